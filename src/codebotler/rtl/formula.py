@@ -1,0 +1,316 @@
+"""The formulas of RTL as values that print as the text in which people write them."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, TypeAlias
+
+CutName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
+
+
+@dataclass(frozen=True)
+class Regex:
+    """A text in which a regex is found, ignoring case.
+
+    Args:
+        pattern: the regex; `.` is any character, a line break too.
+    """
+
+    pattern: str
+
+    @cached_property
+    def compiled(self) -> re.Pattern[str]:
+        """The regex, ready to search with."""
+        return compile_regex(self.pattern)
+
+    def matches(self, text: str) -> bool:
+        """Whether the regex is found in a text."""
+        return self.compiled.search(text) is not None
+
+    def __str__(self) -> str:
+        return quote(self.pattern)
+
+
+@dataclass(frozen=True)
+class Without:
+    """A text in which a regex is not found as a whole word.
+
+    Args:
+        pattern: the regex.
+    """
+
+    pattern: str
+
+    @cached_property
+    def compiled(self) -> re.Pattern[str]:
+        """The regex between word boundaries, ready to search with."""
+        return compile_regex(rf"\b(?:{self.pattern})\b")
+
+    def matches(self, text: str) -> bool:
+        """Whether the regex is nowhere in a text, or only inside words."""
+        return self.compiled.search(text) is None
+
+    def __str__(self) -> str:
+        return f"without({quote(self.pattern)})"
+
+
+@dataclass(frozen=True)
+class Words:
+    """A text in which all parts are found, in any order.
+
+    Args:
+        parts: one or more texts.
+    """
+
+    parts: tuple[Text, ...]
+
+    def matches(self, text: str) -> bool:
+        """Whether every part is found somewhere in a text."""
+        return all(part.matches(text) for part in self.parts)
+
+    def __str__(self) -> str:
+        return f"words({', '.join(map(str, self.parts))})"
+
+
+Text: TypeAlias = Regex | Words | Without
+
+
+@dataclass(frozen=True)
+class Element:
+    """What an event may be: a kind with a text and, for a question, an option.
+
+    Args:
+        kind: the kind of the event, such as `goto`.
+        text: what the event's text must match.
+        options: what at least one option must match; None for kinds without options.
+    """
+
+    kind: str
+    text: Text
+    options: Text | None = None
+
+    def __str__(self) -> str:
+        texts = [self.text] if self.options is None else [self.text, self.options]
+        return f"{self.kind}({', '.join(map(str, texts))})"
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A part of a trace: what lies before or after the first or last event that an element matches.
+
+    Args:
+        name: which part.
+        element: what is searched for; where nothing matches, the trace stays whole.
+    """
+
+    name: CutName
+    element: Element
+
+    def __str__(self) -> str:
+        return f".{self.name}({self.element})"
+
+
+Cuts: TypeAlias = tuple[Cut, ...]
+
+
+@dataclass(frozen=True)
+class Exists:
+    """Some event of the trace matches.
+
+    Args:
+        element: what the event must match.
+        cuts: how the trace is cut before, in order.
+    """
+
+    element: Element
+    cuts: Cuts = ()
+
+    def __str__(self) -> str:
+        return f"{_cut_trace(self.cuts)}.Exists({self.element})"
+
+
+@dataclass(frozen=True)
+class ActAtFirst:
+    """An event matches during the first stay at a place.
+
+    Args:
+        place: a regex for the room.
+        element: what the event must match.
+        cuts: how the trace is cut before, in order.
+    """
+
+    place: str
+    element: Element
+    cuts: Cuts = ()
+
+    @cached_property
+    def stay(self) -> Stay:
+        """The moves that begin and end a stay at the place."""
+        return Stay.at(self.place)
+
+    def __str__(self) -> str:
+        return f"{_cut_trace(self.cuts)}.ActAtFirst({quote(self.place)}, {self.element})"
+
+
+@dataclass(frozen=True)
+class ActAtSome:
+    """An event matches during some stay at a place.
+
+    Args:
+        place: a regex for the room.
+        element: what the event must match.
+        cuts: how the trace is cut before, in order.
+    """
+
+    place: str
+    element: Element
+    cuts: Cuts = ()
+
+    @cached_property
+    def stay(self) -> Stay:
+        """The moves that begin and end a stay at the place."""
+        return Stay.at(self.place)
+
+    def __str__(self) -> str:
+        return f"{_cut_trace(self.cuts)}.ActAtSome({quote(self.place)}, {self.element})"
+
+
+@dataclass(frozen=True)
+class Count:
+    """Exactly so many events of the trace match.
+
+    Args:
+        element: what the events must match.
+        number: how many, 0 or more.
+        cuts: how the trace is cut before, in order.
+    """
+
+    element: Element
+    number: int
+    cuts: Cuts = ()
+
+    def __str__(self) -> str:
+        return f"{_cut_trace(self.cuts)}.Count({self.element}, {self.number})"
+
+
+@dataclass(frozen=True)
+class AtLeast:
+    """So many events of the trace match, or more.
+
+    Args:
+        element: what the events must match.
+        number: how many, 0 or more.
+        cuts: how the trace is cut before, in order.
+    """
+
+    element: Element
+    number: int
+    cuts: Cuts = ()
+
+    def __str__(self) -> str:
+        return f"{_cut_trace(self.cuts)}.AtLeast({self.element}, {self.number})"
+
+
+@dataclass(frozen=True)
+class And:
+    """All parts hold.
+
+    Args:
+        parts: two or more, evaluated from the left until one fails.
+    """
+
+    parts: tuple[Formula, ...]
+
+    def __str__(self) -> str:
+        return " and ".join(_part(part, (And, Or)) for part in self.parts)
+
+
+@dataclass(frozen=True)
+class Or:
+    """Some part holds.
+
+    Args:
+        parts: two or more, evaluated from the left until one holds.
+    """
+
+    parts: tuple[Formula, ...]
+
+    def __str__(self) -> str:
+        return " or ".join(_part(part, (Or,)) for part in self.parts)
+
+
+@dataclass(frozen=True)
+class Not:
+    """A formula does not hold.
+
+    Args:
+        part: the formula.
+    """
+
+    part: Formula
+
+    def __str__(self) -> str:
+        return f"not {_part(self.part, (And, Or))}"
+
+
+Test: TypeAlias = Exists | ActAtFirst | ActAtSome | Count | AtLeast
+Formula: TypeAlias = Test | And | Or | Not
+
+
+@dataclass(frozen=True)
+class Stay:
+    """A stay at a place.
+
+    Args:
+        arrival: the move that begins it.
+        departure: the move that ends it.
+    """
+
+    arrival: Element
+    departure: Element
+
+    @classmethod
+    def at(cls, place: str) -> Stay:
+        """A stay at the place that a regex names."""
+        return cls(Element("goto", Regex(place)), Element("goto", Without(place)))
+
+
+def compile_regex(pattern: str) -> re.Pattern[str]:
+    """A regex as RTL understands it.
+
+    Args:
+        pattern: the regex.
+
+    Raises:
+        re.error: it is none.
+    """
+    with warnings.catch_warnings():
+        # `[[` and the like may mean something else in a later Python; in this one they are plain.
+        warnings.simplefilter("ignore", FutureWarning)
+        return re.compile(pattern, re.IGNORECASE | re.DOTALL)
+
+
+def quote(text: str) -> str:
+    """A string as RTL writes it: in double quotes, raw where it holds backslashes, if that is possible.
+
+    Args:
+        text: any text.
+    """
+    odd_end = (len(text) - len(text.rstrip("\\"))) % 2
+    if "\\" in text and '"' not in text and text.isprintable() and not odd_end:
+        return f'r"{text}"'
+    if '"' in text:
+        return repr(text)
+    # A single quote makes `repr` choose double ones.
+    return '"' + repr("'" + text)[2:]
+
+
+def _cut_trace(cuts: Cuts) -> str:
+    return "tr" + "".join(map(str, cuts))
+
+
+def _part(formula: Formula, bracketed: tuple[type[Formula], ...]) -> str:
+    return f"({formula})" if isinstance(formula, bracketed) else str(formula)

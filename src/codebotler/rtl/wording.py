@@ -1,0 +1,328 @@
+"""Texts, elements and events of RTL in English, for explanations."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from codebotler.rtl.formula import Element, Regex, Text, Without, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from codebotler.trace import Event
+
+Form: TypeAlias = Literal["base", "past", "ing"]
+Deed: TypeAlias = tuple[Element, ...]
+"""What one robot may do: any of these elements. Two of them are one text, in a question or in its options."""
+
+# The kinds of the paper read best with verbs of their own; further skills are told by their names.
+_VERBS: dict[str, dict[Form, str]] = {
+    "goto": {"base": "go", "past": "went", "ing": "going"},
+    "say": {"base": "say", "past": "said", "ing": "saying"},
+    "ask": {"base": "ask", "past": "asked", "ing": "asking"},
+    "check": {"base": "look for", "past": "looked for", "ing": "looking for"},
+    "pick": {"base": "pick up", "past": "picked up", "ing": "picking up"},
+    "place": {"base": "put down", "past": "put down", "ing": "putting down"},
+}
+_OTHER_VERB: dict[Form, str] = {"base": "do", "past": "did", "ing": "doing"}
+_MENTION: dict[Form, str] = {"base": "mention", "past": "mentioned", "ing": "mentioning"}
+_PASTIMES = {
+    "say": "spoke",
+    "ask": "asked something",
+    "check": "looked around",
+    "pick": "picked something up",
+    "place": "put something down",
+}
+_SHOWN = 70
+_MOST = 5
+
+
+def did(deed: Deed, form: Form, *, never: bool = False) -> str:  # noqa: PLR0911 - one for each kind
+    """A deed as a verb and its object, such as `asked about lunch`.
+
+    Args:
+        deed: what may be done.
+        form: of the verb.
+        never: whether `never` or `not` stands before it, so that it is `anything` rather than `something`.
+    """
+    element = deed[0]
+    verb = _VERBS.get(element.kind, _OTHER_VERB)[form]
+    if len(deed) > 1:
+        return _mentioned(deed, form, verb)
+    if element.kind == "check" and is_any(element.text):
+        return f"{verb.removesuffix(' for')} around"
+    thing = "anything" if never else "something"
+    match element.kind:
+        case "goto":
+            return f"{verb} {_destination(element.text, 'anywhere' if never else 'somewhere')}"
+        case "say":
+            return " ".join(filter(None, [verb, thing, with_texts(element.text)]))
+        case "ask":
+            return f"{verb} {_question(element, 'anything' if never else 'a question')}"
+        case "check" | "pick" | "place":
+            return f"{verb} {_thing(element.text, thing)}"
+        case kind:
+            return " ".join(filter(None, [verb, f"a {kind}", with_texts(element.text)]))
+
+
+def happened(event: Event, form: Form) -> str:
+    """An event as a verb and its object, such as `said "hello"`.
+
+    Args:
+        event: what the robot did.
+        form: of the verb.
+    """
+    verb = _VERBS.get(event.kind, _OTHER_VERB)[form]
+    if event.kind == "goto":
+        return f"{verb} to {room_name(event.text)}"
+    return (
+        f"{verb} {quoted(event.text)}"
+        if event.kind in _VERBS
+        else f"{verb} a {event.kind} {quoted(event.text)}"
+    )
+
+
+def offered(event: Event) -> str:
+    """An event in the past, with the options of a question.
+
+    Args:
+        event: what the robot did.
+    """
+    options = f" with the options {_options(event)}" if event.options else ""
+    return f"{happened(event, 'past')}{options}"
+
+
+def pastimes(events: Iterable[Event]) -> str:
+    """What the robot did, by kind only: `spoke and looked around`; empty where it did nothing but move.
+
+    Args:
+        events: what it did.
+    """
+    kinds = dict.fromkeys(event.kind for event in events if event.kind != "goto")
+    return listed([_PASTIMES.get(kind, f"did a {kind}") for kind in kinds])
+
+
+def lacking(deed: Deed, event: Event) -> str:
+    """Why an event of the right kind is not the deed: `which lacks "good"`.
+
+    Args:
+        deed: what was wanted.
+        event: what happened instead.
+    """
+    missing = next((lack for element in deed if (lack := lacks(element.text, event.text))), [])
+    named = len(missing) > 1 or not missing or not missing[0].startswith("does not match")
+    reasons = [f"which {listed(missing) if named else 'does not match'}"] if missing else []
+    if not event.options and deed[0].options is not None:
+        return ", and ".join([*reasons, "it had no options"])
+    if len(deed) > 1:
+        return ", and ".join([*reasons, f"none of its options ({_options(event)}) does better"])
+    if not missing and deed[0].options is not None:
+        wanted = with_texts(deed[0].options)
+        is_one = f"has {wanted.removeprefix('with ')}" if wanted.startswith("with ") else f"is one {wanted}"
+        return f"but none of its options ({_options(event)}) {is_one}"
+    return reasons[0]
+
+
+def _options(event: Event) -> str:
+    names = [quoted(option.text) for option in event.options]
+    return listed(names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST} more"])
+
+
+def lacks(text: Text, actual: str) -> list[str]:
+    """What keeps a text from matching: `lacks "good"`, `has the word "no"`.
+
+    Args:
+        text: what it should match.
+        actual: the text.
+    """
+    match text:
+        case Words(parts):
+            missing = [lack for part in parts for lack in lacks(part, actual)]
+            return _merged(missing, "lacks ")
+        case _ if text.matches(actual):
+            return []
+        case Without(pattern):
+            return [f"has {_word(pattern)}"]
+        case Regex(pattern):
+            if start := _forbidden_start(pattern):
+                return [f'starts with "{start}"']
+            return [f"lacks {named}" if (named := _named(pattern)) else f"does not match /{pattern}/"]
+
+
+def with_texts(text: Text) -> str:
+    """A text as an attribute, such as `with "5 or five" and "lobby"`; empty where any text will do.
+
+    Args:
+        text: what is to be matched.
+    """
+    return listed(_merged(_qualities(text), "with "))
+
+
+def room(pattern: str) -> str:
+    """A place as a formula names it, such as `the lobby` or `bob's office`.
+
+    Args:
+        pattern: the regex.
+    """
+    names = literals(pattern)
+    return listed([room_name(name) for name in names], "or") if names else f"a room matching /{pattern}/"
+
+
+def room_name(name: str) -> str:
+    """A room, with an article where its name is a common noun.
+
+    Args:
+        name: as the robot was told.
+    """
+    return f"the {name}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else _shortened(name) or '""'
+
+
+def quoted(text: str) -> str:
+    """A text in quotes, shortened to fit into a sentence.
+
+    Args:
+        text: any text.
+    """
+    return f'"{_shortened(text)}"'
+
+
+def listed(parts: Sequence[str], last: str = "and") -> str:
+    """An enumeration: `a, b and c`.
+
+    Args:
+        parts: what to enumerate.
+        last: the word before the last part.
+    """
+    if len(parts) <= 1:
+        return "".join(parts)
+    return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
+
+
+def times(number: int) -> str:
+    """How often: `once`, `twice`, `3 times`.
+
+    Args:
+        number: 0 or more.
+    """
+    return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number} times")
+
+
+def is_any(text: Text) -> bool:
+    """Whether every text matches.
+
+    Args:
+        text: what is to be matched.
+    """
+    match text:
+        case Words(parts):
+            return all(map(is_any, parts))
+        case Regex(pattern):
+            return pattern in {"", ".*", "^.*$"}
+        case Without():
+            return False
+
+
+def literals(pattern: str) -> list[str]:
+    """The plain texts between which a regex chooses; none if it is more than such a choice.
+
+    Args:
+        pattern: the regex.
+    """
+    names = [re.sub(r"\\(\W)", r"\1", part) for part in pattern.split("|")]
+    plain = re.fullmatch(r"(?:[^\\.^$*+?{}\[\]()]|\\[^\w|])*", pattern)
+    return names if plain and all(name and name == name.strip() for name in names) else []
+
+
+def _qualities(text: Text) -> list[str]:
+    match text:
+        case Words(parts):
+            return [quality for part in parts for quality in _qualities(part)]
+        case Without(pattern):
+            return [f"without {_word(pattern)}"]
+        case Regex(pattern):
+            if is_any(text):
+                return []
+            if start := _forbidden_start(pattern):
+                return [f'not starting with "{start}"']
+            return [f"with {named}" if (named := _named(pattern)) else f"matching /{pattern}/"]
+
+
+def _named(pattern: str) -> str:
+    if names := literals(pattern):
+        return f'"{listed(names, "or")}"'
+    inner = re.fullmatch(r"\\b(?:\(\?:)?(.+?)\)?\\b", pattern)
+    return f'the word "{listed(names, "or")}"' if inner and (names := literals(inner[1])) else ""
+
+
+def _word(pattern: str) -> str:
+    names = literals(pattern)
+    return f'the word "{listed(names, "or")}"' if names else f"words matching /{pattern}/"
+
+
+def _forbidden_start(pattern: str) -> str:
+    inner = re.fullmatch(r"\^\(\?!(.*)\\b\)", pattern)
+    return listed(literals(inner[1]), "or") if inner else ""
+
+
+def _merged(parts: list[str], head: str) -> list[str]:
+    """The same parts with those that begin with one word in front, told as one enumeration."""
+    same = [part.removeprefix(head) for part in parts if part.startswith(head)]
+    others = [part for part in parts if not part.startswith(head)]
+    return [head + listed(same), *others] if same else others
+
+
+def _destination(text: Text, anywhere: str) -> str:
+    match text:
+        case Regex(pattern):
+            return anywhere if is_any(text) else f"to {room(pattern)}"
+        case Without(pattern):
+            return (
+                f"{anywhere} but to {room(pattern)}"
+                if anywhere == "anywhere"
+                else f"elsewhere than to {room(pattern)}"
+            )
+        case Words():
+            return f"to a room {with_texts(text)}".rstrip()
+
+
+def _thing(text: Text, thing: str) -> str:
+    match text:
+        case Regex(pattern) if names := literals(pattern):
+            return f'"{listed(names, "or")}"'
+        case _:
+            return f"{thing} {with_texts(text)}".rstrip()
+
+
+def _mentioned(deed: Deed, form: Form, verb: str) -> str:
+    """A text in a question or in its options."""
+    wanted = with_texts(_wanted(deed))
+    if wanted.startswith("with "):
+        return f"{_MENTION[form]} {wanted.removeprefix('with ')} in a question or its options"
+    return f"{verb} a question or offer{'ed' if form == 'past' else ''} an option {wanted}"
+
+
+def _wanted(deed: Deed) -> Text:
+    options = deed[0].options
+    return options if options is not None and is_any(deed[0].text) else deed[0].text
+
+
+def _question(element: Element, question: str) -> str:
+    text, options = element.text, element.options
+    offered = "" if options is None or is_any(options) else f"with an option {with_texts(options)}"
+    if is_any(text):
+        return f"{question} {offered}".rstrip()
+    return f"{_topic(text, question)} {offered}".rstrip()
+
+
+def _topic(text: Text, question: str) -> str:
+    match text:
+        case Regex(pattern) if names := literals(pattern):
+            return f"about {listed(names, 'or')}"
+        case _:
+            return f"{question} {with_texts(text)}"
+
+
+def _shortened(text: str) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= _SHOWN else line[: _SHOWN - 1].rstrip() + "…"

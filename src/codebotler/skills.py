@@ -1,0 +1,192 @@
+"""The skill table: the one place that knows what a robot can be asked to do.
+
+Prompts, the simulator, the isolated child, RTL, ROS types and the pages are all derived from it, so that one
+more skill is one more row here and one more behaviour in `codebotler.simulator.robot`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One argument of a skill.
+
+    Args:
+        name: the keyword by which a program may pass it.
+        type: `str` or `list`; exactly this type is asked for, no subclass and no other sequence.
+        annotation: how the type is written for a reader, such as `list[str]`.
+    """
+
+    name: str
+    type: type[str] | type[list[object]] = str
+    annotation: str = "str"
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a skill leaves in the trace.
+
+    Args:
+        kind: the event's kind, which is also the name of its element in RTL, such as `goto`.
+        text: the parameter whose value is the event's text.
+        options: the parameter whose value is the event's list of options, for a question.
+    """
+
+    kind: str
+    text: str
+    options: str | None = None
+
+
+@dataclass(frozen=True)
+class RosAction:
+    """The ROS action that carries a skill to a robot (paper, section III.C)."""
+
+    type: str
+    server: str
+    goal: tuple[str, ...] = ()
+    result: str | None = None
+
+
+@dataclass(frozen=True)
+class Skill:
+    """One robot primitive of the paper's figure 2a.
+
+    Args:
+        name: the function a program calls.
+        parameters: its arguments, in order.
+        returns: the annotation of what comes back.
+        doc: what it does, in a sentence meant for the person or model who writes programs.
+        recording: what it leaves in the trace; None for skills that leave nothing.
+        ros: the action on a robot.
+    """
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    returns: str
+    doc: str
+    recording: Recording | None = None
+    ros: RosAction | None = None
+
+    @property
+    def signature(self) -> str:
+        """The skill as a Python signature, such as `go_to(location: str) -> None`."""
+        arguments = ", ".join(f"{p.name}: {p.annotation}" for p in self.parameters)
+        return f"{self.name}({arguments}) -> {self.returns}"
+
+
+@dataclass(frozen=True)
+class SkillTable(Mapping[str, Skill]):
+    """Skills by name, in the order in which they are shown.
+
+    Args:
+        rows: the skills; names and recorded kinds are unique.
+
+    Raises:
+        ValueError: two rows share a name or a recorded kind.
+    """
+
+    rows: tuple[Skill, ...]
+    _by_name: Mapping[str, Skill] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        by_name = {skill.name: skill for skill in self.rows}
+        kinds = [skill.recording.kind for skill in self.rows if skill.recording]
+        if len(by_name) != len(self.rows) or len(set(kinds)) != len(kinds):
+            raise ValueError("two skills share a name or a kind of event")
+        object.__setattr__(self, "_by_name", MappingProxyType(by_name))
+
+    def __getitem__(self, name: str) -> Skill:
+        return self._by_name[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._by_name)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __hash__(self) -> int:
+        return hash(self.rows)
+
+    def with_skill(self, skill: Skill) -> SkillTable:
+        """This table and one more row."""
+        return SkillTable((*self.rows, skill))
+
+    @property
+    def recordings(self) -> Mapping[str, Recording]:
+        """What can stand in a trace, by kind of event."""
+        return {s.recording.kind: s.recording for s in self.rows if s.recording}
+
+
+SKILLS = SkillTable(
+    (
+        Skill(
+            "get_current_location",
+            (),
+            "str",
+            "Name the room the robot is in.",
+            ros=RosAction("GetCurrentLocation", "/get_current_location_server", result="string"),
+        ),
+        Skill(
+            "get_all_rooms",
+            (),
+            "list[str]",
+            "List the names of all rooms.",
+            ros=RosAction("GetAllRooms", "/get_all_rooms_server", result="string[]"),
+        ),
+        Skill(
+            "is_in_room",
+            (Parameter("entity"),),
+            "bool",
+            "Look whether an object or a person is in the room the robot is in.",
+            Recording("check", "entity"),
+            RosAction("IsInRoom", "/is_in_room_server", ("string object",), "bool"),
+        ),
+        Skill(
+            "go_to",
+            (Parameter("location"),),
+            "None",
+            "Drive to a room.",
+            Recording("goto", "location"),
+            RosAction("GoTo", "/go_to_server", ("string location",)),
+        ),
+        Skill(
+            "ask",
+            (Parameter("person"), Parameter("question"), Parameter("options", list, "list[str]")),
+            "str",
+            "Ask a person in the same room a question and return the option that they choose.",
+            Recording("ask", "question", "options"),
+            RosAction(
+                "Ask", "/ask_server", ("string person", "string question", "string[] options"), "string"
+            ),
+        ),
+        Skill(
+            "say",
+            (Parameter("message"),),
+            "None",
+            "Say a message aloud in the room the robot is in.",
+            Recording("say", "message"),
+            RosAction("Say", "/say_server", ("string message",)),
+        ),
+        Skill(
+            "pick",
+            (Parameter("obj"),),
+            "None",
+            "Pick up an object in the room; the robot can hold one at a time.",
+            Recording("pick", "obj"),
+            RosAction("Pick", "/pick_server", ("string obj",)),
+        ),
+        Skill(
+            "place",
+            (Parameter("obj"),),
+            "None",
+            "Put down the object that the robot holds.",
+            Recording("place", "obj"),
+            RosAction("Place", "/place_server", ("string obj",)),
+        ),
+    )
+)
+"""The eight skills of the paper."""

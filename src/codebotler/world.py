@@ -1,0 +1,227 @@
+"""Worlds: rooms, objects, people with scripted answers, and where the robot starts."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from codebotler.badinput import Place, YamlFile
+
+Point: TypeAlias = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody in a room who answers questions.
+
+    Args:
+        name: a regex for the names they answer to.
+        answers: a regex per answer, in order; the last one stays for ever. Without any, every question fails.
+    """
+
+    name: str
+    answers: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Room:
+    """A place the robot can drive to.
+
+    Args:
+        name: a regex that is looked for in what a program asks for.
+        objects: labels of what lies there, in order.
+        people: who is there, in order.
+        footprint: its corners in metres; None where nobody measured it.
+        stand_at: where the robot stops in it, in metres.
+    """
+
+    name: str
+    objects: tuple[str, ...] = ()
+    people: tuple[Person, ...] = ()
+    footprint: tuple[Point, ...] | None = None
+    stand_at: Point | None = None
+
+
+@dataclass(frozen=True)
+class World:
+    """An initial state of the world (paper, section IV.A).
+
+    Args:
+        rooms: at least one, in the order in which the robot knows them, with unique names.
+        robot: the room in which the robot starts.
+        about: what is special here, in a few words.
+        may_wait_forever: whether a program may wait here for something that never comes.
+    """
+
+    rooms: tuple[Room, ...]
+    robot: str
+    about: str = ""
+    may_wait_forever: bool = False
+
+    @classmethod
+    def read(cls, path: Path) -> World:
+        """Read a world file.
+
+        Raises:
+            BadInput: the file is missing or wrong; the sentence names the line and the mend.
+        """
+        file = YamlFile.read(path)
+        return file.validate(WorldFile).world(file)
+
+    def to_yaml(self) -> str:
+        """This world as the text of a world file."""
+        data: dict[str, object] = {
+            "about": self.about,
+            "robot": self.robot,
+            "rooms": [_room_data(room) for room in self.rooms],
+        }
+        if any(room.objects for room in self.rooms):
+            data["objects"] = {room.name: list(room.objects) for room in self.rooms if room.objects}
+        if any(room.people for room in self.rooms):
+            data["people"] = {
+                room.name: [{"name": p.name, "answers": list(p.answers)} for p in room.people]
+                for room in self.rooms
+                if room.people
+            }
+        if self.may_wait_forever:
+            data["may_wait_forever"] = True
+        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+
+
+ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
+
+
+def laid_out(world: World) -> World:
+    """The world with a footprint and a standing point for every room: a grid on both sides of a hallway.
+
+    Rooms that have a footprint keep it; the others are placed beyond the rightmost of them.
+    """
+    taken = [x for room in world.rooms for x, _ in room.footprint or ()]
+    start = max(taken, default=0.0) + (HALLWAY if taken else 0.0)
+    rooms, placed = [], 0
+    for room in world.rooms:
+        footprint = room.footprint
+        if footprint is None:
+            left = start + placed // 2 * ROOM_WIDTH
+            low = 0.0 if placed % 2 == 0 else ROOM_DEPTH + HALLWAY
+            right, high = left + ROOM_WIDTH, low + ROOM_DEPTH
+            footprint = ((left, low), (right, low), (right, high), (left, high))
+            placed += 1
+        centre = (
+            sum(x for x, _ in footprint) / len(footprint),
+            sum(y for _, y in footprint) / len(footprint),
+        )
+        rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
+    return replace(world, rooms=tuple(rooms))
+
+
+Text = Annotated[str, StringConstraints(strict=True)]
+Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class PersonFile(_Form):
+    """A person as a world file writes them."""
+
+    name: Name
+    answers: list[Text] = []
+
+
+class RoomFile(_Form):
+    """A room with geometry as a world file writes it."""
+
+    name: Name
+    footprint: Annotated[list[Point], Field(min_length=3)] | None = None
+    stand_at: Point | None = None
+
+
+class WorldFile(_Form):
+    """A world as a file writes it, alone or inside a task."""
+
+    about: Text = ""
+    robot: Name
+    rooms: Annotated[list[Name | RoomFile], Field(min_length=1)]
+    objects: dict[str, list[Name]] = {}
+    people: dict[str, list[PersonFile]] = {}
+    may_wait_forever: bool = False
+
+    def world(self, file: YamlFile, at: Place = ()) -> World:
+        """The world it describes.
+
+        Args:
+            file: where it stands, for the sentences of errors.
+            at: where in the file.
+
+        Raises:
+            BadInput: a room does not exist or stands twice, or a regex is invalid.
+        """
+        rooms = [RoomFile(name=room) if isinstance(room, str) else room for room in self.rooms]
+        names = [room.name for room in rooms]
+        for index, name in enumerate(names):
+            _regex(name, file, (*at, "rooms", index))
+            if name in names[:index]:
+                raise file.wrong(f'the room "{name}" stands here twice; remove one', *at, "rooms", index)
+        self._check_places(file, at, names)
+        return World(
+            rooms=tuple(
+                Room(
+                    name=room.name,
+                    objects=tuple(self.objects.get(room.name, ())),
+                    people=tuple(Person(p.name, tuple(p.answers)) for p in self.people.get(room.name, ())),
+                    footprint=None if room.footprint is None else tuple(room.footprint),
+                    stand_at=room.stand_at,
+                )
+                for room in rooms
+            ),
+            robot=self.robot,
+            about=self.about,
+            may_wait_forever=self.may_wait_forever,
+        )
+
+    def _check_places(self, file: YamlFile, at: Place, rooms: list[str]) -> None:
+        known = ", ".join(rooms)
+        if self.robot not in rooms:
+            raise file.wrong(f'the robot starts in "{self.robot}", but the rooms are: {known}', *at, "robot")
+        for room, labels in self.objects.items():
+            if room not in rooms:
+                raise file.wrong(
+                    f'there are objects in "{room}", but the rooms are: {known}', *at, "objects", room
+                )
+            for index, label in enumerate(labels):
+                _regex(label, file, (*at, "objects", room, index))
+        for room, people in self.people.items():
+            if room not in rooms:
+                raise file.wrong(
+                    f'there are people in "{room}", but the rooms are: {known}', *at, "people", room
+                )
+            for index, person in enumerate(people):
+                here = (*at, "people", room, index)
+                _regex(person.name, file, (*here, "name"))
+                for number, answer in enumerate(person.answers):
+                    _regex(answer, file, (*here, "answers", number))
+
+
+def _regex(text: str, file: YamlFile, place: Place) -> None:
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise file.wrong(f'"{text}" is no valid regular expression: {error}', *place) from None
+
+
+def _room_data(room: Room) -> object:
+    if room.footprint is None and room.stand_at is None:
+        return room.name
+    data: dict[str, object] = {"name": room.name}
+    if room.footprint is not None:
+        data["footprint"] = [list(corner) for corner in room.footprint]
+    if room.stand_at is not None:
+        data["stand_at"] = list(room.stand_at)
+    return data

@@ -1,0 +1,1 @@
+"""How good are language models at writing programs for service robots?"""

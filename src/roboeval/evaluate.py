@@ -1,0 +1,125 @@
+"""The authority on right and wrong: runs completions in the worlds of their tasks and judges the traces."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from codebotler import __version__
+from codebotler.rtl import CannotJudge, holds
+from codebotler.simulator.engine import Lane, Lanes
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import Rules
+from codebotler.trace import Outcome, Status, Trace
+from roboeval.records import Completion, outcome_data, trace_data
+from roboeval.suite import Requirement, Scenario, Suite
+from roboeval.taxonomy import Verdict, failure
+
+
+def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
+    """Say whether a run did what its world requires.
+
+    A run that ended in an error is unsatisfied whatever it did; one that reached a limit is judged by the
+    requirements only in a world that may wait for ever.
+
+    Args:
+        outcome: of the run.
+        scenario: the world in which it ran, with its requirements.
+    """
+    waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
+    if outcome.status is not Status.FINISHED and not waited:
+        return Verdict(scenario.world.about, outcome, (), satisfied=False)
+    failed = tuple(r for r in scenario.require if not _is_met(r, outcome.trace))
+    return Verdict(scenario.world.about, outcome, failed, satisfied=not failed)
+
+
+def _is_met(requirement: Requirement, trace: Trace) -> bool:
+    try:
+        return holds(requirement.formula, trace)
+    except CannotJudge:
+        return False
+
+
+def evaluate(
+    completions: Iterable[Completion], suite: Suite, *, ablated: bool = False, workers: int = 1
+) -> Iterator[dict[str, Any]]:
+    """Judge completions, yielding one row each in their order; equal programs of a task run once.
+
+    Args:
+        completions: whose tasks the suite knows; read as they are needed.
+        suite: tasks and rules.
+        ablated: whether to require common sense only; then all tasks have an ablation.
+        workers: how many programs are run at the same time.
+
+    Raises:
+        EngineError: no isolated process can be started.
+    """
+
+    def run_all(work: tuple[str, str]) -> list[Verdict]:
+        task, program = work
+        scenarios = suite.tasks[task].judged_in(ablated=ablated)
+        return [judge(_run(lanes.here(), program, s, suite.rules), s) for s in scenarios]
+
+    rows: list[Completion] = []
+
+    def works() -> Iterator[tuple[str, str]]:
+        for completion in completions:
+            rows.append(completion)
+            yield completion.task, completion.program
+
+    with Lanes(workers) as lanes:
+        for verdicts in lanes.map_distinct(run_all, works()):
+            yield evaluation(rows.pop(0), verdicts)
+
+
+def _run(lane: Lane, program: str, scenario: Scenario, rules: Rules) -> Outcome:
+    return lane.run(program, SimulatedRobot(scenario.world, rules))
+
+
+def evaluation(completion: Completion, verdicts: list[Verdict]) -> dict[str, Any]:
+    """The row of an evaluation."""
+    why = failure(verdicts)
+    return {
+        "task": completion.task,
+        "prompt": completion.prompt,
+        "index": completion.index,
+        "passed": why is None,
+        "failure": None if why is None else why.data(),
+        "verdicts": [verdict_data(verdict) for verdict in verdicts],
+    }
+
+
+def verdict_data(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as a row writes it."""
+    return {
+        "world": verdict.world,
+        "satisfied": verdict.satisfied,
+        **outcome_data(verdict.outcome),
+        "failed_checks": [requirement.text for requirement in verdict.failed],
+        "trace": trace_data(verdict.outcome.trace),
+    }
+
+
+def head(suite: Suite) -> dict[str, Any]:
+    """What KEY.json says beside the rows: by what they were judged."""
+    rules = suite.rules
+    return {
+        "suite": suite.name,
+        "version": suite.version,
+        "digest": suite.digest,
+        "rules": {
+            "literals": rules.literals,
+            "matching": rules.matching,
+            "people": rules.people,
+            "limits": {
+                "seconds": rules.limits.seconds,
+                "calls": rules.limits.calls,
+                "ticks": rules.limits.ticks,
+            },
+            "skill_seconds": 0,
+            "clock_starts": rules.clock_starts.isoformat(),
+        },
+        "codebotler": __version__,
+        "python": ".".join(platform.python_version_tuple()[:2]),
+    }

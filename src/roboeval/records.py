@@ -1,0 +1,359 @@
+"""Rows of completions.jsonl and of evaluations: read with line numbers, written so that no crash loses one."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import zipfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, BinaryIO, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from codebotler.badinput import BadInput, read_text
+from codebotler.models.recorded import recorded_model
+from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
+from roboeval.suite import Suite
+
+MAX_ROW = 5_000_000
+COMPLETIONS = "completions.jsonl"
+
+Key: TypeAlias = tuple[str, int, int]
+
+
+class Completion(BaseModel):
+    """One row of completions.jsonl: a program that a model wrote for an instruction.
+
+    Args:
+        task: the task's name.
+        prompt: which phrasing, counted from 0.
+        index: which sample, counted from 0.
+        program: the cleaned source; judged exactly as it stands.
+        instruction: what the model was told; None where nobody recorded it.
+        model: who wrote it.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+
+    task: str
+    prompt: Annotated[int, Field(ge=0)]
+    index: Annotated[int, Field(ge=0)]
+    program: str
+    instruction: str | None = None
+    model: str | None = None
+
+    @property
+    def key(self) -> Key:
+        """What no other row of a run shares."""
+        return self.task, self.prompt, self.index
+
+
+# --- reading
+
+
+def read_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Read a file of JSON lines: the line's number, counted from 1, and its object.
+
+    A last line without an end is one that a crash has torn; it is passed over.
+
+    Raises:
+        BadInput: the file is missing, or a line is too long or no JSON object.
+    """
+    try:
+        file = path.open("rb")
+    except FileNotFoundError:
+        raise BadInput("there is no such file", file=path) from None
+    except OSError as error:
+        raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+    with file:
+        for number in _count():
+            line = file.readline(MAX_ROW + 1)
+            if not line:
+                return
+            if len(line) > MAX_ROW:
+                raise BadInput(f"this row is longer than {MAX_ROW:,} bytes", file=path, line=number)
+            if line.strip():
+                row = _parsed(line, path, number)
+                if row is None:
+                    return
+                yield number, row
+
+
+def _count() -> Iterator[int]:
+    number = 0
+    while True:
+        yield (number := number + 1)
+
+
+def _parsed(line: bytes, path: Path, number: int) -> dict[str, Any] | None:
+    try:
+        row = json.loads(line)
+    except (ValueError, RecursionError):
+        if not line.endswith(b"\n"):
+            return None
+        raise BadInput("this line is no JSON", file=path, line=number) from None
+    if not isinstance(row, dict):
+        raise BadInput("this line is no JSON object", file=path, line=number)
+    return row
+
+
+def read_completions(path: Path) -> Iterator[Completion]:
+    """Read completions from a file of JSON lines.
+
+    Raises:
+        BadInput: the file is missing or empty, or a row is wrong or repeats another.
+    """
+    seen: dict[Key, int] = {}
+    for number, row in read_rows(path):
+        try:
+            completion = Completion.model_validate(row)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            what = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg'].lower()}"
+            field = ".".join(map(str, first["loc"]))
+            raise BadInput(f'"{field}" {what}', file=path, line=number) from None
+        if completion.key in seen:
+            raise BadInput(
+                f"{name_of(completion.key)} stands here again; it stood in line {seen[completion.key]} already",
+                file=path,
+                line=number,
+            )
+        seen[completion.key] = number
+        yield completion
+    if not seen:
+        raise BadInput("there is no completion in it", file=path)
+
+
+def check_known(completions: Iterable[Completion], suite: Suite, source: object) -> Iterator[Completion]:
+    """Pass completions on whose task and prompt the suite knows.
+
+    Raises:
+        BadInput: the suite has no such task, or the task no such prompt.
+    """
+    for completion in completions:
+        task = suite.tasks.get(completion.task)
+        if task is None:
+            known = ", ".join(suite.tasks)
+            raise BadInput(
+                f'the suite has no task "{completion.task}"; its tasks are {known}', file=str(source)
+            )
+        if completion.prompt >= len(task.prompts):
+            raise BadInput(
+                f"{name_of(completion.key)}: the task has prompts 0 to {len(task.prompts) - 1}",
+                file=str(source),
+            )
+        yield completion
+
+
+def name_of(key: Key) -> str:
+    """How a person names a row: TASK/PROMPT/INDEX."""
+    return "/".join(map(str, key))
+
+
+def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
+    """Every reply that a recorded model has for a suite's prompts, as completions.
+
+    Raises:
+        BadInput: there is no such model, or it knows none of the suite's instructions.
+    """
+    model = recorded_model(name)
+    found = False
+    for task in suite.tasks.values():
+        for prompt, instruction in enumerate(task.prompts):
+            for index, reply in enumerate(model.replies.get(instruction, ())):
+                found = True
+                yield Completion(
+                    task=task.name,
+                    prompt=prompt,
+                    index=index,
+                    instruction=instruction,
+                    model=f"recorded:{model.name}",
+                    program=reply.program,
+                )
+    if not found:
+        raise BadInput(f'{name} knows no instruction of the suite "{suite.name}"')
+
+
+PUBLISHED = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d+)_(?P<index>\d+)\.py")
+
+
+def published_completions(path: Path) -> Iterator[Completion]:
+    """Read a folder or zip of `TASK_PROMPT_INDEX.py`, the format in which the paper's authors published theirs.
+
+    The files assign texts to `name`, `prompt` and `completion`; they are parsed and never imported.
+
+    Raises:
+        BadInput: it holds no such file, or one of them is wrong.
+    """
+    files = _zipped(path) if path.is_file() else _in_folder(path)
+    found = [(match, name, text) for name, text in files if (match := PUBLISHED.fullmatch(Path(name).name))]
+    if not found:
+        raise BadInput("there is no file named TASK_PROMPT_INDEX.py in it", file=path)
+    found.sort(key=lambda item: (item[0]["task"], int(item[0]["prompt"]), int(item[0]["index"])))
+    seen: dict[Key, str] = {}
+    for match, name, text in found:
+        key = match["task"], int(match["prompt"]), int(match["index"])
+        if key in seen:
+            raise BadInput(f"{name_of(key)} stands here again; {seen[key]} holds it already", file=name)
+        seen[key] = name
+        values = _assigned(text, name)
+        yield Completion(
+            task=key[0],
+            prompt=key[1],
+            index=key[2],
+            instruction=values.get("prompt"),
+            program=values["completion"],
+        )
+
+
+def _in_folder(path: Path) -> Iterator[tuple[str, str]]:
+    for file in sorted(path.rglob("*.py")):
+        yield str(file), read_text(file, limit=MAX_ROW)
+
+
+def _zipped(path: Path) -> Iterator[tuple[str, str]]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for member in archive.infolist():
+                name = PurePosixPath(member.filename)
+                if name.is_absolute() or ".." in name.parts:
+                    raise BadInput(f'the zip names a file outside itself, "{member.filename}"', file=path)
+                if member.file_size > MAX_ROW:
+                    raise BadInput(f'"{member.filename}" is larger than {MAX_ROW:,} bytes', file=path)
+                if name.suffix == ".py":
+                    yield f"{path}/{member.filename}", archive.read(member).decode()
+    except (zipfile.BadZipFile, UnicodeDecodeError, NotImplementedError, RuntimeError) as error:
+        raise BadInput(f"is no readable zip ({error})", file=path) from None
+
+
+def _assigned(text: str, name: str) -> dict[str, str]:
+    try:
+        statements = ast.parse(text).body
+        values = {
+            target.id: ast.literal_eval(statement.value)
+            for statement in statements
+            if isinstance(statement, ast.Assign)
+            for target in statement.targets
+            if isinstance(target, ast.Name) and target.id in ("name", "prompt", "completion")
+        }
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise BadInput(f"cannot be read as assignments of texts ({error})", file=name) from None
+    if not isinstance(values.get("completion"), str):
+        raise BadInput("does not assign a text to `completion`", file=name)
+    return {key: value for key, value in values.items() if isinstance(value, str)}
+
+
+# --- writing
+
+
+def to_line(row: dict[str, Any]) -> bytes:
+    """A row as a line of JSON, in UTF-8 where that is possible."""
+    try:
+        return json.dumps(row, ensure_ascii=False).encode() + b"\n"
+    except UnicodeEncodeError:  # half of a surrogate pair, which JSON can escape and UTF-8 cannot hold
+        return json.dumps(row).encode() + b"\n"
+
+
+@dataclass
+class Appender:
+    """Appends whole lines to a file; what a crash leaves torn is cut off when it is opened.
+
+    Args:
+        path: the file.
+    """
+
+    path: Path
+
+    def __post_init__(self) -> None:
+        self._file: BinaryIO = self.path.open("ab", buffering=0)
+        self._file.truncate(whole_length(self.path))
+
+    def append(self, line: bytes) -> None:
+        """Add a line, whole or not at all.
+
+        Raises:
+            OSError: the disk is full; nothing of the line stays.
+        """
+        start = self._file.seek(0, os.SEEK_END)
+        view = memoryview(line)
+        try:
+            while view:
+                view = view[self._file.write(view) :]
+        except OSError:
+            self._file.truncate(start)
+            raise
+
+    def close(self) -> None:
+        """Bring everything to the disk."""
+        os.fsync(self._file.fileno())
+        self._file.close()
+
+
+def whole_length(path: Path) -> int:
+    """How many bytes of a file of lines are whole lines."""
+    with path.open("rb") as file:
+        position = file.seek(0, os.SEEK_END)
+        while position > 0:
+            start = max(0, position - (1 << 16))
+            file.seek(start)
+            end = file.read(position - start).rfind(b"\n")
+            if end >= 0:
+                return start + end + 1
+            position = start
+    return 0
+
+
+# --- traces and outcomes in rows
+
+
+def trace_data(trace: Trace) -> list[list[Any]]:
+    """A trace as rows write it: `[kind, text]`, with what was found, or with options and answer."""
+    return [_event_data(event) for event in trace]
+
+
+def _event_data(event: Event) -> list[Any]:
+    if event.kind == "ask":
+        return ["ask", event.text, [_option_data(option) for option in event.options], event.answer]
+    if event.found is not None:
+        return [event.kind, event.text, event.found]
+    return [event.kind, event.text]
+
+
+def _option_data(option: Option) -> Any:  # noqa: ANN401 - JSON
+    return option.text if option.is_text else {"no text": option.text}
+
+
+def trace_from(data: Iterable[list[Any]]) -> Trace:
+    """The trace that a row holds; its events have no place and no time."""
+    return tuple(_event_from(element) for element in data)
+
+
+def _event_from(element: list[Any]) -> Event:
+    match element:
+        case ["ask", str(text), list(options), answer]:
+            return Event("ask", text, tuple(_option_from(o) for o in options), answer=answer)
+        case [str(kind), str(text), bool(found)]:
+            return Event(kind, text, found=found)
+        case [str(kind), str(text)]:
+            return Event(kind, text)
+    raise ValueError(f"{element!r} is no element of a trace")
+
+
+def _option_from(data: Any) -> Option:  # noqa: ANN401 - JSON
+    return Option(data) if isinstance(data, str) else Option(data["no text"], is_text=False)
+
+
+def outcome_data(outcome: Outcome) -> dict[str, Any]:
+    """The part of a verdict that says how the run ended."""
+    error = None if outcome.error is None else {"kind": outcome.error.kind, "message": outcome.error.message}
+    return {"status": outcome.status.value, "error": error, "line": outcome.line}
+
+
+def outcome_from(data: dict[str, Any]) -> Outcome:
+    """The outcome that a verdict holds."""
+    error = None if data["error"] is None else RunError(data["error"]["kind"], data["error"]["message"])
+    return Outcome(Status(data["status"]), trace_from(data["trace"]), error, data["line"])

@@ -1,0 +1,112 @@
+"""Random traces and formulas, small enough to meet each other."""
+
+import pytest
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from codebotler.rtl import (
+    ActAtFirst,
+    ActAtSome,
+    And,
+    AtLeast,
+    Count,
+    Cut,
+    Element,
+    Exists,
+    Formula,
+    Not,
+    Or,
+    Regex,
+    Test,
+    Text,
+    Without,
+    Words,
+)
+from codebotler.trace import Event, Option, Trace
+
+NAMES = st.sampled_from(["a", "b", "ab", "a b", "No"])
+PATTERNS = st.sampled_from([".*", "a", "b", "ab", "a|b", "^b", r"\bb\b", "no", "[", ""]).map(
+    lambda pattern: pattern.replace("[", "[ab]$")
+)
+PLAIN = ("goto", "goto", "say", "check", "pick", "place")
+
+
+def texts_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
+    leaves: SearchStrategy[Text] = patterns.map(Regex) | patterns.map(Without)
+    return st.recursive(
+        leaves, lambda inner: st.lists(inner, min_size=1, max_size=3).map(tuple).map(Words), max_leaves=3
+    )
+
+
+def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[Element]:
+    texts = texts_from(patterns)
+    plain = st.builds(Element, st.sampled_from(PLAIN), texts)
+    return plain | st.builds(Element, st.just("ask"), texts, texts)
+
+
+def tests_from(patterns: SearchStrategy[str]) -> SearchStrategy[Test]:
+    elements = elements_from(patterns)
+    names = st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"])
+    cuts = st.lists(st.builds(Cut, names, elements), max_size=3).map(tuple)
+    numbers = st.integers(0, 3)
+    return st.one_of(
+        st.builds(Exists, elements, cuts),
+        st.builds(ActAtFirst, patterns, elements, cuts),
+        st.builds(ActAtSome, patterns, elements, cuts),
+        st.builds(Count, elements, numbers, cuts),
+        st.builds(AtLeast, elements, numbers, cuts),
+    )
+
+
+def formulas_from(patterns: SearchStrategy[str]) -> SearchStrategy[Formula]:
+    leaves: SearchStrategy[Formula] = tests_from(patterns)
+
+    def larger(inner: SearchStrategy[Formula]) -> SearchStrategy[Formula]:
+        parts = st.lists(inner, min_size=2, max_size=3).map(tuple)
+        return parts.map(And) | parts.map(Or) | inner.map(Not)
+
+    return st.recursive(leaves, larger, max_leaves=4)
+
+
+def traces_from(options: SearchStrategy[Option]) -> SearchStrategy[Trace]:
+    plain = st.builds(Event, st.sampled_from(PLAIN), NAMES)
+    asked = st.builds(Event, st.just("ask"), NAMES, st.lists(options, max_size=2).map(tuple))
+    return st.lists(plain | asked, max_size=8).map(tuple)
+
+
+@pytest.fixture(scope="session")
+def elements() -> SearchStrategy[Element]:
+    return elements_from(PATTERNS)
+
+
+@pytest.fixture(scope="session")
+def formulas() -> SearchStrategy[Formula]:
+    return formulas_from(PATTERNS)
+
+
+@pytest.fixture(scope="session")
+def single_tests() -> SearchStrategy[Test]:
+    return tests_from(PATTERNS)
+
+
+@pytest.fixture(scope="session")
+def strange_formulas() -> SearchStrategy[Formula]:
+    """Formulas whose regexes hold anything a string may hold."""
+    return formulas_from(st.text(max_size=6).map(_escaped))
+
+
+@pytest.fixture(scope="session")
+def traces() -> SearchStrategy[Trace]:
+    """Traces in which every option is text."""
+    return traces_from(st.builds(Option, NAMES))
+
+
+@pytest.fixture(scope="session")
+def odd_traces() -> SearchStrategy[Trace]:
+    """Traces in which some options are no text."""
+    return traces_from(st.builds(Option, NAMES, st.booleans()))
+
+
+def _escaped(text: str) -> str:
+    # A bare backspace is refused on purpose; everything else is escaped only where a regex needs it.
+    return "".join(f"\\{c}" if c in r"\.^$*+?{}[]()#" else c for c in text if c != "\b")

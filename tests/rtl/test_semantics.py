@@ -1,0 +1,362 @@
+"""What formulas mean, against the definitions of RTL.md written out literally."""
+
+import pickle
+import re
+from collections.abc import Callable
+from typing import overload
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from codebotler.rtl import (
+    ActAtFirst,
+    ActAtSome,
+    And,
+    AtLeast,
+    CannotJudge,
+    Count,
+    Cut,
+    Element,
+    Exists,
+    Formula,
+    Not,
+    Or,
+    Regex,
+    Test,
+    Text,
+    Without,
+    Words,
+    holds,
+    parse,
+)
+from codebotler.rtl.semantics import cut
+from codebotler.trace import Event, Option, Trace
+
+Placed = list[tuple[int, Event]]
+"""A copied part of a trace, each event with its position in the whole."""
+
+YES = Option("yes")
+THREE = Option("3", is_text=False)
+
+
+def goto(room: str) -> Event:
+    return Event("goto", room)
+
+
+def say(message: str) -> Event:
+    return Event("say", message)
+
+
+def ask(question: str, *options: Option) -> Event:
+    return Event("ask", question, options)
+
+
+def pattern(text: Text) -> str:
+    match text:
+        case Regex(regex):
+            return regex
+        case Without(regex):
+            return rf"^(?!.*\b(?:{regex})\b).*$"
+        case Words(parts):
+            return "^" + "".join(f"(?=.*(?:{pattern(part)}))" for part in parts) + ".*$"
+
+
+def found(text: Text, actual: str) -> bool:
+    return re.search(pattern(text), actual, re.IGNORECASE | re.DOTALL) is not None
+
+
+def same(element: Element, placed: tuple[int, Event]) -> bool:
+    at, event = placed
+    if event.kind != element.kind:
+        return False
+    if element.options is None:
+        return found(element.text, event.text)
+    offered = False
+    for number, option in enumerate(event.options):
+        if not option.is_text:
+            raise CannotJudge(at, number, option)
+        if found(element.options, option.text):
+            offered = True
+            break
+    return found(element.text, event.text) and offered
+
+
+def exists(tr: Placed, e: Element) -> bool:
+    return any(same(e, event) for event in tr)
+
+
+def after_first(tr: Placed, e: Element) -> Placed:
+    return next((tr[i + 1 :] for i, event in enumerate(tr) if same(e, event)), tr)
+
+
+def before_first(tr: Placed, e: Element) -> Placed:
+    return next((tr[:i] for i, event in enumerate(tr) if same(e, event)), tr)
+
+
+def after_last(tr: Placed, e: Element) -> Placed:
+    hits = [i for i, event in enumerate(tr) if same(e, event)]
+    return tr[hits[-1] + 1 :] if hits else tr
+
+
+def before_last(tr: Placed, e: Element) -> Placed:
+    hits = [i for i, event in enumerate(tr) if same(e, event)]
+    return tr[: hits[-1]] if hits else tr
+
+
+def act_at_first(tr: Placed, p: str, e: Element) -> bool:
+    there, away = Element("goto", Regex(p)), Element("goto", Without(p))
+    return exists(tr, there) and exists(before_first(after_first(tr, there), away), e)
+
+
+def act_at_some(tr: Placed, p: str, e: Element) -> bool:
+    there = Element("goto", Regex(p))
+    return exists(tr, there) and (act_at_first(tr, p, e) or act_at_some(after_first(tr, there), p, e))
+
+
+def at_least(tr: Placed, e: Element, n: int) -> bool:
+    return n == 0 or (exists(tr, e) and at_least(after_first(tr, e), e, n - 1))
+
+
+def count(tr: Placed, e: Element, n: int) -> bool:
+    return at_least(tr, e, n) and not at_least(tr, e, n + 1)
+
+
+CUTS: dict[str, Callable[[Placed, Element], Placed]] = {
+    "BeforeFirst": before_first,
+    "BeforeLast": before_last,
+    "AfterFirst": after_first,
+    "AfterLast": after_last,
+}
+
+
+def defined(formula: Formula, trace: Trace) -> bool:
+    match formula:
+        case And(parts):
+            return all(defined(part, trace) for part in parts)
+        case Or(parts):
+            return any(defined(part, trace) for part in parts)
+        case Not(part):
+            return not defined(part, trace)
+        case _:
+            tr = list(enumerate(trace))
+            for one in formula.cuts:
+                tr = CUTS[one.name](tr, one.element)
+            return defined_test(formula, tr)
+
+
+def defined_test(test: Test, tr: Placed) -> bool:
+    match test:
+        case Exists(e):
+            return exists(tr, e)
+        case ActAtFirst(p, e):
+            return act_at_first(tr, p, e)
+        case ActAtSome(p, e):
+            return act_at_some(tr, p, e)
+        case AtLeast(e, n):
+            return at_least(tr, e, n)
+        case Count(e, n):
+            return count(tr, e, n)
+
+
+Verdict = bool | tuple[int, int, Option]
+
+
+def verdict(judge: Callable[[Formula, Trace], bool], formula: Formula, trace: Trace) -> Verdict:
+    try:
+        return judge(formula, trace)
+    except CannotJudge as error:
+        return error.event, error.number, error.option
+
+
+@settings(max_examples=600)
+@given(st.data())
+def test_tests_mean_their_definitions(
+    single_tests: SearchStrategy[Test], odd_traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    test, trace = data.draw(single_tests), data.draw(odd_traces)
+    assert verdict(holds, test, trace) == verdict(defined, test, trace)
+
+
+@settings(max_examples=300)
+@given(st.data())
+def test_formulas_mean_their_definitions(
+    formulas: SearchStrategy[Formula], odd_traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    formula, trace = data.draw(formulas), data.draw(odd_traces)
+    assert verdict(holds, formula, trace) == verdict(defined, formula, trace)
+
+
+@given(st.data())
+def test_stays_mean_their_definition(traces: SearchStrategy[Trace], data: DataObject) -> None:
+    """Rooms whose names contain each other, where a stay may begin within a stay."""
+    moves = st.sampled_from(["a", "ab", "a b", "b"]).map(goto)
+    trace = tuple(data.draw(st.lists(moves | st.just(say("x")), max_size=9)))
+    for test in (ActAtSome, ActAtFirst):
+        for kind in ("say", "goto"):
+            formula = test(data.draw(st.sampled_from(["a", "b"])), Element(kind, Regex("x|b")))
+            assert holds(formula, trace) == defined(formula, trace)
+
+
+@given(st.data())
+def test_negation(
+    formulas: SearchStrategy[Formula], odd_traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    formula, trace = data.draw(formulas), data.draw(odd_traces)
+    plain, negated = verdict(holds, formula, trace), verdict(holds, Not(formula), trace)
+    assert negated == (not plain if isinstance(plain, bool) else plain)
+
+
+@given(st.data())
+def test_count_is_the_largest_at_least(
+    elements: SearchStrategy[Element], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    element, trace = data.draw(elements), data.draw(traces)
+    numbers = [n for n in range(len(trace) + 2) if holds(Count(element, n), trace)]
+    assert numbers == [max(n for n in range(len(trace) + 2) if holds(AtLeast(element, n), trace))]
+
+
+@given(st.data())
+def test_the_parts_before_and_after_make_up_the_trace(
+    elements: SearchStrategy[Element], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    element, trace = data.draw(elements), data.draw(traces)
+    hits = [at for at in range(len(trace)) if same(element, (at, trace[at]))]
+    for which, at in (("First", hits[:1]), ("Last", hits[-1:])):
+        before, after = (cut(parse_cut(side + which, element), trace) for side in ("Before", "After"))
+        if not at:
+            assert before == after == (0, len(trace))
+        else:
+            assert before == (0, at[0])
+            assert after == (at[0] + 1, len(trace))
+
+
+def parse_cut(name: str, element: Element) -> tuple[Cut, ...]:
+    formula = parse(f"tr.{name}({element}).Exists(say('x'))")
+    assert isinstance(formula, Exists)
+    return formula.cuts
+
+
+@given(st.data())
+def test_a_trace_is_judged_by_what_is_compared_only(
+    formulas: SearchStrategy[Formula], traces: SearchStrategy[Trace], data: DataObject
+) -> None:
+    """Events of a kind that a formula does not name change nothing."""
+    formula, trace = data.draw(formulas), data.draw(traces)
+    padded = tuple(event for one in trace for event in (Event("wave", "a"), one))
+    assert holds(formula, padded) == holds(formula, trace)
+
+
+class Reads(tuple[Event, ...]):  # noqa: SLOT001 - it counts
+    """A trace that counts how often an event of it is looked at."""
+
+    number = 0
+
+    @overload
+    def __getitem__(self, at: int) -> Event: ...  # type: ignore[override]
+    @overload
+    def __getitem__(self, at: slice) -> tuple[Event, ...]: ...
+    def __getitem__(self, at: int | slice) -> Event | tuple[Event, ...]:
+        assert isinstance(at, int), "a copy was made"
+        self.number += 1
+        return super().__getitem__(at)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'tr.ActAtSome("a", pick("x"))',
+        'tr.ActAtFirst("a", pick("x"))',
+        'tr.Count(goto("a"), 500)',
+        'tr.Count(goto("."), 5000)',
+        'tr.AtLeast(say("."), 5000)',
+        'tr.AfterLast(goto("a")).BeforeLast(say(".")).AfterFirst(goto("b")).BeforeFirst(pick("x")).Exists(place("x"))',
+    ],
+)
+@pytest.mark.parametrize(
+    "turn", [[goto("a"), say("x"), goto("b")], [goto("a"), say("x")], [say("x"), goto("a")]], ids=str
+)
+def test_work_grows_with_the_trace(text: str, turn: list[Event]) -> None:
+    formula = parse(text)
+    for turns in (10, 1000):
+        trace = Reads(turn * turns)
+        holds(formula, trace)
+        assert trace.number <= 5 * len(trace)
+
+
+def test_an_option_that_is_no_text_cannot_be_judged_whether_or_not_the_question_matches() -> None:
+    trace = (ask("lunch", YES, THREE),)
+    for text in (
+        'tr.Exists(ask("lunch", "no"))',
+        'tr.Exists(ask("dinner", "no"))',
+        'not tr.Exists(ask("x", "no"))',
+    ):
+        with pytest.raises(CannotJudge) as caught:
+            holds(parse(text), trace)
+        assert (caught.value.event, caught.value.number, caught.value.option) == (0, 1, THREE)
+
+
+def test_options_are_compared_until_one_matches() -> None:
+    assert holds(parse('tr.Exists(ask("lunch", "yes"))'), (ask("lunch", YES, THREE),))
+    assert not holds(parse('tr.Exists(ask("dinner", "yes"))'), (ask("lunch", YES, THREE),))
+
+
+def test_only_elements_that_ask_look_at_options() -> None:
+    assert not holds(parse('tr.Exists(say("x"))'), (ask("x", THREE),))
+    assert holds(parse('tr.Exists(goto("x")) or tr.Exists(ask("x", ".*"))'), (goto("x"), ask("x", THREE)))
+    assert holds(parse('tr.AtLeast(ask("x", ".*"), 0)'), (ask("x", THREE),))
+
+
+def test_a_question_without_options_matches_no_options() -> None:
+    assert not holds(parse('tr.Exists(ask(".*", ".*"))'), (ask("lunch"),))
+
+
+@pytest.mark.parametrize(
+    ("text", "actual", "matches"),
+    [
+        ('"lobby"', "the Lobby", True),
+        ('"a.b"', "a\nb", True),
+        ('words("5|five", "lobby")', "in the lobby at five", True),
+        ('words("5|five", "lobby")', "in the lobby", False),
+        ('words("no")', "I know", True),
+        ('without("no")', "I know", True),
+        ('without("no")', "No, thanks", False),
+        ('without("a|b")', "x b", False),
+        ('words("alice", without("no"))', "alice joins", True),
+        ('words("alice", without("no"))', "no alice", False),
+        ('words(r"(x)\\1", r"(y)\\1")', "yyxx", True),
+    ],
+)
+def test_texts(text: str, actual: str, matches: bool) -> None:  # noqa: FBT001
+    assert holds(parse(f"tr.Exists(say({text}))"), (say(actual),)) is matches
+
+
+YES_FORMULA = 'tr.AfterFirst(goto("alice\'s office")).AfterFirst(ask("lunch", ".*")).Exists(say("lobby"))'
+NO_FORMULA = (
+    'tr.AfterFirst(goto("alice\'s office")).Exists(ask("lunch", ".*")) and not '
+    'tr.AfterFirst(goto("alice\'s office")).AfterFirst(ask("lunch", ".*")).Exists(say("lobby"))'
+)
+
+
+@pytest.mark.parametrize(
+    ("events", "when_yes", "when_no"),
+    [
+        ([goto("alice's office"), ask("lunch?", YES), say("to the lobby")], True, False),
+        ([goto("alice's office"), ask("lunch?", YES)], False, True),
+        ([goto("alice's office"), say("to the lobby"), ask("lunch?", YES)], False, True),
+        ([ask("lunch?", YES), goto("alice's office")], False, False),
+        ([], False, False),
+        # The two pitfalls of cutting: what is not found cuts nothing off.
+        ([say("to the lobby")], True, False),
+    ],
+)
+def test_the_example_of_the_paper(events: list[Event], when_yes: bool, when_no: bool) -> None:  # noqa: FBT001
+    assert holds(parse(YES_FORMULA), tuple(events)) is when_yes
+    assert holds(parse(NO_FORMULA), tuple(events)) is when_no
+
+
+def test_what_cannot_be_judged_travels_between_processes() -> None:
+    error = pickle.loads(pickle.dumps(CannotJudge(4, 1, THREE)))
+    assert (error.event, error.number, error.option) == (4, 1, THREE)
+    assert str(error) == "option 2 of the question at step 5 is no text: 3"

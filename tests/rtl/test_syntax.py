@@ -1,0 +1,202 @@
+"""Text to formulas and back."""
+
+import pickle
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from codebotler.rtl import (
+    ActAtFirst,
+    And,
+    AtLeast,
+    Count,
+    Cut,
+    Element,
+    Exists,
+    Formula,
+    Not,
+    Or,
+    Regex,
+    RtlSyntaxError,
+    Without,
+    Words,
+    holds,
+    parse,
+)
+from codebotler.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.trace import Event
+
+LOBBY = Exists(Element("goto", Regex("lobby")))
+ASK = Element("ask", Regex("lunch"), Regex(".*"))
+
+
+@pytest.mark.parametrize(
+    ("text", "formula"),
+    [
+        ('tr.Exists(goto("lobby"))', LOBBY),
+        ("  tr.Exists(\n  goto('lobby')) ", LOBBY),
+        ('tr.Exists(goto("lob" "by"))', LOBBY),
+        ('tr.ActAtFirst("lobby", ask("lunch", ".*"))', ActAtFirst("lobby", ASK)),
+        ('tr.Count(goto("lobby"), 0)', Count(LOBBY.element, 0)),
+        (
+            'tr.AfterFirst(goto(without("x"))).BeforeLast(ask("lunch", ".*")).AtLeast(goto("lobby"), 2)',
+            AtLeast(
+                LOBBY.element,
+                2,
+                (Cut("AfterFirst", Element("goto", Without("x"))), Cut("BeforeLast", ASK)),
+            ),
+        ),
+        (
+            r'tr.Exists(say(words("5|five", without("no"), r"^(?!not\b)")))',
+            Exists(Element("say", Words((Regex("5|five"), Without("no"), Regex(r"^(?!not\b)"))))),
+        ),
+    ],
+)
+def test_reads(text: str, formula: Formula) -> None:
+    assert parse(text) == formula
+
+
+def test_and_binds_closer_than_or_and_not_closest() -> None:
+    a = 'tr.Exists(goto("lobby"))'
+    assert parse(f"{a} or not {a} and {a}\n or {a}") == Or((LOBBY, And((Not(LOBBY), LOBBY)), LOBBY))
+    assert parse(f"not ({a} or {a})") == Not(Or((LOBBY, LOBBY)))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'tr.Exists(goto("lobby")) and (tr.Exists(goto("lobby")) or not tr.Exists(goto("lobby")))',
+        'not (tr.Exists(goto("lobby")) and (tr.Exists(goto("lobby")) and tr.Exists(goto("lobby"))))',
+        'tr.Exists(goto("lobby")) and tr.Exists(goto("lobby")) or tr.Exists(goto("lobby"))',
+        r'tr.Exists(say(r"\b(7[3-9]|8[0-9])\b"))',
+        'tr.Exists(say("alice\'s office"))',
+        "tr.Exists(say('a \"big\" room'))",
+        r'tr.Exists(say(r"a\\"))',
+    ],
+)
+def test_prints_readably(text: str) -> None:
+    assert str(parse(text)) == text
+
+
+def test_mixed_chains_print_with_brackets() -> None:
+    a = 'tr.Exists(goto("lobby"))'
+    assert str(parse(f"{a} and {a} or {a}")) == f"{a} and {a} or {a}"
+    assert str(parse(f"{a} and ({a} or {a})")) == f"{a} and ({a} or {a})"
+
+
+@given(st.data())
+def test_round_trip(formulas: SearchStrategy[Formula], data: DataObject) -> None:
+    formula = data.draw(formulas)
+    assert parse(str(formula)) == formula
+    assert hash(parse(str(formula))) == hash(formula)
+
+
+@given(st.data())
+def test_round_trip_of_strange_texts(strange_formulas: SearchStrategy[Formula], data: DataObject) -> None:
+    formula = data.draw(strange_formulas)
+    assert parse(str(formula)) == formula
+
+
+@given(st.text(max_size=8).map(lambda text: text.replace("\b", "")))
+def test_round_trip_of_raw_patterns(pattern: str) -> None:
+    formula = Exists(Element("say", Regex(pattern)))
+    try:
+        assert parse(str(formula)) == formula
+    except RtlSyntaxError as error:
+        assert "regex" in str(error)  # noqa: PT017 - only invalid regexes may fail
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "words"),
+    [
+        ("", 1, "expected a formula"),
+        ("tr", 1, "expected a test"),
+        ("1 + 1", 1, "expected a test"),
+        ('tr.Exists(say("a"))()', 1, "expected a test"),
+        ('tr.Exist(goto("a"))', 4, "unknown test Exist; did you mean Exists?"),
+        ('not tr.Exists(got("a"))', 15, "unknown element got; did you mean goto?"),
+        ('  tr.Exists(say(word("a")))', 17, "unknown text helper word; did you mean words?"),
+        ('tr.Exists(say("é"), 2)', 4, "Exists takes 1 argument, not 2"),
+        ('tr.Exists(say("é")) and tr.Exists(say(3))', 39, "expected a string"),
+        ('tr.Exists(ask("a"))', 11, "ask takes 2 arguments, not 1"),
+        ("tr.Exists(say(words()))", 15, "words needs at least one text"),
+        ('tr.Exists(say(without("a", "b")))', 15, "without takes 1 argument, not 2"),
+        ('tr.Exists(say(without(words("a"))))', 23, "expected a string"),
+        ('tr.Exists(say(text="a"))', 15, "arguments have no names"),
+        ('tr.Exists(say(f"a"))', 15, "expected a string"),
+        ('tr.Exists(say(b"a"))', 15, "expected a string"),
+        ("tr.Exists(*say)", 11, "expected an element"),
+        ('tr.Exists(say("("))', 15, "no valid regex"),
+        ('tr.ActAtFirst("(", say("a"))', 15, "no valid regex"),
+        ('tr.Exists(say(without("(?i)a")))', 23, "cannot be searched as a whole word"),
+        ('tr.Exists(say("\\bno"))', 15, 'write r"..."'),
+        ('tr.Count(say("a"), -1)', 20, "cannot be negative"),
+        ('tr.Count(say("a"), True)', 20, "expected a whole number"),
+        ('tr.Count(say("a"), 1.0)', 20, "expected a whole number"),
+        ('tr.Count(say("a"), 10000000000)', 20, "at most"),
+        ('tr.AfterFirst(say("a"))', 4, "must be followed by a test"),
+        ('tr.Exists(say("a")).Exists(say("a"))', 4, "Exists is a test, so nothing can follow it"),
+        ('tr.After(say("a")).Exists(say("a"))', 4, "unknown cut After; did you mean AfterLast?"),
+        ('trace.Exists(say("a"))', 1, "expected tr or a cut"),
+        ('tr.Exists(say("a")) # or\n tr.Exists(say("b"))', 20, "no comments"),
+        ('tr.Exists(say("a")', 10, "never closed"),
+        ('tr.Exists(say("\ud800"))', 16, "no character"),
+        ("\0", 1, "null"),
+    ],
+)
+def test_says_what_is_wrong_and_where(text: str, column: int, words: str) -> None:
+    with pytest.raises(RtlSyntaxError) as caught:
+        parse(text)
+    assert words in str(caught.value)
+    assert caught.value.column == column
+    assert str(caught.value).startswith(f"column {column}: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "not " * 60 + 'tr.Exists(say("a"))',
+        "not " * 100_000 + 'tr.Exists(say("a"))',
+        "(" * 5_000,
+        "-" * 100_000 + "1",
+        "tr" + '.AfterFirst(say("a"))' * 60 + '.Exists(say("a"))',
+        "tr" + '.AfterFirst(say("a"))' * 50_000 + '.Exists(say("a"))',
+        "tr.Exists(say(" + "words(" * 60 + '"a"' + ")" * 62,
+        'tr.Exists(say("' + "(" * 5_000 + "a" + ")" * 5_000 + '"))',
+        'tr.Count(say("a"), ' + "9" * 5_000 + ")",
+    ],
+    ids=lambda text: text[:12],
+)
+def test_deep_nesting_is_an_error_and_no_crash(text: str) -> None:
+    with pytest.raises(RtlSyntaxError):
+        parse(text)
+
+
+def test_nothing_is_evaluated() -> None:
+    with pytest.raises(RtlSyntaxError):
+        parse('__import__("os").system("true")')
+
+
+def test_escapes_that_python_does_not_know_mean_what_they_look_like() -> None:
+    assert parse(r'tr.Exists(say("\d"))') == parse(r'tr.Exists(say(r"\d"))')
+
+
+def test_a_further_skill_is_a_further_element() -> None:
+    wave = Skill("wave", (Parameter("person"),), "None", "Wave at a person.", Recording("wave", "person"))
+    formula = parse('tr.Exists(wave("alice"))', skills=SKILLS.with_skill(wave))
+    assert formula == Exists(Element("wave", Regex("alice")))
+    assert holds(formula, (Event("wave", "Alice"),))
+    with pytest.raises(RtlSyntaxError, match="unknown element wave"):
+        parse('tr.Exists(wave("alice"))')
+
+
+def test_errors_and_formulas_travel_between_processes() -> None:
+    with pytest.raises(RtlSyntaxError) as caught:
+        parse("tr")
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+    formula = parse('tr.ActAtSome("a", say("b"))')
+    holds(formula, (Event("goto", "a"),))
+    assert pickle.loads(pickle.dumps(formula)) == formula
