@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping, Sequence
+from datetime import date
 from pathlib import Path
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 
 Place: TypeAlias = tuple[str | int, ...]
 Model = TypeVar("Model", bound=BaseModel)
 
-Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MAX_BYTES = 5_000_000
+MAX_DEPTH = 50
+MAX_PLACES = 100_000
+MENDS = {
+    "mapping values are not allowed in this context": 'put quotes around a text that holds ": "',
+    "found character that cannot start any token": "put quotes around a text, and indent with spaces",
+}
 
 
 class BadInput(ValueError):  # noqa: N818 - named for what it says to the user, not for where it is raised
@@ -31,6 +40,28 @@ class BadInput(ValueError):  # noqa: N818 - named for what it says to the user, 
         super().__init__(where + sentence)
 
 
+class _Bounded(Loader):  # type: ignore[misc]  # one of two classes, chosen above
+    """A loader that refuses what is nested so deeply that the C stack would not hold it."""
+
+    depth = 0
+
+    def descend_resolver(self, *where: object) -> None:
+        """Called where a node begins."""
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise _TooMuchError
+        super().descend_resolver(*where)
+
+    def ascend_resolver(self) -> None:
+        """Called where a node ends."""
+        self.depth -= 1
+        super().ascend_resolver()
+
+
+class _TooMuchError(Exception):
+    """A file is nested too deeply, or its anchors repeat too much."""
+
+
 class YamlFile:
     """A parsed YAML file that remembers on which line everything stands.
 
@@ -39,22 +70,26 @@ class YamlFile:
         name: what error sentences call the file.
 
     Raises:
-        BadInput: it is no YAML, or a key stands twice in one mapping.
+        BadInput: it is no YAML, a key stands twice in one mapping, or its anchors make too much of it.
     """
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
         self._lines: dict[Place, int] = {}
         try:
-            loader = Loader(text)
+            loader = _Bounded(text)
             node = loader.get_single_node()
+            if node is not None:
+                self._remember(node, ())
             self.data: object = None if node is None else loader.construct_document(node)
         except yaml.YAMLError as error:
             raise self._syntax(error) from None
-        except (RecursionError, ValueError) as error:
-            raise BadInput(f"cannot be read as YAML ({error})", file=name) from None
-        if node is not None:
-            self._remember(node, ())
+        except _TooMuchError:
+            raise BadInput("is nested too deeply, or its anchors repeat too much", file=name) from None
+        except ValueError as error:
+            if isinstance(error, BadInput):
+                raise
+            raise BadInput(f"holds a value that cannot be read ({error})", file=name) from None
 
     @classmethod
     def read(cls, path: Path) -> YamlFile:
@@ -71,7 +106,8 @@ class YamlFile:
         while path not in self._lines:
             if not path:
                 return None
-            path = path[:-1]
+            *around, last = path  # a number may be a key, which is kept as it is spelt
+            path = (*around, str(last)) if isinstance(last, int) else tuple(around)
         return self._lines[path]
 
     def wrong(self, sentence: str, *place: str | int) -> BadInput:
@@ -94,23 +130,42 @@ class YamlFile:
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             place = (*at, *first["loc"])
-            raise self.wrong(_sentence(first["type"], first["msg"], place, first["input"]), *place) from None
+            raise self.wrong(_sentence(first, self._name(place)), *place) from None
+
+    def _name(self, place: Place) -> str:
+        if not place:
+            return "the file"
+        if place[-1] == "[key]":
+            return "this key"
+        return f'"{place[-1]}"' if isinstance(place[-1], str) and place in self._lines else "this entry"
 
     def _syntax(self, error: yaml.YAMLError) -> BadInput:
-        mark = getattr(error, "problem_mark", None)
-        problem = getattr(error, "problem", None) or "unreadable"
+        mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+        problem = getattr(error, "problem", None)
+        said = [getattr(error, "context", None), problem or getattr(error, "reason", None)]
+        sentence = ", ".join(part for part in said if part).replace(", but", " but") or "unreadable"
+        if problem in MENDS:
+            sentence += "; " + MENDS[problem]
         return BadInput(
-            f"this is no valid YAML: {problem}", file=self.name, line=None if mark is None else mark.line + 1
+            f"this is no valid YAML: {sentence}", file=self.name, line=None if mark is None else mark.line + 1
         )
 
     def _remember(self, node: yaml.Node, place: Place) -> None:
         self._lines[place] = node.start_mark.line + 1
+        if len(place) > MAX_DEPTH or len(self._lines) > MAX_PLACES:
+            raise _TooMuchError
         if isinstance(node, yaml.SequenceNode):
             for index, item in enumerate(node.value):
                 self._remember(item, (*place, index))
         elif isinstance(node, yaml.MappingNode):
             for key, value in node.value:
                 inner = (*place, str(key.value))
+                if key.tag == "tag:yaml.org,2002:merge":
+                    raise BadInput(
+                        'merging with "<<" is not supported; write the keys out',
+                        file=self.name,
+                        line=key.start_mark.line + 1,
+                    )
                 if inner in self._lines:
                     raise BadInput(
                         f'the key "{key.value}" stands here a second time; keep one of them',
@@ -132,31 +187,75 @@ def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
         BadInput: it is missing, a folder, unreadable, larger than the limit, or no UTF-8.
     """
     try:
-        if path.stat().st_size > limit:
-            raise BadInput(f"is larger than {limit:,} bytes", file=path)
-        return path.read_text(encoding="utf-8")
+        with path.open("rb") as file:
+            data = file.read(limit + 1)
     except FileNotFoundError:
         raise BadInput("there is no such file", file=path) from None
-    except UnicodeDecodeError as error:
-        raise BadInput(f"is no UTF-8 text (byte {error.start})", file=path) from None
+    except IsADirectoryError:
+        raise BadInput("is a folder; name a file", file=path) from None
     except OSError as error:
         raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+    if len(data) > limit:
+        raise BadInput(f"is larger than {limit:,} bytes", file=path)
+    try:
+        return io.StringIO(data.decode(), newline=None).read()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise BadInput("is no UTF-8 text; save it as UTF-8", file=path, line=line) from None
 
 
-def _sentence(kind: str, message: str, place: Place, value: object) -> str:
-    name = f'"{place[-1]}"' if place and isinstance(place[-1], str) else "this entry"
-    if kind == "extra_forbidden":
-        return f"the key {name} means nothing here; remove it or correct its spelling"
+EXPECTED = {
+    "string_type": "a text",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a mapping of keys to values",
+    "model_type": "a mapping of keys to values",
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+}
+FAULTS = {
+    "extra_forbidden": "the key {name} means nothing here; remove it or correct its spelling",
+    "invalid_key": "this key is no text; remove it or put quotes around it",
+    "string_too_short": "{name} is empty; write a text",
+    "too_short": "{name} has too few entries; it needs at least {min_length}",
+    "too_long": "{name} has too many entries; it takes {max_length}",
+    "finite_number": "{name} is no finite number",
+}
+WHAT = (
+    (bool, "a truth value"),
+    (int | float, "a number"),
+    (str, "a text"),
+    (date, "a date"),
+    (Mapping, "a mapping"),
+    (list, "a list"),
+    (object, "something else"),
+)
+
+
+def _sentence(error: ErrorDetails, name: str) -> str:
+    kind, value = error["type"], error["input"]
     if kind == "missing":
-        return f"the key {name} is missing"
-    if isinstance(value, bool) and "string" in kind:
-        word = "yes" if value else "no"
-        return f'{name} is a truth value, not a text; put quotes around it ("{word}")'
+        last = error["loc"][-1]
+        if isinstance(last, str):
+            return f'the key "{last}" is missing'
+        return f"this entry has too few values; it needs at least {last + 1}"
+    if kind in EXPECTED:
+        return f"{name} {_instead_of(EXPECTED[kind], value)}"
+    if kind in FAULTS:
+        return FAULTS[kind].format(name=name, **error.get("ctx", {}))
+    plain = error["msg"].removeprefix("Value error, ").replace("Input should be", "it should be")
+    plain = plain[:1].lower() + plain[1:]
     if isinstance(value, Mapping | Sequence) and not isinstance(value, str):
-        return f"{name} is not as it should be: {_plain(message)}"
-    return f"{name} is {value!r}, but {_plain(message)}"
+        return f"{name} is not as it should be: {plain}"
+    return f"{name} is {value!r}, but {plain}"
 
 
-def _plain(message: str) -> str:
-    plain = message.removeprefix("Value error, ").replace("Input should be", "it should be")
-    return plain[:1].lower() + plain[1:]
+def _instead_of(expected: str, value: object) -> str:
+    if value is None:
+        return "is empty; fill it in or remove it"
+    sentence = f"is {next(word for kind, word in WHAT if isinstance(value, kind))}, not {expected}"
+    if expected != "a text" or not isinstance(value, int | float | date):
+        return sentence
+    word = {True: ' ("yes")', False: ' ("no")'}[value] if isinstance(value, bool) else ""
+    return f"{sentence}; put quotes around it{word}"

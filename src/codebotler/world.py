@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from codebotler.badinput import Place, YamlFile
 
@@ -90,7 +90,7 @@ class World:
             }
         if self.may_wait_forever:
             data["may_wait_forever"] = True
-        return yaml.safe_dump(data, sort_keys=False, allow_unicode=True, width=100)
+        return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
 
 
 ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
@@ -122,6 +122,8 @@ def laid_out(world: World) -> World:
 
 Text = Annotated[str, StringConstraints(strict=True)]
 Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
+Metres = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Corner: TypeAlias = tuple[Metres, Metres]
 
 
 class _Form(BaseModel):
@@ -136,11 +138,16 @@ class PersonFile(_Form):
 
 
 class RoomFile(_Form):
-    """A room with geometry as a world file writes it."""
+    """A room as a world file writes it: its name alone, or with geometry."""
 
     name: Name
-    footprint: Annotated[list[Point], Field(min_length=3)] | None = None
-    stand_at: Point | None = None
+    footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
+    stand_at: Corner | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_alone(cls, data: object) -> object:
+        return data if isinstance(data, dict | RoomFile) else {"name": data}
 
 
 class WorldFile(_Form):
@@ -148,10 +155,10 @@ class WorldFile(_Form):
 
     about: Text = ""
     robot: Name
-    rooms: Annotated[list[Name | RoomFile], Field(min_length=1)]
-    objects: dict[str, list[Name]] = {}
-    people: dict[str, list[PersonFile]] = {}
-    may_wait_forever: bool = False
+    rooms: Annotated[list[RoomFile], Field(min_length=1)]
+    objects: dict[Text, list[Name]] = {}
+    people: dict[Text, list[PersonFile]] = {}
+    may_wait_forever: Annotated[bool, Field(strict=True)] = False
 
     def world(self, file: YamlFile, at: Place = ()) -> World:
         """The world it describes.
@@ -163,8 +170,7 @@ class WorldFile(_Form):
         Raises:
             BadInput: a room does not exist or stands twice, or a regex is invalid.
         """
-        rooms = [RoomFile(name=room) if isinstance(room, str) else room for room in self.rooms]
-        names = [room.name for room in rooms]
+        names = [room.name for room in self.rooms]
         for index, name in enumerate(names):
             _regex(name, file, (*at, "rooms", index))
             if name in names[:index]:
@@ -179,7 +185,7 @@ class WorldFile(_Form):
                     footprint=None if room.footprint is None else tuple(room.footprint),
                     stand_at=room.stand_at,
                 )
-                for room in rooms
+                for room in self.rooms
             ),
             robot=self.robot,
             about=self.about,
@@ -214,6 +220,18 @@ def _regex(text: str, file: YamlFile, place: Place) -> None:
         re.compile(text)
     except (re.error, RecursionError, OverflowError) as error:
         raise file.wrong(f'"{text}" is no valid regular expression: {error}', *place) from None
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes texts so that they read back; PyYAML folds rare line breaks away where it need not quote."""
+
+
+def _written_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    rare = any(character in text for character in "\x85\u2028\u2029")
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"' if rare else None)
+
+
+_Dumper.add_representer(str, _written_text)
 
 
 def _room_data(room: Room) -> object:

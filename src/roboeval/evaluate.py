@@ -8,10 +8,10 @@ from typing import Any
 
 from codebotler import __version__
 from codebotler.rtl import CannotJudge, holds
-from codebotler.simulator.engine import Lane, Lanes
+from codebotler.simulator.engine import Lanes, simulate
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Rules
 from codebotler.trace import Outcome, Status, Trace
+from codebotler.world import World
 from roboeval.records import Completion, outcome_data, trace_data
 from roboeval.suite import Requirement, Scenario, Suite
 from roboeval.taxonomy import Verdict, failure
@@ -42,7 +42,12 @@ def _is_met(requirement: Requirement, trace: Trace) -> bool:
 
 
 def evaluate(
-    completions: Iterable[Completion], suite: Suite, *, ablated: bool = False, workers: int = 1
+    completions: Iterable[Completion],
+    suite: Suite,
+    *,
+    ablated: bool = False,
+    workers: int = 1,
+    require_isolation: bool = False,
 ) -> Iterator[dict[str, Any]]:
     """Judge completions, yielding one row each in their order; equal programs of a task run once.
 
@@ -51,6 +56,7 @@ def evaluate(
         suite: tasks and rules.
         ablated: whether to require common sense only; then all tasks have an ablation.
         workers: how many programs are run at the same time.
+        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -59,7 +65,10 @@ def evaluate(
     def run_all(work: tuple[str, str]) -> list[Verdict]:
         task, program = work
         scenarios = suite.tasks[task].judged_in(ablated=ablated)
-        return [judge(_run(lanes.here(), program, s, suite.rules), s) for s in scenarios]
+        return [judge(run(program, scenario.world), scenario) for scenario in scenarios]
+
+    def run(program: str, world: World) -> Outcome:
+        return simulate(lanes.here(), program, lambda: SimulatedRobot(world, suite.rules))
 
     rows: list[Completion] = []
 
@@ -68,13 +77,9 @@ def evaluate(
             rows.append(completion)
             yield completion.task, completion.program
 
-    with Lanes(workers) as lanes:
+    with Lanes(workers, require_isolation=require_isolation) as lanes:
         for verdicts in lanes.map_distinct(run_all, works()):
             yield evaluation(rows.pop(0), verdicts)
-
-
-def _run(lane: Lane, program: str, scenario: Scenario, rules: Rules) -> Outcome:
-    return lane.run(program, SimulatedRobot(scenario.world, rules))
 
 
 def evaluation(completion: Completion, verdicts: list[Verdict]) -> dict[str, Any]:

@@ -270,7 +270,9 @@ class Appender:
 
     def __post_init__(self) -> None:
         self._file: BinaryIO = self.path.open("ab", buffering=0)
-        self._file.truncate(whole_length(self.path))
+        whole = whole_length(self.path)
+        if self.path.stat().st_size > whole:
+            self._file.truncate(whole)
 
     def append(self, line: bytes) -> None:
         """Add a line, whole or not at all.

@@ -1,9 +1,10 @@
 """Text to formulas and back."""
 
 import pickle
+import re
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
@@ -99,13 +100,15 @@ def test_round_trip_of_strange_texts(strange_formulas: SearchStrategy[Formula], 
     assert parse(str(formula)) == formula
 
 
+@pytest.mark.filterwarnings("ignore::FutureWarning")
 @given(st.text(max_size=8).map(lambda text: text.replace("\b", "")))
 def test_round_trip_of_raw_patterns(pattern: str) -> None:
-    formula = Exists(Element("say", Regex(pattern)))
     try:
-        assert parse(str(formula)) == formula
-    except RtlSyntaxError as error:
-        assert "regex" in str(error)  # noqa: PT017 - only invalid regexes may fail
+        re.compile(pattern)
+    except re.error:
+        assume(condition=False)
+    formula = Exists(Element("say", Regex(pattern)))
+    assert parse(str(formula)) == formula
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from codebotler.rtl.wording import (
     happened,
     is_any,
     lacking,
-    lacks,
     listed,
+    missing,
     offered,
     pastimes,
     room,
@@ -174,19 +174,25 @@ class _Absence:
     def never_went(self) -> Explanation:
         assert isinstance(self.test, ActAtFirst | ActAtSome)
         arrival = self.test.stay.arrival
-        went = did((arrival,), "past", never=True)
         if not self.trace:
-            return self.because(f"the robot did nothing at all, so it never {went}")
+            return self.because(f"the robot did nothing at all, so it {self.never_arrived()}")
         _, detail = _Absence(Exists(arrival, self.test.cuts), (arrival,), self.trace).instead(
             range(*self.window.span)
         )
-        never = f"never {went}{self.window.told_until()}, where it was to {did(self.deed, 'base')}{detail}"
+        never = f"{self.never_arrived()}{self.window.told_until()}, where it was to "
+        never += f"{did(self.deed, 'base')}{detail}"
         return self.because(self.window.told_after() + self.robot() + never)
 
     def robot(self) -> str:
         """The subject, after what should have begun the part of the trace but never happened."""
         never = self.window.never_began()
-        return f"the robot {never}; it " if never and not self.window.told_after() else "the robot "
+        said_anyway = isinstance(self.test, ActAtFirst | ActAtSome) and never == self.never_arrived()
+        needed = never and not self.window.told_after() and not said_anyway
+        return f"the robot {never}; it " if needed else "the robot "
+
+    def never_arrived(self) -> str:
+        assert isinstance(self.test, ActAtFirst | ActAtSome)
+        return f"never {did((self.test.stay.arrival,), 'past', never=True)}"
 
     def not_there(self, stay: list[int], place: str, moves: Stay) -> Explanation:
         span = self.window.span
@@ -260,7 +266,7 @@ class _Absence:
 
     def likeness(self, at: int) -> tuple[int, int]:
         event = self.trace[at]
-        return -min(len(lacks(element.text, event.text)) for element in self.deed), -at
+        return -min(missing(element.text, event.text) for element in self.deed), -at
 
     def because(self, sentence: str, event: int | None = None) -> Explanation:
         return Explanation(self.test, event, sentence)
@@ -294,7 +300,8 @@ def _presence(test: Test, trace: Trace) -> Explanation:
     fact = _fact(test, trace)
     assert fact.event is not None
     began = window.never_began()
-    since = f" (it {began}, so every step counts)" if began else ""
+    told_anyway = any(at is None and one.name.startswith("Before") for one, at in window.made)
+    since = f" (it {began}, so every step counts)" if began and not told_anyway else ""
     if isinstance(test, Count | AtLeast):
         limit = "not be exactly" if isinstance(test, Count) else "be less than"
         sentence = f"the robot {fact.told}{fact.where}, but it must {limit} {times(test.number)}{since}"

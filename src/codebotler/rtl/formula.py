@@ -294,13 +294,13 @@ def compile_regex(pattern: str) -> re.Pattern[str]:
 
 
 def quote(text: str) -> str:
-    """A string as RTL writes it: in double quotes, raw where it holds backslashes, if that is possible.
+    """A regex as RTL writes it: in double quotes, raw where it holds backslashes, if that is possible.
 
     Args:
-        text: any text.
+        text: the regex.
     """
-    odd_end = (len(text) - len(text.rstrip("\\"))) % 2
-    if "\\" in text and '"' not in text and text.isprintable() and not odd_end:
+    if "\\" in text and '"' not in text and text.isprintable():
+        # No regex ends with a single backslash, so the closing quote is safe.
         return f'r"{text}"'
     if '"' in text:
         return repr(text)

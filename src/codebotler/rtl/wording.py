@@ -110,14 +110,14 @@ def lacking(deed: Deed, event: Event) -> str:
         deed: what was wanted.
         event: what happened instead.
     """
-    missing = next((lack for element in deed if (lack := lacks(element.text, event.text))), [])
-    named = len(missing) > 1 or not missing or not missing[0].startswith("does not match")
-    reasons = [f"which {listed(missing) if named else 'does not match'}"] if missing else []
+    absent = next((lack for element in deed if (lack := lacks(element.text, event.text))), [])
+    named = len(absent) > 1 or not absent or not absent[0].startswith("does not match")
+    reasons = [f"which {listed(absent) if named else 'does not match'}"] if absent else []
     if not event.options and deed[0].options is not None:
         return ", and ".join([*reasons, "it had no options"])
     if len(deed) > 1:
         return ", and ".join([*reasons, f"none of its options ({_options(event)}) does better"])
-    if not missing and deed[0].options is not None:
+    if not absent and deed[0].options is not None:
         wanted = with_texts(deed[0].options)
         is_one = f"has {wanted.removeprefix('with ')}" if wanted.startswith("with ") else f"is one {wanted}"
         return f"but none of its options ({_options(event)}) {is_one}"
@@ -138,8 +138,8 @@ def lacks(text: Text, actual: str) -> list[str]:
     """
     match text:
         case Words(parts):
-            missing = [lack for part in parts for lack in lacks(part, actual)]
-            return _merged(missing, "lacks ")
+            absent = [lack for part in parts for lack in lacks(part, actual)]
+            return _merged(absent, "lacks ")
         case _ if text.matches(actual):
             return []
         case Without(pattern):
@@ -148,6 +148,18 @@ def lacks(text: Text, actual: str) -> list[str]:
             if start := _forbidden_start(pattern):
                 return [f'starts with "{start}"']
             return [f"lacks {named}" if (named := _named(pattern)) else f"does not match /{pattern}/"]
+
+
+def missing(text: Text, actual: str) -> int:
+    """How many parts of a text do not match.
+
+    Args:
+        text: what should match.
+        actual: the text.
+    """
+    if isinstance(text, Words):
+        return sum(missing(part, actual) for part in text.parts)
+    return int(not text.matches(actual))
 
 
 def with_texts(text: Text) -> str:

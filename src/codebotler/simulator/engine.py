@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import math
 import os
 import signal
@@ -25,12 +26,16 @@ from codebotler.simulator.robot import Argument, Behaviour, RobotError, Simulate
 from codebotler.simulator.rules import PAPER, Rules
 from codebotler.skills import SKILLS, Skill, SkillTable
 from codebotler.trace import Option, Outcome, RunError, Status
-from codebotler.world import World
+from codebotler.world import Room, World
 
 MEMORY = 512 * 1024 * 1024
 CPU_SECONDS = 5
 MAX_SOURCE = 5_000_000
 HEADER = sandbox.HEADER
+REHEARSAL = World((Room("room"),), "room")
+
+LOG = logging.getLogger("codebotler.engine")
+NO_SECCOMP = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -47,6 +52,7 @@ def run(
     rules: Rules = PAPER,
     skills: SkillTable = SKILLS,
     behaviours: dict[str, Behaviour] | None = None,
+    require_isolation: bool = False,
 ) -> Iterator[Outcome]:
     """Run programs in worlds and yield their outcomes in the order of the pairs.
 
@@ -56,17 +62,38 @@ def run(
         rules: how the worlds are simulated.
         skills: the skills that programs can call.
         behaviours: what each skill does; those of the eight skills by default.
+        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Raises:
         EngineError: no isolated process could be started.
     """
-    with Lanes(workers or os.cpu_count() or 1) as lanes:
+    with Lanes(workers or os.cpu_count() or 1, require_isolation=require_isolation) as lanes:
 
         def run_pair(pair: tuple[str, World]) -> Outcome:
             source, world = pair
-            return lanes.here().run(source, SimulatedRobot(world, rules, skills, behaviours))
+            return simulate(lanes.here(), source, lambda: SimulatedRobot(world, rules, skills, behaviours))
 
         yield from lanes.map_distinct(run_pair, pairs)
+
+
+def simulate(lane: Lane, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
+    """Run a program with a simulated robot, once more if its process was lost through no fault of its own.
+
+    Args:
+        lane: where to run it.
+        source: the program, which need not even parse.
+        new_robot: makes the robot, in the initial state of its world.
+
+    Raises:
+        EngineError: its process was lost twice.
+    """
+    try:
+        return lane.run(source, new_robot())
+    except LostChildError:
+        try:
+            return lane.run(source, new_robot())
+        except LostChildError as error:
+            raise EngineError(f"an isolated process was lost twice: {error}") from None
 
 
 class Lanes:
@@ -74,28 +101,46 @@ class Lanes:
 
     Args:
         workers: how many.
+        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+
+    Raises:
+        EngineError: no zygote can be started, or a wall is missing that is required.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, *, require_isolation: bool = False) -> None:
         self.workers = workers
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="lane")
         self._local = threading.local()
-        self._lanes: list[Lane] = []
+        first = Lane()
+        if not first.has_seccomp:
+            if require_isolation:
+                first.close()
+                raise EngineError(NO_SECCOMP)
+            LOG.warning(NO_SECCOMP)
+        self._lanes = [first]
+        self._idle = [first]
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for lane in self._lanes:
+            lane.stop()
+        self._pool.shutdown(wait=True)
         for lane in self._lanes:
             lane.close()
-        self._pool.shutdown(wait=True, cancel_futures=True)
 
     def here(self) -> Lane:
         """The lane of the calling thread."""
         lane: Lane | None = getattr(self._local, "lane", None)
         if lane is None:
-            lane = self._local.lane = Lane()
-            self._lanes.append(lane)
+            try:
+                lane = self._idle.pop()
+            except IndexError:
+                lane = Lane()
+                self._lanes.append(lane)
+            self._local.lane = lane
         return lane
 
     def map_distinct(self, function: Callable[[Key], Value], keys: Iterable[Key]) -> Iterator[Value]:
@@ -136,6 +181,7 @@ class Lane:
     """
 
     def __init__(self) -> None:
+        self._stopped = False
         self._start()
 
     def run(self, source: str, robot: SimulatedRobot) -> Outcome:
@@ -146,30 +192,33 @@ class Lane:
             robot: who executes its skills; it has done nothing yet.
 
         Raises:
-            EngineError: the child could not be started, twice.
+            LostChildError: the process ended through no fault of the program; the lane can be used again.
+            EngineError: the lane was stopped.
         """
         if len(source) > MAX_SOURCE:
             error = RunError("MemoryError", f"the program is longer than {MAX_SOURCE:,} characters")
             return Outcome(Status.PYTHON_ERROR, (), error)
         try:
-            conversation = Conversation(self._fork(), source, robot)
-        except (BrokenChildError, OSError):
+            return Conversation(self._fork(), source, robot).outcome()
+        except (LostChildError, OSError) as error:
+            if self._stopped:
+                raise EngineError("the engine was stopped") from None
             self.close()
             self._start()
-            try:
-                conversation = Conversation(self._fork(), source, robot)
-            except (BrokenChildError, OSError) as error:
-                raise EngineError(f"an isolated process could not be started: {error}") from error
-        return conversation.outcome()
+            raise LostChildError(str(error)) from None
+
+    def stop(self) -> None:
+        """End the zygote and with it a run that is still going on; its thread notices."""
+        self._stopped = True
+        self._zygote.kill()
 
     def close(self) -> None:
-        """End the zygote and with it a run that is still going on."""
-        for descriptor in (self._wake, self._report):
-            with contextlib.suppress(OSError):
-                os.close(descriptor)
-        self._door.close()
+        """Give back all that the lane holds; nothing may be running."""
         self._zygote.kill()
         self._zygote.wait()
+        for descriptor in (self._wake, self._report):
+            os.close(descriptor)
+        self._door.close()
 
     def _start(self) -> None:
         wake, self._wake = os.pipe()
@@ -178,7 +227,7 @@ class Lane:
         with door:
             inherited = (wake, door.fileno(), report)
             self._zygote = subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
-                [sys.executable, *sandbox.FLAGS, str(Path(sandbox.__file__)), "start", *map(str, inherited)],
+                [sys.executable, *sandbox.FLAGS, str(Path(sandbox.__file__)), *map(str, inherited)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -190,25 +239,35 @@ class Lane:
         os.close(wake)
         os.close(report)
         try:
-            self._read_report()
-        except BrokenChildError:
+            self.has_seccomp = self._read_report() == 1
+            self._rehearse()
+        except (LostChildError, OSError):
             raise EngineError("the zygote of the engine does not start") from None
+
+    def _rehearse(self) -> None:
+        """Run an empty program: by then the heap of the zygote, which programs can see, has settled."""
+        Conversation(self._fork(), "task_program = int", SimulatedRobot(REHEARSAL)).outcome()
 
     def _fork(self) -> Child:
         ours, theirs = socket.socketpair()
         with theirs:
             socket.send_fds(self._door, [b"x"], [theirs.fileno()])
-        os.write(self._wake, b"x")
-        return Child(self._read_report(), ours, self._read_report)
+        try:
+            os.write(self._wake, b"x")
+            pid = self._read_report()
+        except (LostChildError, OSError):
+            ours.close()
+            raise
+        return Child(pid, ours, self._read_report)
 
     def _read_report(self) -> int:
         data = os.read(self._report, struct.calcsize("=q"))
         if not data:
-            raise BrokenChildError("the zygote has ended")
+            raise LostChildError("the zygote has ended")
         return int(struct.unpack("=q", data)[0])
 
 
-class BrokenChildError(Exception):
+class LostChildError(Exception):
     """A child ended before it could close its walls, through no fault of the program."""
 
 
@@ -267,9 +326,10 @@ class Child:
         """End it, if it has not ended, and return its exit status, or minus the signal."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
-        status = self._wait()
-        self._channel.close()
-        return status
+        try:
+            return self._wait()
+        finally:
+            self._channel.close()
 
     def ended(self) -> int:
         """Wait a moment for it to end by itself; then like `end`."""
@@ -338,7 +398,7 @@ class Conversation:
         robot: who executes its skills.
 
     Raises:
-        BrokenChildError: the child ended before its walls were closed.
+        LostChildError: the child ended before its walls were closed.
     """
 
     def __init__(self, child: Child, source: str, robot: SimulatedRobot) -> None:
@@ -360,7 +420,7 @@ class Conversation:
         )
         if child.receive() != ["ready", []]:
             child.end()
-            raise BrokenChildError("a child ended before it was closed")
+            raise LostChildError("a child ended before it was closed")
 
     def outcome(self) -> Outcome:
         """Talk to the end."""

@@ -11,6 +11,7 @@ import ast
 import builtins
 import contextlib
 import ctypes
+import fcntl
 import gc
 import importlib
 import io
@@ -30,6 +31,7 @@ from collections.abc import Callable
 from typing import Any, NoReturn
 
 CHANNEL = 3
+WAKE, DOOR, REPORT = 4, 5, 6
 MAX_FRAME = 1_000_000
 PROGRAM = "<program>"
 HEADER = 4
@@ -419,8 +421,8 @@ SYSCALLS = {
     ),
     "aarch64": (
         0xC00000B7,
-        {"read": 63, "write": 64, "mmap": 222, "mprotect": 226, "munmap": 215, "brk": 214, "rt_sigreturn": 139,
-         "sched_yield": 124, "mremap": 216, "madvise": 233, "getpid": 172, "exit": 93,
+        {"read": 63, "write": 64, "mmap": 222, "mprotect": 226, "munmap": 215, "brk": 214,
+         "rt_sigreturn": 139, "sched_yield": 124, "mremap": 216, "madvise": 233, "getpid": 172, "exit": 93,
          "gettimeofday": 169, "futex": 98, "restart_syscall": 128, "clock_gettime": 113, "exit_group": 94},
     ),
 }  # fmt: skip
@@ -464,6 +466,19 @@ def seccomp_filter(machine: str) -> ctypes.Array[ctypes.c_char] | None:
     return header
 
 
+def can_install(seccomp: ctypes.Array[ctypes.c_char]) -> bool:
+    """Whether the kernel takes the filter here, which a container may forbid; tried in another process."""
+    pid = os.fork()
+    if pid == 0:
+        try:
+            prctl(PR_SET_NO_NEW_PRIVS, 1)
+            prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
+        except OSError:
+            os._exit(1)
+        os._exit(0)
+    return os.waitpid(pid, 0)[1] == 0
+
+
 # --- the zygote
 
 
@@ -481,13 +496,13 @@ def child(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None) -> N
     os._exit(0)
 
 
-def one_run(wake: int, door: socket.socket, report: int, seccomp: ctypes.Array[ctypes.c_char] | None) -> bool:
+def one_run(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None) -> bool:
     """Fork the child of one run and report its process id and, at its end, its wait status.
 
     The dead child is reaped only when the next run is asked for, so that until then its id stays its own. All
     that is allocated here is freed on return, so that every child starts from the same heap.
     """
-    if not os.read(wake, 1):
+    if not os.read(WAKE, 1):
         return False
     with contextlib.suppress(ChildProcessError):
         os.waitpid(-1, 0)
@@ -497,18 +512,18 @@ def one_run(wake: int, door: socket.socket, report: int, seccomp: ctypes.Array[c
             child(door, seccomp)
         finally:
             os._exit(1)
-    os.write(report, struct.pack("=q", pid))
+    os.write(REPORT, struct.pack("=q", pid))
     watch = os.pidfd_open(pid)
-    if watch not in select.select([watch, wake], [], [])[0]:
+    if watch not in select.select([watch, WAKE], [], [])[0]:
         os.kill(pid, signal.SIGKILL)  # the engine is gone
     os.close(watch)
     ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     status = 0 if ended is None else ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
-    os.write(report, struct.pack("=q", status))
+    os.write(REPORT, struct.pack("=q", status))
     return True
 
 
-def zygote(wake: int, door: int, report: int) -> None:
+def zygote() -> None:
     """Serve runs, one at a time, until the engine closes its end.
 
     All that a program may import is imported here: the walls allow no file to be opened later.
@@ -516,20 +531,35 @@ def zygote(wake: int, door: int, report: int) -> None:
     for name in PRELOADED:
         importlib.import_module(name)
     seccomp = seccomp_filter(platform.machine())
-    entrance = socket.socket(fileno=door)
+    if seccomp is not None and not can_install(seccomp):
+        seccomp = None
+    entrance = socket.socket(fileno=DOOR)
     gc.collect()
     gc.freeze()
-    os.write(report, struct.pack("=q", 0 if seccomp is None else 1))
-    while one_run(wake, entrance, report, seccomp):
+    os.write(REPORT, struct.pack("=q", 0 if seccomp is None else 1))
+    while one_run(entrance, seccomp):
         pass
 
 
+def start_again(wake: int, door: int, report: int) -> NoReturn:
+    """Become the zygote, with what the engine handed over at fixed numbers and with fixed addresses.
+
+    A program may say an address. It must be the same in every start, and even the lengths of arguments and
+    the numbers of descriptors would move it.
+    """
+    copies = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, REPORT + 1) for descriptor in (wake, door, report)]
+    for copy, number in zip(copies, (WAKE, DOOR, REPORT), strict=True):
+        os.dup2(copy, number, inheritable=True)
+    os.closerange(REPORT + 1, 65536)
+    LIBC.personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
+    os.execv(sys.executable, [sys.executable, *FLAGS, __file__])  # noqa: S606 - the same program again
+
+
 def main(arguments: list[str]) -> None:
-    """Start the zygote; at first start again with addresses that do not change from start to start."""
-    if arguments[0] == "start":
-        LIBC.personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
-        os.execv(sys.executable, [sys.executable, *FLAGS, __file__, "serve", *arguments[1:]])  # noqa: S606
-    zygote(*map(int, arguments[1:]))
+    """Start, at first only to start again."""
+    if arguments:
+        start_again(*map(int, arguments))
+    zygote()
 
 
 FLAGS = ("-S", "-s", "-P", "-B")

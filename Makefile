@@ -1,0 +1,46 @@
+# Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
+# installed (this folder, or a wheel), VENV where.
+PYTHON ?= python3
+PACKAGE ?= .
+VENV ?= .venv
+BIN = $(VENV)/bin
+PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet
+SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
+
+.PHONY: demo test lint bench clean
+
+demo: $(VENV)/installed
+	@$(BIN)/roboeval evaluate recorded:careful
+	@$(BIN)/roboeval evaluate recorded:hasty
+
+test: $(VENV)/tested
+	$(BIN)/python -m pytest $(TESTS)
+
+lint: $(VENV)/linted
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/installed
+	$(BIN)/python bench/evaluate.py
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+	$(PIP) install --upgrade "pip>=25.1"
+
+$(VENV)/installed: $(SOURCES) | $(BIN)/python
+	@echo "installing into $(VENV)"
+	@$(PIP) install --constraint constraints.txt --upgrade $(PACKAGE)
+	@touch $@
+
+$(VENV)/tested: $(VENV)/installed
+	@$(PIP) install --constraint constraints.txt --group test
+	@touch $@
+
+$(VENV)/linted: $(VENV)/tested
+	@$(PIP) install --constraint constraints.txt --group lint
+	@touch $@
+
+clean:
+	rm -rf $(VENV) dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

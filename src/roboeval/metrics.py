@@ -1,0 +1,221 @@
+"""How good a model is: pass@k for each prompt, and means over prompts with honest intervals."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+
+def pass_at_k(n: int, c: int, k: int) -> float:
+    """The chance that at least one of k completions passes, estimated without bias from n of which c pass.
+
+    Args:
+        n: how many completions were judged.
+        c: how many of them passed.
+        k: how many tries there are.
+
+    Raises:
+        ValueError: not 0 <= c <= n, or not 1 <= k <= n.
+    """
+    if not 0 <= c <= n:
+        raise ValueError(f"{c} of {n} completions cannot have passed")
+    if not 1 <= k <= n:
+        raise ValueError(f"pass@{k} cannot be estimated from {n} completions")
+    # Integers up to the one division: 1 - (a ratio near 1) in floating point would lose most digits.
+    draws = math.comb(n, k)
+    return (draws - math.comb(n - c, k)) / draws
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean and the interval in which the true one lies.
+
+    Args:
+        mean: the mean of the values.
+        low: the lower end of the interval, at least 0.
+        high: its upper end, at most 1.
+    """
+
+    mean: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class PromptScore:
+    """How the completions of one prompt did.
+
+    Args:
+        task: the prompt's task.
+        prompt: its number, from 0.
+        n: how many completions were judged.
+        c: how many of them passed.
+    """
+
+    task: str
+    prompt: int
+    n: int
+    c: int
+
+    def pass_at(self, k: int) -> float:
+        """The prompt's pass@k.
+
+        Args:
+            k: how many tries there are.
+
+        Raises:
+            ValueError: the prompt has fewer than k completions.
+        """
+        if k > self.n:
+            raise ValueError(
+                f"{self.task}, prompt {self.prompt}: pass@{k} cannot be estimated from {self.n} completions"
+            )
+        return pass_at_k(self.n, self.c, k)
+
+
+@dataclass(frozen=True)
+class TaskScore:
+    """How the prompts of one task did; each prompt counts the same, however many completions it has.
+
+    Args:
+        task: its name.
+        prompts: the scores of its prompts, at least one, by number.
+    """
+
+    task: str
+    prompts: tuple[PromptScore, ...]
+
+    def pass_at(self, k: int) -> Estimate:
+        """The mean pass@k over prompts, with its 95 % interval.
+
+        Args:
+            k: how many tries there are.
+
+        Raises:
+            ValueError: a prompt, which is named, has fewer than k completions.
+        """
+        return overall([self], k)
+
+    def lowest(self, k: int) -> float:
+        """The pass@k of the worst prompt, the lower end of the paper's error bars.
+
+        Args:
+            k: how many tries there are.
+
+        Raises:
+            ValueError: a prompt, which is named, has fewer than k completions.
+        """
+        return min(prompt.pass_at(k) for prompt in self.prompts)
+
+    def highest(self, k: int) -> float:
+        """The pass@k of the best prompt, the upper end of the paper's error bars.
+
+        Args:
+            k: how many tries there are.
+
+        Raises:
+            ValueError: a prompt, which is named, has fewer than k completions.
+        """
+        return max(prompt.pass_at(k) for prompt in self.prompts)
+
+
+def score_by_prompt(rows: Iterable[tuple[str, int, bool]]) -> tuple[TaskScore, ...]:
+    """Count what passed, by task in the order of the rows and by prompt number.
+
+    Args:
+        rows: task, prompt and whether it passed, of each completion.
+    """
+    results: defaultdict[str, defaultdict[int, list[bool]]] = defaultdict(lambda: defaultdict(list))
+    for task, prompt, passed in rows:
+        results[task][prompt].append(passed)
+    return tuple(
+        TaskScore(
+            task,
+            tuple(PromptScore(task, i, len(passes), sum(passes)) for i, passes in sorted(prompts.items())),
+        )
+        for task, prompts in results.items()
+    )
+
+
+def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
+    """The mean pass@k over all prompts of all tasks, with its 95 % interval.
+
+    Args:
+        tasks: the tasks, with at least one prompt among them.
+        k: how many tries there are.
+
+    Raises:
+        ValueError: a prompt, which is named, has fewer than k completions; or there is no prompt.
+    """
+    return clustered_interval([prompt.pass_at(k) for task in tasks for prompt in task.prompts])
+
+
+def clustered_interval(values: Sequence[float], *, level: float = 0.95) -> Estimate:
+    """The mean of one value per prompt, with an interval that takes prompts as drawn at random.
+
+    Completions of one prompt resemble each other, so that only prompts count as independent: the interval is
+    Student's t with one degree of freedom less than there are prompts, clipped to [0, 1]. One prompt says
+    nothing about others: its interval is [0, 1].
+
+    Args:
+        values: one value in [0, 1] for each prompt.
+        level: how often such intervals shall hold the true mean, between 0 and 1.
+
+    Raises:
+        ValueError: there are no values, one lies outside [0, 1], or the level is not between 0 and 1.
+    """
+    m = len(values)
+    if m == 0:
+        raise ValueError("there is no mean of no prompts")
+    if not all(0 <= value <= 1 for value in values):
+        raise ValueError("a value lies outside [0, 1]")
+    if not 0 < level < 1:
+        raise ValueError(f"a level lies between 0 and 1, which {level} does not")
+    mean = math.fsum(values) / m
+    if m == 1:
+        return Estimate(mean, 0.0, 1.0)
+    variance = math.fsum((value - mean) ** 2 for value in values) / (m - 1)
+    margin = t_quantile((1 + level) / 2, m - 1) * math.sqrt(variance / m)
+    return Estimate(mean, max(0.0, mean - margin), min(1.0, mean + margin))
+
+
+@lru_cache(maxsize=1024)
+def t_quantile(p: float, df: int) -> float:
+    """The value that Student's t stays below with probability p.
+
+    Args:
+        p: between 0 and 1.
+        df: degrees of freedom, at least 1.
+
+    Raises:
+        ValueError: p or df is out of range.
+    """
+    if not 0 < p < 1 or df < 1:
+        raise ValueError(f"Student's t has no quantile {p} with {df} degrees of freedom")
+    if p < 1 / 2:
+        return -t_quantile(1 - p, df)
+    # With angle = atan(t / sqrt(df)) the probability is a finite sum, and the range to search is bounded.
+    low, high = 0.0, math.pi / 2
+    while low < (angle := (low + high) / 2) < high:
+        low, high = (angle, high) if _within(angle, df) < 2 * p - 1 else (low, angle)
+    return math.sqrt(df) * math.tan(low)
+
+
+def _within(angle: float, df: int) -> float:
+    """The chance that |t| stays below sqrt(df) * tan(angle) (Abramowitz and Stegun, 26.7.3 and 26.7.4)."""
+    if df % 2 == 0:
+        return math.sin(angle) * math.fsum(_terms(angle, 1.0, range(2, df, 2)))
+    series = math.fsum(_terms(angle, math.cos(angle), range(3, df, 2))) if df > 1 else 0.0
+    return 2 / math.pi * (angle + math.sin(angle) * series)
+
+
+def _terms(angle: float, first: float, factors: range) -> Iterator[float]:
+    """A first term, and one more for each factor i: the one before times cos(angle)**2 * (i - 1) / i."""
+    term = first
+    yield term
+    for i in factors:
+        term *= math.cos(angle) ** 2 * (i - 1) / i
+        yield term

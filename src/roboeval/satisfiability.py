@@ -1,0 +1,551 @@
+"""Decides what formulas allow: whether some sequence of events satisfies them, and whether they imply another.
+
+A formula is made into a finite automaton that reads events, and the product of automata is searched to its
+end. So an answer is a proof for all sequences, of any length, of the *representative events*. These stand for
+the ways in which the regexes of the formulas can be found, or not found, in one text; they are sampled, and
+that is the one gap: a text that no sample is like. Options that are no text play no part.
+"""
+
+from __future__ import annotations
+
+import heapq
+import re
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from importlib import import_module
+from itertools import chain, combinations, count, islice, permutations, product
+from random import Random
+from typing import Any, TypeAlias, assert_never
+
+from codebotler.rtl import (
+    ActAtFirst,
+    ActAtSome,
+    And,
+    AtLeast,
+    Count,
+    Cut,
+    Element,
+    Exists,
+    Formula,
+    Not,
+    Or,
+    Regex,
+    Test,
+    Text,
+    Without,
+    Words,
+    holds,
+)
+from codebotler.trace import Event, Option, Trace
+
+MOST_STATES = 20_000
+"""How many states one automaton may have, and how many of a product are visited."""
+
+
+class Undecided(Exception):  # noqa: N818 - no mistake of the caller
+    """More states would have to be visited than there is time for."""
+
+
+class Reasoner:
+    """Answers questions about formulas that are judged together.
+
+    Args:
+        formulas: all that will be asked about; their regexes make the representative events.
+        moves: the requests by which the robot moves; by default any text, which may name several rooms at
+            once, or none that there is.
+    """
+
+    def __init__(self, formulas: Iterable[Formula], moves: Iterable[str] | None = None) -> None:
+        self.events = representative_events(chain.from_iterable(map(elements, formulas)))
+        if moves is not None:
+            self.events = [event for event in self.events if event.kind != "goto"]
+            self.events += [Event("goto", move) for move in moves]
+        self._readings: dict[Formula, tuple[Automaton, tuple[int, ...]]] = {}
+
+    def clash(self, formulas: Sequence[Formula], denied: Formula | None = None) -> tuple[Formula, ...] | None:
+        """Formulas that cannot all hold, or cannot while another fails; none of them can be left out.
+
+        It starts with no formula and adds one that the last trace breaks, so that proofs stay small.
+
+        Args:
+            formulas: those that may be in it.
+            denied: what must fail; then they imply it.
+
+        Returns:
+            the clashing formulas, in their order; None where a trace shows that there is no clash.
+
+        Raises:
+            Undecided: there are too many states.
+        """
+        wanted = set(elements(denied)) if denied else set()
+        nearest = sorted(formulas, key=lambda one: -len(wanted & set(elements(one))))
+        chosen: list[Formula] = []
+        while (trace := self.trace(chosen, denied)) is not None:
+            broken = next((one for one in nearest if not holds(one, trace)), None)
+            if broken is None:
+                return None
+            chosen.append(broken)
+        for one in tuple(chosen):
+            fewer = [other for other in chosen if other != one]
+            if self.trace(fewer, denied) is None:
+                chosen = fewer
+        return tuple(one for one in formulas if one in chosen)
+
+    def trace(self, formulas: Sequence[Formula], denied: Formula | None = None) -> Trace | None:
+        """A trace of representative events on which formulas hold and another fails; None if there is none.
+
+        Args:
+            formulas: what must hold.
+            denied: what must fail.
+
+        Raises:
+            Undecided: there are too many states.
+        """
+        readings = [self._reading(one) for one in formulas]
+        if denied is not None:
+            automaton, letters = self._reading(denied)
+            readings.append((automaton.complement, letters))
+        automata = [automaton for automaton, _ in readings]
+        # Events that no automaton tells apart are one letter of their product.
+        alphabet: dict[tuple[int, ...], Event] = {}
+        for event, *letters_of_event in zip(self.events, *(letters for _, letters in readings), strict=True):
+            alphabet.setdefault(tuple(letters_of_event), event)
+        return _path(automata, alphabet)
+
+    def _reading(self, formula: Formula) -> tuple[Automaton, tuple[int, ...]]:
+        """The formula's automaton, and which of its letters each representative event is."""
+        if formula not in self._readings:
+            seen = [*dict.fromkeys(elements(formula))]
+            letters = [frozenset(e for e in seen if _fits(e, event)) for event in self.events]
+            number = {letter: index for index, letter in enumerate(dict.fromkeys(letters))}
+            automaton = Automaton.of(_machine(formula), tuple(number))
+            self._readings[formula] = automaton, tuple(number[letter] for letter in letters)
+        return self._readings[formula]
+
+
+def _path(automata: Sequence[Automaton], alphabet: Mapping[tuple[int, ...], Event]) -> Trace | None:
+    """Events that lead all automata to acceptance, found by going first where acceptance is nearest."""
+    start = (0,) * len(automata)
+    came: dict[tuple[int, ...], tuple[tuple[int, ...], Event] | None] = {start: None}
+    tables = [(automaton.rows, automaton.distances) for automaton in automata]
+    steps = count()
+    heap = [(0, 0, start)]
+    while heap:
+        _, _, state = heapq.heappop(heap)
+        if all(distances[s] == 0 for (_, distances), s in zip(tables, state, strict=True)):
+            return tuple(reversed([*_back(state, came)]))
+        here = [rows[s] for (rows, _), s in zip(tables, state, strict=True)]
+        for letter, event in alphabet.items():
+            after = tuple(row[one] for row, one in zip(here, letter, strict=True))
+            if after in came:
+                continue
+            came[after] = state, event
+            far = [distances[s] for (_, distances), s in zip(tables, after, strict=True)]
+            if None not in far:
+                heapq.heappush(heap, (sum(d for d in far if d is not None), next(steps), after))
+        if len(came) > MOST_STATES:
+            raise Undecided
+    return None
+
+
+def _back(
+    state: tuple[int, ...], came: Mapping[tuple[int, ...], tuple[tuple[int, ...], Event] | None]
+) -> Iterator[Event]:
+    while (step := came[state]) is not None:
+        state, event = step
+        yield event
+
+
+# --- automata
+
+State: TypeAlias = Hashable
+Letter: TypeAlias = frozenset[Element]
+"""The elements that match an event."""
+
+
+@dataclass(frozen=True)
+class Automaton:
+    """A smallest deterministic automaton; it starts in state 0.
+
+    Args:
+        rows: for each state, where each letter leads.
+        accepts: for each state, whether the formula holds if the trace ends there.
+    """
+
+    rows: tuple[tuple[int, ...], ...]
+    accepts: tuple[bool, ...]
+
+    @classmethod
+    def of(cls, machine: _Machine, letters: Sequence[Letter]) -> Automaton:
+        """The automaton of a machine that reads these letters.
+
+        Raises:
+            Undecided: it has too many states.
+        """
+        number: dict[State, int] = {machine.start: 0}
+        states, rows = [machine.start], []
+        for state in states:
+            row = []
+            for letter in letters:
+                after = machine.step(state, letter)
+                if after not in number:
+                    number[after] = len(states)
+                    states.append(after)
+                row.append(number[after])
+            rows.append(row)
+            if len(states) > MOST_STATES:
+                raise Undecided
+        return cls._smallest(rows, [machine.accepts(state) for state in states])
+
+    @classmethod
+    def _smallest(cls, rows: list[list[int]], accepts: list[bool]) -> Automaton:
+        """Merge states until no two behave alike."""
+        groups: list[int] = [int(a != accepts[0]) for a in accepts]
+        while True:
+            behaviours = [(groups[s], *(groups[t] for t in row)) for s, row in enumerate(rows)]
+            number = {behaviour: index for index, behaviour in enumerate(dict.fromkeys(behaviours))}
+            finer = [number[behaviour] for behaviour in behaviours]
+            if len(number) == len(set(groups)):
+                break
+            groups = finer
+        firsts = {group: state for state, group in reversed([*enumerate(finer)])}
+        ordered = [firsts[group] for group in range(len(firsts))]
+        return cls(
+            tuple(tuple(finer[t] for t in rows[s]) for s in ordered), tuple(accepts[s] for s in ordered)
+        )
+
+    @cached_property
+    def complement(self) -> Automaton:
+        """The automaton of the negated formula."""
+        return Automaton(self.rows, tuple(not accepted for accepted in self.accepts))
+
+    @cached_property
+    def distances(self) -> tuple[int | None, ...]:
+        """For each state, how many events acceptance is away; None where it cannot be reached any more."""
+        found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
+        distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
+        while border:
+            distance += 1
+            border = {s for s, row in enumerate(self.rows) if found[s] is None and border.intersection(row)}
+            for state in border:
+                found[state] = distance
+        return tuple(found)
+
+
+@dataclass(frozen=True)
+class _Machine:
+    """What reads a trace from the left, remembering only a state, and knows at each end whether it holds."""
+
+    start: State
+    step: Callable[[Any, Letter], State]
+    accepts: Callable[[Any], bool]
+
+
+def _machine(formula: Formula) -> _Machine:
+    match formula:
+        case And(parts):
+            return _together([_machine(part) for part in parts], all)
+        case Or(parts):
+            return _together([_machine(part) for part in parts], any)
+        case Not(part):
+            inner = _machine(part)
+            return _Machine(inner.start, inner.step, lambda state: not inner.accepts(state))
+        case _:
+            machine = _reader(formula)
+            for cut in reversed(formula.cuts):
+                machine = _behind(cut, machine)
+            return machine
+
+
+def _together(machines: list[_Machine], join: Callable[[Iterable[bool]], bool]) -> _Machine:
+    return _Machine(
+        tuple(machine.start for machine in machines),
+        lambda state, letter: tuple(m.step(s, letter) for m, s in zip(machines, state, strict=True)),
+        lambda state: join(m.accepts(s) for m, s in zip(machines, state, strict=True)),
+    )
+
+
+def _reader(test: Test) -> _Machine:
+    element = test.element
+    match test:
+        case Exists():
+            return _Machine(False, lambda seen, letter: seen or element in letter, bool)  # noqa: FBT003 - a state
+        case AtLeast(_, number):
+            return _counter(element, number, number)
+        case Count(_, number):
+            return _counter(element, number, number + 1)
+        case ActAtFirst():
+            return _at_first(test)
+        case ActAtSome():
+            return _at_some(test)
+    assert_never(test)
+
+
+def _counter(element: Element, number: int, most: int) -> _Machine:
+    return _Machine(0, lambda n, letter: min(n + (element in letter), most), lambda n: n == number)
+
+
+def _at_first(test: ActAtFirst) -> _Machine:
+    arrival, departure = test.stay.arrival, test.stay.departure
+
+    def step(state: str, letter: Letter) -> State:
+        match state:
+            case "before":
+                return "there" if arrival in letter else state
+            case "there" if departure in letter:
+                return "gone"
+            case "there" if test.element in letter:
+                return "done"
+        return state
+
+    return _Machine("before", step, lambda state: state == "done")
+
+
+def _at_some(test: ActAtSome) -> _Machine:
+    arrival, departure = test.stay.arrival, test.stay.departure
+
+    def step(state: str, letter: Letter) -> State:
+        stays = state == "there" and departure not in letter
+        if state == "done" or (stays and test.element in letter):
+            return "done"
+        return "there" if stays or arrival in letter else "away"
+
+    return _Machine("away", step, lambda state: state == "done")
+
+
+def _behind(cut: Cut, inner: _Machine) -> _Machine:
+    """The machine that lets an inner one read only what a cut leaves: everything where it finds nothing."""
+    at = cut.element
+    match cut.name:
+        case "BeforeFirst":
+            return _Machine(
+                (False, inner.start),
+                lambda s, letter: (True, s[1]) if s[0] or at in letter else (False, inner.step(s[1], letter)),
+                lambda s: inner.accepts(s[1]),
+            )
+        case "AfterFirst":
+            return _Machine(
+                (False, inner.start),
+                lambda s, letter: (
+                    (True, inner.start) if not s[0] and at in letter else (s[0], inner.step(s[1], letter))
+                ),
+                lambda s: inner.accepts(s[1]),
+            )
+        case "BeforeLast":
+            return _Machine(
+                (inner.start, ()),
+                lambda s, letter: (inner.step(s[0], letter), (s[0],) if at in letter else s[1]),
+                lambda s: inner.accepts(s[1][0] if s[1] else s[0]),
+            )
+        case "AfterLast":
+            return _Machine(
+                inner.start,
+                lambda s, letter: inner.start if at in letter else inner.step(s, letter),
+                inner.accepts,
+            )
+    assert_never(cut.name)
+
+
+# --- representative events
+
+
+def elements(formula: Formula) -> Iterator[Element]:
+    """Everything that a formula looks for, in the order of its text; for a stay, the moves that bound it."""
+    match formula:
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from elements(part)
+        case Not(part):
+            yield from elements(part)
+        case _:
+            yield from (cut.element for cut in formula.cuts)
+            if isinstance(formula, ActAtFirst | ActAtSome):
+                yield from (formula.stay.arrival, formula.stay.departure)
+            yield formula.element
+
+
+def representative_events(wanted: Iterable[Element]) -> list[Event]:
+    """Events that match the elements in all combinations for which texts were found.
+
+    Args:
+        wanted: what the events are to be told apart by.
+    """
+    kinds: dict[str, list[Element]] = {}
+    for element in dict.fromkeys(wanted):
+        kinds.setdefault(element.kind, []).append(element)
+    events = []
+    for kind, alike in kinds.items():
+        texts = representative_texts(element.text for element in alike)
+        choices: list[tuple[Option, ...]] = [()]
+        if options := [element.options for element in alike if element.options is not None]:
+            choices += [(Option(text),) for text in representative_texts(options)]
+        events += [Event(kind, text, choice) for text in texts for choice in choices]
+    return events
+
+
+def _fits(element: Element, event: Event) -> bool:
+    return (
+        element.kind == event.kind
+        and element.text.matches(event.text)
+        and (element.options is None or any(element.options.matches(o.text) for o in event.options))
+    )
+
+
+_MOST_SAMPLES = 4
+_MOST_SUBSETS = 400
+
+
+def representative_texts(wanted: Iterable[Text]) -> list[str]:
+    """Texts that match in different combinations; one, and a short one, for each combination that was found.
+
+    Args:
+        wanted: what the texts are to be told apart by.
+    """
+    texts = [*dict.fromkeys(wanted)]
+    found: dict[tuple[bool, ...], str] = {}
+    for candidate in dict.fromkeys(_candidates(tuple(texts))):
+        found.setdefault(tuple(text.matches(candidate) for text in texts), candidate)
+    return [*found.values()]
+
+
+@cache
+def _candidates(texts: tuple[Text, ...]) -> tuple[str, ...]:
+    groups = [
+        group
+        for pattern in dict.fromkeys(chain.from_iterable(map(patterns, texts)))
+        for group in (samples(pattern), _forbidden(pattern))
+        if group
+    ]
+    words = [*dict.fromkeys(chain.from_iterable(groups))]
+    whole = [word for word in words if word]
+    hidden = [f"x{word}x" for word in whole]
+    pairs = (f"{one} {other}" for one, other in product([*whole, *hidden], repeat=2))
+    sizes = range(3, len(groups) + 1)
+    subsets = chain.from_iterable(
+        combinations([group[0] for group in groups], size) for size in reversed(sizes)
+    )
+    several = (
+        " ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1])
+    )
+    joined = chain.from_iterable(_joined(text.parts) for text in texts if isinstance(text, Words))
+    spaced = (form for word in whole for form in (f"x {word}", f"{word} x"))
+    every = chain(["", "x"], words, hidden, spaced, pairs, several, joined)
+    return tuple(dict.fromkeys(text for text in every if text == text.strip()))
+
+
+def _joined(parts: Sequence[Text]) -> Iterator[str]:
+    """Texts made of a sample for each part, in several orders."""
+    groups = [
+        [word for pattern in patterns(part) for word in samples(pattern)] or [""]
+        for part in parts
+        if not isinstance(part, Without)
+    ]
+    for order in islice(permutations(groups), 24):
+        for choice in islice(product(*order), 64):
+            yield from (joint.join(filter(None, choice)) for joint in (" ", "", "x"))
+
+
+def patterns(text: Text) -> Iterator[str]:
+    """The regexes in a text of RTL."""
+    match text:
+        case Words(parts):
+            for part in parts:
+                yield from patterns(part)
+        case Regex(pattern) | Without(pattern):
+            yield pattern
+
+
+@cache
+def samples(pattern: str) -> tuple[str, ...]:
+    """Texts without spaces at their ends in which a regex is found; none where none was thought of.
+
+    Args:
+        pattern: the regex.
+    """
+    matches = Regex(pattern).matches
+    spelled = _spelled(_parsed(pattern))
+    forms = (form.strip() for word in spelled for form in (word, f"x {word} x", f"x{word}x", f"x {word}"))
+    found = dict.fromkeys(form for form in forms if matches(form))
+    return tuple(islice(found or _guessed(pattern), _MOST_SAMPLES))
+
+
+def _guessed(pattern: str) -> Iterator[str]:
+    random, letters = Random(pattern), f"{pattern}x1 "  # noqa: S311 - no secret
+    guesses = ("".join(random.choices(letters, k=random.randint(0, 8))).strip() for _ in range(3_000))
+    return (guess for guess in guesses if Regex(pattern).matches(guess))
+
+
+def _forbidden(pattern: str) -> tuple[str, ...]:
+    """What stands in the negative lookaheads of a regex: what a text must hold not to match."""
+    inner = (value[1] for op, value in _parsed(pattern) if str(op) == "ASSERT_NOT")
+    return tuple(word.strip() for items in inner for word in _spelled(items) if word.strip())
+
+
+def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
+    return import_module("re._parser").parse(pattern, re.IGNORECASE | re.DOTALL)
+
+
+def _spelled(items: Any) -> list[str]:  # noqa: ANN401 - the same
+    texts = [""]
+    for op, value in items:
+        parts = _spelled_one(str(op), value)
+        texts = [*dict.fromkeys(text + part for part in parts for text in texts)][: 4 * _MOST_SAMPLES]
+    return texts
+
+
+def _spelled_one(op: str, value: Any) -> list[str]:  # noqa: ANN401, PLR0911 - the same, one for each node
+    match op:
+        case "LITERAL":
+            return [chr(value)]
+        case "NOT_LITERAL":
+            return ["a" if value != ord("a") else "b"]
+        case "ANY":
+            return ["a"]
+        case "IN":
+            return _spelled_set(value)
+        case "BRANCH":
+            return [text for branch in value[1] for text in _spelled(branch)[:_MOST_SAMPLES]]
+        case "SUBPATTERN" | "ASSERT":
+            return _spelled(value[-1])
+        case "ATOMIC_GROUP":
+            return _spelled(value)
+        case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
+            least, _, items = value
+            repeated = [text * min(max(least, 1), 100) for text in _spelled(items)]
+            return repeated if least else ["", *repeated]
+    return [""]
+
+
+def _spelled_set(members: Any) -> list[str]:  # noqa: ANN401 - the same
+    ends = [end for op, value in members for end in _ends(str(op), value)]
+    return [char for char in dict.fromkeys([*ends, *"a1 _-.'z"]) if _is_in(char, members)][:_MOST_SAMPLES]
+
+
+def _ends(op: str, value: Any) -> list[str]:  # noqa: ANN401 - the same
+    return [chr(value)] if op == "LITERAL" else [*map(chr, value)] if op == "RANGE" else []
+
+
+def _is_in(char: str, members: Any) -> bool:  # noqa: ANN401 - the same
+    found = negated = False
+    for op, value in members:
+        match str(op):
+            case "NEGATE":
+                negated = True
+            case "LITERAL":
+                found = found or ord(char) == value
+            case "RANGE":
+                found = found or value[0] <= ord(char) <= value[1]
+            case _:
+                found = found or re.match(_CATEGORIES.get(str(value), "."), char) is not None
+    return found != negated
+
+
+_CATEGORIES = {
+    "CATEGORY_DIGIT": r"\d",
+    "CATEGORY_NOT_DIGIT": r"\D",
+    "CATEGORY_SPACE": r"\s",
+    "CATEGORY_NOT_SPACE": r"\S",
+    "CATEGORY_WORD": r"\w",
+    "CATEGORY_NOT_WORD": r"\W",
+}

@@ -1,0 +1,378 @@
+"""Why programs pass or fail: a reason for each program of a prompt, and every step of one in each world."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.syntax import Syntax
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.rtl import explain
+from codebotler.simulator.robot import located, resolve_room
+from codebotler.trace import Event, Trace
+from codebotler.world import World
+from roboeval.records import Completion, name_of, trace_from
+from roboeval.suite import Scenario, Suite
+from roboeval.tables import (
+    NOT_RECORDED,
+    Row,
+    Selection,
+    grid,
+    key_of,
+    kind_of,
+    of_task,
+    parse_selection,
+    prompt_head,
+    prompt_lines,
+    shortened,
+    task_data,
+    task_view,
+    visible,
+)
+
+__all__ = [
+    "Selection",
+    "completion_data",
+    "completion_view",
+    "parse_selection",
+    "prompt_data",
+    "prompt_view",
+    "task_data",
+    "task_view",
+    "view",
+]
+
+CHANGED = "the suite has changed since this was judged"
+
+MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
+MOST_LINES, MOST_OPTIONS = 1_000, 20
+
+
+# --- what there is to show, as plain data
+
+
+def prompt_data(
+    rows: Iterable[Row],
+    completions: Iterable[Completion],
+    suite: Suite,
+    task: str,
+    prompt: int,
+    *,
+    ablated: bool = False,
+) -> dict[str, Any]:
+    """A prompt, program by program, with the one reason why each fails; equal programs are told once.
+
+    Args:
+        rows: of the evaluation.
+        completions: that were judged.
+        suite: by which they were judged.
+        task: its name.
+        prompt: counted from 0.
+        ablated: whether common sense only was required.
+
+    Raises:
+        BadInput: the prompt has no row.
+    """
+    found = Selection(task, prompt).rows(rows)
+    written = of_task(completions, task)
+    programs: dict[object, list[Row]] = defaultdict(list)
+    for row in found:
+        completion = written.get(key_of(row))
+        programs[row["index"] if completion is None else completion.program].append(row)
+    return {
+        "task": task,
+        **prompt_head(prompt, found, written),
+        "programs": [
+            {"indices": [row["index"] for row in same], **_reason(same[0], suite, ablated=ablated)}
+            for same in programs.values()
+        ],
+    }
+
+
+def _reason(row: Row, suite: Suite, *, ablated: bool) -> dict[str, Any]:
+    why = row["failure"]
+    if why is None:
+        return {"passed": True, "failure": None}
+    verdict = row["verdicts"][why["world"]]
+    told = {key: verdict[key] for key in ("world", "error", "line")}
+    if why["check"] is None:
+        return {"passed": False, "failure": why, **told, "explanation": None, "step": None}
+    scenario = _scenario(suite, row, why["world"], ablated=ablated)
+    explained = _explained(why["check"], scenario, _trace(verdict, scenario))
+    return {"passed": False, "failure": why, **told, **explained}
+
+
+def completion_data(
+    row: Row, completion: Completion | None, suite: Suite, *, ablated: bool = False
+) -> dict[str, Any]:
+    """One completion: what was asked, the program, and each world with every step and failed check.
+
+    Args:
+        row: of the evaluation.
+        completion: that was judged; None if it is not there.
+        suite: by which it was judged.
+        ablated: whether common sense only was required.
+    """
+    return {
+        **{key: row[key] for key in ("task", "prompt", "index", "passed", "failure")},
+        **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
+        "worlds": [
+            _world_data(verdict, _scenario(suite, row, number, ablated=ablated))
+            for number, verdict in enumerate(row["verdicts"])
+        ],
+    }
+
+
+def _scenario(suite: Suite, row: Row, number: int, *, ablated: bool) -> Scenario | None:
+    """The scenario in which a verdict was reached; None if the suite has it no more."""
+    task = suite.tasks.get(row["task"])
+    scenarios = () if task is None else task.judged_in(ablated=ablated)
+    about = row["verdicts"][number]["world"]
+    return next((s for s in (*scenarios[number : number + 1], *scenarios) if s.world.about == about), None)
+
+
+def _trace(verdict: Row, scenario: Scenario | None) -> Trace:
+    trace = trace_from(verdict["trace"])
+    return trace if scenario is None else located(trace, scenario.world)
+
+
+def _world_data(verdict: Row, scenario: Scenario | None) -> dict[str, Any]:
+    trace = _trace(verdict, scenario)
+    world = None if scenario is None else scenario.world
+    return {
+        **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
+        "steps": [_step_data(number, event, world) for number, event in enumerate(trace, 1)],
+        "failed_checks": [
+            {"check": check, **_explained(check, scenario, trace)} for check in verdict["failed_checks"]
+        ],
+    }
+
+
+def _step_data(number: int, event: Event, world: World | None) -> dict[str, Any]:
+    data: dict[str, Any] = {"step": number, "kind": event.kind, "text": event.text}
+    if world is not None:
+        data["place"] = event.place
+        if event.kind == "goto":
+            data["to"] = resolve_room([room.name for room in world.rooms], event.text)
+    if event.found is not None:
+        data["found"] = event.found
+    if event.kind == "ask":
+        data["options"] = [o.text if o.is_text else {"no text": o.text} for o in event.options]
+        data["answer"] = event.answer
+    return data
+
+
+def _explained(check: str, scenario: Scenario | None, trace: Trace) -> dict[str, Any]:
+    """Why a check fails, with the step that makes it fail if it is one."""
+    require = () if scenario is None else scenario.require
+    requirement = next((r for r in require if r.text == check), None)
+    if requirement is None:
+        return {"explanation": f"{CHANGED} and no longer requires this here", "step": None}
+    why = explain(requirement.formula, trace)
+    if why is None:
+        return {"explanation": f"{CHANGED}; by now this is satisfied", "step": None}
+    return {"explanation": why.sentence, "step": None if why.event is None else why.event + 1}
+
+
+# --- what people see of it
+
+
+def view(
+    selection: Selection,
+    rows: Iterable[Row],
+    completions: Iterable[Completion],
+    suite: Suite,
+    *,
+    ablated: bool = False,
+) -> RenderableType:
+    """The view of a task, a prompt or a completion.
+
+    Raises:
+        BadInput: it has no row.
+    """
+    assert selection.task is not None
+    if selection.prompt is None:
+        return task_view(rows, completions, suite, selection.task)
+    if selection.index is None:
+        return prompt_view(rows, completions, suite, selection.task, selection.prompt, ablated=ablated)
+    row = selection.rows(rows)[0]
+    completion = next((c for c in completions if c.key == key_of(row)), None)
+    return completion_view(row, completion, suite, ablated=ablated)
+
+
+def prompt_view(
+    rows: Iterable[Row],
+    completions: Iterable[Completion],
+    suite: Suite,
+    task: str,
+    prompt: int,
+    *,
+    ablated: bool = False,
+) -> RenderableType:
+    """What `prompt_data` says, for a person."""
+    data = prompt_data(rows, completions, suite, task, prompt, ablated=ablated)
+    table = grid("right", "left")
+    for program in data["programs"]:
+        table.add_row(f"  {program['indices'][0]}", _told(program))
+    return Group(*prompt_lines(task, data), Text(), table)
+
+
+def _told(program: Mapping[str, Any]) -> Text:
+    same = len(program["indices"])
+    often = Text(f"x{same:,}  " if same > 1 else "")
+    if program["passed"]:
+        return often.append("passed", "green")
+    text = Text.assemble(often, kind_of(program["failure"]), f' in "{visible(program["world"])}"\n')
+    if program["explanation"] is None:
+        return text.append(_error_sentence(program))
+    return text.append(f"{visible(program['failure']['check'])}: {shortened(program['explanation'])}")
+
+
+def _error_sentence(verdict: Mapping[str, Any]) -> str:
+    where = "" if verdict["line"] is None else f"line {verdict['line']}: "
+    return where + shortened(verdict["error"]["message"])
+
+
+def completion_view(
+    row: Row, completion: Completion | None, suite: Suite, *, ablated: bool = False
+) -> RenderableType:
+    """What `completion_data` says, for a person."""
+    data = completion_data(row, completion, suite, ablated=ablated)
+    lines = {world["line"] for world in data["worlds"] if not world["satisfied"]}
+    parts: list[RenderableType] = [_completion_head(data), Text(), *_program(data["program"], lines)]
+    for number, world in enumerate(data["worlds"], 1):
+        parts += [Text(), *_world(world, f"World {number} of {len(data['worlds'])}: ")]
+    return Group(*parts)
+
+
+def _completion_head(data: Mapping[str, Any]) -> Text:
+    head = Text.assemble((visible(name_of((data["task"], data["prompt"], data["index"]))), "bold"), "  ")
+    why = data["failure"]
+    head.append_text(Text("passed", "green") if why is None else kind_of(why))
+    if data["model"] is not None:
+        head.append(f"\nwritten by {visible(data['model'])}", "dim")
+    told = NOT_RECORDED if data["instruction"] is None else visible(data["instruction"])
+    return head.append(f"\n{told}", "italic")
+
+
+def _program(program: str | None, marked: set[int | None]) -> list[RenderableType]:
+    if program is None:
+        return [Text("program not recorded", "italic")]
+    lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
+    source = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
+    syntax = Syntax(
+        source,
+        "python",
+        theme="ansi_dark",
+        background_color="default",
+        line_numbers=True,
+        highlight_lines={line for line in marked if line is not None},
+        word_wrap=True,
+    )
+    left = len(lines) - MOST_LINES
+    return [syntax, Text(f"... {left:,} more lines", "dim")] if left > 0 else [syntax]
+
+
+def _world(world: Mapping[str, Any], name: str) -> list[RenderableType]:
+    parts: list[RenderableType] = [
+        Text(name + visible(world["world"]), "bold"),
+        _ending(world),
+        _storyboard(world["steps"], {check["step"] for check in world["failed_checks"]}),
+    ]
+    for check in world["failed_checks"]:
+        text = Text.assemble(
+            ("failed ", "red"), visible(check["check"]), f": {shortened(check['explanation'])}"
+        )
+        parts.append(Padding(text, (0, 0, 0, 2)))
+    return parts
+
+
+def _ending(world: Mapping[str, Any]) -> Text:
+    text = Text("satisfied", "green") if world["satisfied"] else Text("not satisfied", "red")
+    text = Text.assemble(text, f", {world['status']}")
+    if world["error"] is None:
+        return text
+    allowed = " (allowed here)" if world["satisfied"] else ""
+    return text.append(f"{allowed}: {visible(world['error']['kind'])}, {_error_sentence(world)}")
+
+
+# --- the storyboard
+
+
+def _storyboard(steps: Sequence[Mapping[str, Any]], needed: set[int | None]) -> Table:
+    """The steps room by room; a long trace keeps its ends and the steps that explanations name."""
+    table = grid("right", "left")
+    if not steps:
+        table.add_row(Text(), Text("the robot did nothing", "dim"))
+        return table
+    if steps[0]["kind"] != "goto" and "place" in steps[0]:
+        table.add_row(Text(), Text(f"in {visible(steps[0]['place'])}", "bold"))
+    last = len(steps) - LAST_STEPS
+
+    def is_shown(step: Mapping[str, Any]) -> bool:
+        number = step["step"]
+        return len(steps) <= MOST_STEPS or number <= FIRST_STEPS or number > last or number in needed
+
+    for shown, some in groupby(steps, key=is_shown):
+        if shown:
+            for step in some:
+                table.add_row(Text(str(step["step"]), "dim"), _step(step))
+        else:
+            hidden = list(some)
+            table.add_row(Text(), Text(f"... {len(hidden):,} more{_repeating(steps, hidden)} ...", "dim"))
+    return table
+
+
+def _repeating(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str, Any]]) -> str:
+    def same(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+        return {**a, "step": 0} == {**b, "step": 0}
+
+    first = hidden[0]["step"] - 1
+    for period in range(1, min(LONGEST_PERIOD, first) + 1):
+        if all(same(steps[at], steps[at - period]) for at in range(first, first + len(hidden))):
+            repeated = f"step {first}" if period == 1 else f"steps {first - period + 1} to {first}"
+            return f", repeating {repeated}"
+    return ""
+
+
+def _step(step: Mapping[str, Any]) -> RenderableType:
+    text = f'"{shortened(step["text"])}"'
+    if step["kind"] == "goto":
+        return _drive(step, text)
+    match step["kind"]:
+        case "check":
+            told = f"looked for {text}: {'found' if step.get('found') else 'not found'}"
+        case "ask":
+            answer = "no answer" if step["answer"] is None else shortened(step["answer"])
+            told = f"asked {text} {_options(step['options'])} → {answer}"
+        case "say":
+            told = f"said {text}"
+        case "pick":
+            told = f"picked up {text}"
+        case "place":
+            told = f"put down {text}"
+        case kind:
+            told = f"{visible(kind)} {text}"
+    return Padding(Text(told), (0, 0, 0, 4))
+
+
+def _drive(step: Mapping[str, Any], request: str) -> Text:
+    if "place" not in step:
+        return Text(f"→ {request}", "bold")
+    start = f"{visible(step['place'])} → "
+    if step["to"] is None:
+        return Text.assemble((f"{start}{request}", "bold"), ("  failed: there is no such room", "red"))
+    drive = Text(start + visible(step["to"]), "bold")
+    return drive if step["to"] == step["text"] else drive.append(f"  (asked for {request})", "not bold")
+
+
+def _options(options: Sequence[str | Mapping[str, str]]) -> str:
+    shown = [shortened(o) if isinstance(o, str) else f"{shortened(o['no text'])} (no text)" for o in options]
+    left = len(shown) - MOST_OPTIONS
+    return f"[{' | '.join(shown[:MOST_OPTIONS] + [f'{left:,} more'] * (left > 0))}]"

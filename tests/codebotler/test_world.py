@@ -1,0 +1,273 @@
+import re
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from codebotler.badinput import BadInput, YamlFile
+from codebotler.world import HALLWAY, Person, Room, World, WorldFile, laid_out
+
+GOOD = "robot: hall\nrooms:\n  - hall\n  - lab\n"
+FULL = """\
+about: second floor, after lunch
+robot: start_loc
+rooms:
+  - start_loc
+  - alice's office
+  - {name: kitchen, footprint: [[6, 0], [9, 0], [9, 4], [6, 4]], stand_at: [7.5, 1]}
+objects: {kitchen: [mug, bottle of water]}
+people: {alice's office: [{name: alice, answers: ["yes", tea]}, {name: .*}]}
+may_wait_forever: true
+"""
+
+
+def read(text: str) -> World:
+    file = YamlFile(text, "w.yaml")
+    return file.validate(WorldFile).world(file)
+
+
+def test_world_file_holds_all_that_a_world_is(tmp_path: Path) -> None:
+    path = tmp_path / "w.yaml"
+    path.write_text(FULL, encoding="utf-8")
+    assert World.read(path) == World(
+        about="second floor, after lunch",
+        robot="start_loc",
+        rooms=(
+            Room("start_loc"),
+            Room("alice's office", people=(Person("alice", ("yes", "tea")), Person(".*"))),
+            Room(
+                "kitchen",
+                objects=("mug", "bottle of water"),
+                footprint=((6, 0), (9, 0), (9, 4), (6, 4)),
+                stand_at=(7.5, 1),
+            ),
+        ),
+        may_wait_forever=True,
+    )
+
+
+def test_only_the_rooms_and_the_start_are_needed() -> None:
+    assert read("robot: a\nrooms: [a]\n") == World((Room("a"),), "a", about="", may_wait_forever=False)
+
+
+WORD = 'w.yaml, line {}: {} is a truth value, not a text; put quotes around it ("{}")'
+KEY = 'w.yaml, line {}: the key "{}" means nothing here; remove it or correct its spelling'
+REGEX = 'w.yaml, line {}: "{}" is no valid regular expression: {}'
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (GOOD + "robots: 3\n", KEY.format(5, "robots")),
+        ("rooms: [hall]\n", 'w.yaml, line 1: the key "robot" is missing'),
+        ("about: x\nrobot: hall\n", 'w.yaml, line 1: the key "rooms" is missing'),
+        (
+            "robot: 3\nrooms: [hall]\n",
+            'w.yaml, line 1: "robot" is a number, not a text; put quotes around it',
+        ),
+        ("robot:\nrooms: [hall]\n", 'w.yaml, line 1: "robot" is empty; fill it in or remove it'),
+        ("rooms: [hall]\nrobot: [hall]\n", 'w.yaml, line 2: "robot" is a list, not a text'),
+        ("robot: ''\nrooms: [hall]\n", 'w.yaml, line 1: "robot" is empty; write a text'),
+        (GOOD + "about: no\n", WORD.format(5, '"about"', "no")),
+        ("robot: yes\nrooms: [hall]\n", WORD.format(1, '"robot"', "yes")),
+        ("robot: hall\nrooms: hall\n", 'w.yaml, line 2: "rooms" is a text, not a list'),
+        ("robot: hall\nrooms: {hall: 1}\n", 'w.yaml, line 2: "rooms" is a mapping, not a list'),
+        ("robot: hall\nrooms: []\n", 'w.yaml, line 2: "rooms" has too few entries; it needs at least 1'),
+        (GOOD + "  - on\n", WORD.format(5, "this entry", "yes")),
+        (GOOD + "  - 12\n", "w.yaml, line 5: this entry is a number, not a text; put quotes around it"),
+        (GOOD + "  -\n", "w.yaml, line 5: this entry is empty; fill it in or remove it"),
+        (GOOD + "  - ''\n", "w.yaml, line 5: this entry is empty; write a text"),
+        (GOOD + "  - [a, b]\n", "w.yaml, line 5: this entry is a list, not a text"),
+        (GOOD + "  - {name: a, colour: red}\n", KEY.format(5, "colour")),
+        (GOOD + "  - {stand_at: [1, 2]}\n", 'w.yaml, line 5: the key "name" is missing'),
+        (GOOD + "  - {name: no}\n", WORD.format(5, '"name"', "no")),
+        (
+            GOOD + "  - name: a\n    footprint: [[0, 0], [1, 0]]\n",
+            'w.yaml, line 6: "footprint" has too few entries; it needs at least 3',
+        ),
+        (
+            GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, 0, 2]\n      - [1, 1]\n",
+            "w.yaml, line 8: this entry has too many entries; it takes 2",
+        ),
+        (
+            GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, 0]\n      - [1]\n",
+            "w.yaml, line 9: this entry has too few values; it needs at least 2",
+        ),
+        (
+            GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, b]\n      - [1, 1]\n",
+            "w.yaml, line 8: this entry is a text, not a number",
+        ),
+        (GOOD + "  - name: a\n    footprint: big\n", 'w.yaml, line 6: "footprint" is a text, not a list'),
+        (GOOD + "  - {name: a, stand_at: [1, .nan]}\n", "w.yaml, line 5: this entry is no finite number"),
+        (GOOD + "  - {name: a, stand_at: [-.inf, 1]}\n", "w.yaml, line 5: this entry is no finite number"),
+        (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", "w.yaml, line 5: this entry is a text, not a number"),
+        (GOOD + "  - hall\n", 'w.yaml, line 5: the room "hall" stands here twice; remove one'),
+        (GOOD + "  - {name: lab}\n", 'w.yaml, line 5: the room "lab" stands here twice; remove one'),
+        (
+            "rooms: [hall, lab]\nrobot: attic\n",
+            'w.yaml, line 2: the robot starts in "attic", but the rooms are: hall, lab',
+        ),
+        (GOOD + "objects: [mug]\n", 'w.yaml, line 5: "objects" is a list, not a mapping of keys to values'),
+        (GOOD + "objects:\n", 'w.yaml, line 5: "objects" is empty; fill it in or remove it'),
+        (GOOD + "objects:\n  lab: mug\n", 'w.yaml, line 6: "lab" is a text, not a list'),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - no\n", WORD.format(8, "this entry", "no")),
+        (
+            GOOD + "objects:\n  lab:\n    - mug\n    - ''\n",
+            "w.yaml, line 8: this entry is empty; write a text",
+        ),
+        (
+            GOOD + "objects:\n  lab: [mug]\n  attic: [mug]\n",
+            'w.yaml, line 7: there are objects in "attic", but the rooms are: hall, lab',
+        ),
+        (
+            GOOD + "people:\n  lab: [{name: a}]\n  attic: [{name: b}]\n",
+            'w.yaml, line 7: there are people in "attic", but the rooms are: hall, lab',
+        ),
+        (
+            GOOD + "people:\n  lab:\n    - alice\n",
+            "w.yaml, line 7: this entry is a text, not a mapping of keys to values",
+        ),
+        (GOOD + "people:\n  lab: {name: a}\n", 'w.yaml, line 6: "lab" is a mapping, not a list'),
+        (GOOD + "people:\n  lab:\n    - answers: [tea]\n", 'w.yaml, line 7: the key "name" is missing'),
+        (GOOD + "people:\n  lab:\n    - name: a\n      answer: b\n", KEY.format(8, "answer")),
+        (
+            GOOD + "people:\n  lab:\n    - name: a\n      answers:\n        - tea\n        - yes\n",
+            WORD.format(10, "this entry", "yes"),
+        ),
+        (
+            GOOD + "people:\n  lab:\n    - name: a\n      answers: tea\n",
+            'w.yaml, line 8: "answers" is a text, not a list',
+        ),
+        (
+            GOOD + "may_wait_forever: 'yes'\n",
+            'w.yaml, line 5: "may_wait_forever" is a text, not true or false',
+        ),
+        (
+            GOOD + "may_wait_forever: 1\n",
+            'w.yaml, line 5: "may_wait_forever" is a number, not true or false',
+        ),
+        (
+            GOOD + "  - lab (3\n",
+            REGEX.format(5, "lab (3", "missing ), unterminated subpattern at position 4"),
+        ),
+        (
+            GOOD + "objects:\n  lab:\n    - mug\n    - '*'\n",
+            REGEX.format(8, "*", "nothing to repeat at position 0"),
+        ),
+        (
+            GOOD + "people:\n  lab:\n    - name: '*'\n",
+            REGEX.format(7, "*", "nothing to repeat at position 0"),
+        ),
+        (
+            GOOD + "people:\n  lab:\n    - name: a\n      answers:\n        - tea\n        - '[a'\n",
+            REGEX.format(10, "[a", "unterminated character set at position 0"),
+        ),
+        (
+            GOOD + "objects:\n  lab: ['a{9999999999999}']\n",
+            REGEX.format(6, "a{9999999999999}", "the repetition number is too large"),
+        ),
+        ("", "w.yaml: the file is empty; fill it in or remove it"),
+        ("- hall\n", "w.yaml, line 1: the file is a list, not a mapping of keys to values"),
+        (
+            GOOD + "objects:\n  lab: [a]\n  lab: [b]\n",
+            'w.yaml, line 7: the key "lab" stands here a second time; keep one of them',
+        ),
+    ],
+)
+def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(text: str, sentence: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        read(text)
+    assert str(caught.value) == sentence
+
+
+def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
+    path = tmp_path / "w.yaml"
+    path.write_text("robot: attic\nrooms: [hall]\n", encoding="utf-8")
+    with pytest.raises(BadInput, match=re.escape(f"{path}, line 1: the robot starts in")):
+        World.read(path)
+
+
+def is_regex(text: str) -> bool:
+    try:
+        re.compile(text)
+    except (re.error, OverflowError):
+        return False
+    return True
+
+
+TEXTS = st.text(st.characters(codec="utf-8"), max_size=12) | st.sampled_from(
+    ["no", "yes", "3", "null", "~", "=", "<<", "a: b", "# a", "2001-01-01", "\ta\n b ", "\x85\u2028", "1e3"]
+)
+REGEXES = TEXTS.filter(is_regex)
+NAMES = REGEXES.filter(bool)
+METRES = st.floats(allow_nan=False, allow_infinity=False)
+POINTS = st.tuples(METRES, METRES)
+ROOMS = st.builds(
+    Room,
+    name=NAMES,
+    objects=st.lists(NAMES, max_size=3).map(tuple),
+    people=st.lists(st.builds(Person, NAMES, st.lists(REGEXES, max_size=3).map(tuple)), max_size=2).map(
+        tuple
+    ),
+    footprint=st.none() | st.lists(POINTS, min_size=3, max_size=5).map(tuple),
+    stand_at=st.none() | POINTS,
+)
+
+
+@st.composite
+def worlds(draw: st.DrawFn) -> World:
+    rooms = draw(st.lists(ROOMS, min_size=1, max_size=4, unique_by=lambda room: room.name))
+    start = draw(st.sampled_from(rooms)).name
+    return World(tuple(rooms), start, draw(TEXTS), may_wait_forever=draw(st.booleans()))
+
+
+@given(worlds())
+def test_world_written_as_a_file_reads_back_as_itself(world: World) -> None:
+    assert read(world.to_yaml()) == world
+
+
+def extent(room: Room) -> tuple[float, float, float, float]:
+    assert room.footprint is not None
+    xs, ys = zip(*room.footprint, strict=True)
+    return min(xs), max(xs), min(ys), max(ys)
+
+
+def overlap(one: Room, other: Room) -> bool:
+    (a, b, c, d), (e, f, g, h) = extent(one), extent(other)
+    return a < f and e < b and c < h and g < d
+
+
+CORNERS = st.integers(-50, 50).map(float)
+RECTANGLES = st.tuples(CORNERS, CORNERS).map(
+    lambda low: (low, (low[0] + 3, low[1]), (low[0] + 3, low[1] + 2), (low[0], low[1] + 2))
+)
+
+
+@given(st.lists(st.none() | RECTANGLES, min_size=1, max_size=9))
+def test_layout_gives_every_room_a_place_of_its_own_and_keeps_those_that_are_given(
+    footprints: list[tuple[tuple[float, float], ...] | None],
+) -> None:
+    world = World(tuple(Room(f"room {i}", footprint=given) for i, given in enumerate(footprints)), "room 0")
+    rooms = laid_out(world).rooms
+    new = [room for room, given in zip(rooms, footprints, strict=True) if given is None]
+    old = [room for room, given in zip(rooms, footprints, strict=True) if given is not None]
+    assert [room.footprint for room in old] == [given for given in footprints if given is not None]
+    assert not any(overlap(one, other) for one, other in combinations(new, 2))
+    assert not any(overlap(one, other) for one in new for other in old)
+    for room in rooms:
+        left, right, low, high = extent(room)
+        assert room.stand_at is not None
+        assert left < room.stand_at[0] < right
+        assert low < room.stand_at[1] < high
+
+
+def test_layout_is_a_hallway_with_rooms_on_both_sides_and_keeps_standing_points() -> None:
+    world = World((Room("a"), Room("b", stand_at=(9, 9)), Room("c")), "a", may_wait_forever=True)
+    a, b, c = laid_out(world).rooms
+    assert (extent(a)[:2], extent(c)[0]) == (extent(b)[:2], extent(a)[1])
+    assert extent(b)[2] - extent(a)[3] == HALLWAY
+    assert b.stand_at == (9, 9)
+    assert laid_out(world).may_wait_forever
+    assert laid_out(laid_out(world)) == laid_out(world)

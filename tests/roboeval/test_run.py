@@ -1,0 +1,259 @@
+"""A run survives interruptions, refuses what does not fit, and gives the same bytes each time."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from roboeval.records import Completion, read_completions, read_rows, recorded_completions, to_line
+from roboeval.run import Run, Source, evaluate_run, open_source, tasks_to_judge
+from roboeval.suite import Suite
+
+GREETS = 'def task_program():\n    say("good day")\n'
+ADDRESS = "def task_program():\n    say(str(object()))\n    say(str(id([])))\n    say(str({'a', 'b', 'c'}))\n"
+
+
+def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> Run:
+    path.mkdir(parents=True)
+    rows = [
+        {"task": task, "prompt": 0, "index": index, "program": program}
+        for index, program in enumerate(programs)
+    ]
+    run = Run(path)
+    run.completions.write_bytes(b"".join(map(to_line, rows)))
+    return run
+
+
+def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[dict[str, Any]]:
+    return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
+
+
+def careful_run(path: Path, suite: Suite) -> Run:
+    run = Run(path)
+    run.keep(Source("recorded:careful", lambda: recorded_completions("recorded:careful", suite)), suite)
+    return run
+
+
+def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, "go_to('nowhere')\n"])
+    judged(run, paper)
+    about = json.loads(run.head("paper").read_text())
+    assert about["suite"] == "paper"
+    assert about["digest"] == paper.digest
+    assert about["rules"]["literals"] == "lowercase"
+    rows = [row for _, row in read_rows(run.rows("paper"))]
+    assert rows[0] == {
+        "task": "SayGoodDay",
+        "prompt": 0,
+        "index": 0,
+        "passed": False,
+        "failure": {
+            "class": "TaskCompletionError",
+            "kind": "ExhaustiveSearch",
+            "world": 0,
+            "check": "visits_every_lab",
+        },
+        "verdicts": rows[0]["verdicts"],
+    }
+    assert rows[1]["failure"] == {
+        "class": "RobotExecutionError",
+        "kind": "GoToInvalidLocation",
+        "world": 0,
+        "check": None,
+    }
+    assert rows[1]["verdicts"][0] == {
+        "world": "sam and amy are both in",
+        "satisfied": False,
+        "status": "robot-error",
+        "error": {"kind": "GoToInvalidLocation", "message": 'there is no room "nowhere"'},
+        "line": 1,
+        "failed_checks": [],
+        "trace": [["goto", "nowhere"]],
+    }
+
+
+def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path: Path) -> None:
+    programs = [
+        ADDRESS,
+        *[f"{GREETS}\n# {n}\n" + "x = [0] * " + str(n * 1000) for n in range(20)],
+        ADDRESS + "#",
+    ]
+    results = []
+    for workers in (1, 4):
+        run = a_run(tmp_path / f"run{workers}", programs)
+        script = (
+            "import sys, pathlib\n"
+            "from roboeval.run import Run, evaluate_run\n"
+            "from roboeval.suite import load_suite\n"
+            f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+            "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, "
+            f"workers={workers}): pass\n"
+        )
+        subprocess.run([sys.executable, "-c", script], check=True)
+        results.append(run.rows("paper").read_bytes())
+    assert results[0] == results[1]
+    said = [event[1] for event in json.loads(results[0].splitlines()[0])["verdicts"][0]["trace"]]
+    assert said[0].startswith("<object object at 0x")
+
+
+def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: Suite) -> None:
+    whole = careful_run(tmp_path / "whole", paper)
+    judged(whole, paper)
+    run = careful_run(tmp_path / "killed", paper)
+    script = (
+        "import pathlib\n"
+        "from roboeval.run import Run, evaluate_run\n"
+        "from roboeval.suite import load_suite\n"
+        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        "print('on', flush=True)\n"
+        "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=2): pass\n"
+    )
+    chance = random.Random(7)
+    kills = 0
+    for _ in range(10):
+        process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(chance.uniform(0.1, 1.2))
+        process.send_signal(signal.SIGKILL)
+        kills += process.wait() == -signal.SIGKILL
+        process.stdout.close()
+    assert kills >= 3
+    rows = judged(run, paper)
+    assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
+    assert len(rows) == sum(1 for _ in read_completions(run.completions))
+
+
+@pytest.mark.parametrize("cut", [1, 10, 200])
+def test_a_torn_last_row_is_judged_again(tmp_path: Path, paper: Suite, cut: int) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    whole = run.rows("paper").read_bytes()
+    run.rows("paper").write_bytes(whole[:-cut])
+    judged(run, paper)
+    assert run.rows("paper").read_bytes() == whole
+
+
+def test_a_finished_evaluation_runs_nothing_again(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    judged(run, paper)
+    before = run.rows("paper").stat().st_mtime_ns
+    assert len(judged(run, paper)) == 1
+    assert run.rows("paper").stat().st_mtime_ns == before
+
+
+def test_completions_that_come_later_are_judged_later(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    judged(run, paper)
+    with run.completions.open("ab") as file:
+        file.write(to_line({"task": "SayGoodDay", "prompt": 1, "index": 0, "program": GREETS}))
+    assert [row["prompt"] for row in judged(run, paper)] == [0, 1]
+
+
+def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    script = (
+        "import pathlib, sys, time\n"
+        "from roboeval.run import Run\n"
+        f"with Run(pathlib.Path({str(run.path)!r})).writing():\n"
+        "    print('on', flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        with pytest.raises(BadInput, match="another process is writing this run"):
+            judged(run, paper)
+        process.kill()
+    assert len(judged(run, paper)) == 1
+
+
+def test_another_suite_is_refused_unless_all_is_redone(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    judged(run, paper)
+    about = json.loads(run.head("paper").read_text())
+    run.head("paper").write_text(json.dumps(about | {"digest": "0" * 64}))
+    with pytest.raises(BadInput, match=r"another content of the suite .* --redo starts over"):
+        judged(run, paper)
+    assert len(judged(run, paper, redo=True)) == 1
+    assert json.loads(run.head("paper").read_text()) == about
+
+
+def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
+    judged(run, paper)
+    rows = run.completions.read_bytes().splitlines(keepends=True)
+    run.completions.write_bytes(rows[1] + rows[0])
+    with pytest.raises(BadInput, match="judges SayGoodDay/0/0 where the completions have SayGoodDay/0/1"):
+        judged(run, paper)
+
+
+def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    before = run.completions.read_bytes()
+    with pytest.raises(BadInput, match="this run holds other completions"):
+        careful_run(run.path, paper)
+    assert run.completions.read_bytes() == before
+
+
+def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    assert open_source(str(run.path), paper).run == run
+    assert open_source(str(run.completions), paper).run is None
+    folder = tmp_path / "published"
+    folder.mkdir()
+    (folder / "SayGoodDay_0_3.py").write_text(f"name = 'x'\nprompt = 'p'\ncompletion = {GREETS!r}\n")
+    assert [c.key for c in open_source(str(folder), paper).read()] == [("SayGoodDay", 0, 3)]
+    assert len(list(open_source("recorded:hasty", paper).read())) >= 160
+    with pytest.raises(BadInput, match="no such file or folder"):
+        open_source(str(tmp_path / "nothing"), paper)
+
+
+def test_only_tasks_with_an_ablation_are_ablated(paper: Suite) -> None:
+    kept, left = tasks_to_judge(paper, "LunchTime,SayGoodDay", ablated=True)
+    assert kept == {"LunchTime"}
+    assert left == ("SayGoodDay",)
+    with pytest.raises(BadInput, match="none of SayGoodDay has an ablation"):
+        tasks_to_judge(paper, "SayGoodDay", ablated=True)
+    with pytest.raises(BadInput, match='has no task "Nonsense"'):
+        tasks_to_judge(paper, "Nonsense", ablated=False)
+
+
+@pytest.mark.skipif(os.geteuid() == 0 and not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
+    script = (
+        "import pathlib, resource, signal\n"
+        "from roboeval.run import Run, evaluate_run\n"
+        "from roboeval.suite import load_suite\n"
+        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "rows = evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=1)\n"
+        "next(rows)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
+        "list(rows)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert ended.returncode != 0
+    assert run.rows("paper").read_bytes().endswith(b"\n")
+    assert len(judged(run, paper)) == 2
+
+
+def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite) -> None:
+    row = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": GREETS, "usage": {"output": 7}}
+    path = tmp_path / "rows.jsonl"
+    path.write_bytes(to_line(row))
+    run = Run(tmp_path / "run")
+    run.keep(open_source(str(path), paper), paper)
+    assert [c.model_dump(exclude_unset=True) for c in read_completions(run.completions)] == [row]
+    assert Completion.model_validate(row).key == ("SayGoodDay", 0, 0)
