@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from roboeval.records import Completion
     from roboeval.suite import Suite
 
@@ -48,7 +50,7 @@ def evaluate(
     ] = False,
     json: JsonOption = False,
 ) -> None:
-    """Say of every completion, in every world of its task, whether it does what was asked."""
+    """Say of every completion whether it does what was asked."""
     from roboeval.evaluate import evaluate as judge_all
     from roboeval.run import Run, evaluate_run, open_source, tasks_to_judge
 
@@ -99,16 +101,19 @@ def show(
     ablation: AblationOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Print a run's tables, or show why a completion passes or fails."""
-    from roboeval.show import parse_selection
+    """Print a run's tables, or show why a completion fails."""
+    from roboeval.show import view, view_data
+    from roboeval.tables import parse_selection
 
     judged_by = load(suite)
+    selection = parse_selection(what, judged_by)
     rows, completions = read_evaluation(run, judged_by, ablated=ablation)
-    if what is None:
+    if selection.task is None:
         print_summary(rows, judged_by, title=str(run), ablated=ablation, as_json=json)
-        return
-    parse_selection(what, judged_by)
-    raise NotImplementedError
+    elif json:
+        print_json(view_data(selection, rows, completions, judged_by, ablated=ablation))
+    else:
+        print_rich(view(selection, rows, completions, judged_by, ablated=ablation))
 
 
 @app.command()
@@ -117,23 +122,47 @@ def tasks(
     suite: SuiteOption = "paper",
     lint: Annotated[bool, typer.Option("--lint", help="Look for faults in the tasks.")] = False,
     new: Annotated[
-        str | None, typer.Option(help="Start a new task of this name in the suite's folder.")
+        str | None, typer.Option(help="Start a task of this name in the folder of --suite.")
     ] = None,
+    json: JsonOption = False,
 ) -> None:
-    """List a suite's tasks, show one, look for faults, or start a new one."""
-    raise NotImplementedError
+    """List a suite's tasks, show one, lint them, start a new one."""
+    from roboeval.catalogue import new_task, suite_data, suite_view, task_view
+
+    if new is not None:
+        if suite == "paper":
+            fail("name the folder of your own suite with --suite; the suite of the paper stays as it is")
+        note(f"fill in {new_task(Path(suite), new)}; `roboeval tasks {new} --suite {suite}` shows it")
+        return
+    known = load(suite)
+    if lint:
+        lint_tasks(known, task)
+    elif task is not None:
+        print_rich(task_view(known.task(task)))
+    elif json:
+        print_json(suite_data(known))
+    else:
+        print_rich(suite_view(known))
 
 
 @app.command()
 def export(
     run: Annotated[Path, typer.Argument(help="A run.")],
     format: Annotated[str, typer.Option(help="csv or parquet.")] = "csv",  # noqa: A002 - the option's name
-    out: Annotated[Path | None, typer.Option(help="The file; by default beside the run's rows.")] = None,
+    out: Annotated[Path | None, typer.Option(help="The file; by default beside the verdicts.")] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
 ) -> None:
-    """Write a run's verdicts as one flat table, a row for each completion and world."""
-    raise NotImplementedError
+    """Write a run's verdicts as one flat table."""
+    from roboeval.export import table, write
+    from roboeval.run import Run, evaluation_key
+
+    judged_by = load(suite)
+    rows, completions = read_evaluation(run, judged_by, ablated=ablation)
+    key = evaluation_key(judged_by, ablated=ablation)
+    path = out or Run(run).rows(key).with_suffix(f".{format}")
+    write(table(rows, completions), path, format)
+    note(f"the table is in {path}")
 
 
 @app.command("import")
@@ -142,7 +171,7 @@ def import_(
     out: Annotated[Path, typer.Option(help="The run to make.")],
     suite: SuiteOption = "paper",
 ) -> None:
-    """Make a run of completions that were published or written by another tool."""
+    """Make a run of completions from elsewhere."""
     from roboeval.run import Run, open_source
 
     known = load(suite)
@@ -183,7 +212,37 @@ def print_summary(
     rows: Iterable[dict[str, Any]], suite: Suite, *, title: str, ablated: bool, as_json: bool
 ) -> None:
     """Print the tables of an evaluation."""
-    raise NotImplementedError
+    from roboeval.tables import render, summary, summary_data
+
+    counted = summary(rows, suite)
+    if as_json:
+        print_json(summary_data(counted))
+    else:
+        print_rich(render(counted, title=title, ablated=ablated))
+
+
+def lint_tasks(suite: Suite, task: str | None) -> None:
+    """Print what the linter finds in all tasks or one."""
+
+
+def print_rich(what: RenderableType) -> None:
+    """Draw on the terminal, or plainly into a pipe."""
+    from rich.console import Console
+
+    console = Console()
+    if console.is_terminal:
+        console.print(what)
+        return
+    with console.capture() as drawn:
+        console.print(what)
+    print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
+
+
+def print_json(data: object) -> None:
+    """Print for machines."""
+    import json
+
+    print(json.dumps(data, indent=2))
 
 
 def watched(rows: Iterable[dict[str, Any]], total: int) -> Iterator[dict[str, Any]]:

@@ -46,12 +46,15 @@ __all__ = [
     "task_data",
     "task_view",
     "view",
+    "view_data",
 ]
 
 CHANGED = "the suite has changed since this was judged"
 
+DID = {"say": "said", "pick": "picked up", "place": "put down"}
+
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
-MOST_LINES, MOST_OPTIONS = 1_000, 20
+MOST_LINES, MOST_OPTIONS, EXPLANATION = 1_000, 20, 2_000
 
 
 # --- what there is to show, as plain data
@@ -180,30 +183,52 @@ def _explained(check: str, scenario: Scenario | None, trace: Trace) -> dict[str,
     return {"explanation": why.sentence, "step": None if why.event is None else why.event + 1}
 
 
+def view_data(
+    part: Selection,
+    rows: Iterable[Row],
+    completions: Iterable[Completion],
+    suite: Suite,
+    *,
+    ablated: bool = False,
+) -> dict[str, Any]:
+    """A task, a prompt or a completion as plain data.
+
+    Raises:
+        BadInput: it has no row.
+    """
+    if part.index is not None:
+        return completion_data(*_one(part, rows, completions), suite, ablated=ablated)
+    assert part.task is not None
+    if part.prompt is not None:
+        return prompt_data(rows, completions, suite, part.task, part.prompt, ablated=ablated)
+    return task_data(rows, completions, suite, part.task)
+
+
+def _one(
+    part: Selection, rows: Iterable[Row], completions: Iterable[Completion]
+) -> tuple[Row, Completion | None]:
+    row = part.rows(rows)[0]
+    return row, next((completion for completion in completions if completion.key == key_of(row)), None)
+
+
 # --- what people see of it
 
 
 def view(
-    selection: Selection,
+    part: Selection,
     rows: Iterable[Row],
     completions: Iterable[Completion],
     suite: Suite,
     *,
     ablated: bool = False,
 ) -> RenderableType:
-    """The view of a task, a prompt or a completion.
-
-    Raises:
-        BadInput: it has no row.
-    """
-    assert selection.task is not None
-    if selection.prompt is None:
-        return task_view(rows, completions, suite, selection.task)
-    if selection.index is None:
-        return prompt_view(rows, completions, suite, selection.task, selection.prompt, ablated=ablated)
-    row = selection.rows(rows)[0]
-    completion = next((c for c in completions if c.key == key_of(row)), None)
-    return completion_view(row, completion, suite, ablated=ablated)
+    """What `view_data` says, for a person."""
+    if part.index is not None:
+        return completion_view(*_one(part, rows, completions), suite, ablated=ablated)
+    assert part.task is not None
+    if part.prompt is not None:
+        return prompt_view(rows, completions, suite, part.task, part.prompt, ablated=ablated)
+    return task_view(rows, completions, suite, part.task)
 
 
 def prompt_view(
@@ -231,7 +256,9 @@ def _told(program: Mapping[str, Any]) -> Text:
     text = Text.assemble(often, kind_of(program["failure"]), f' in "{visible(program["world"])}"\n')
     if program["explanation"] is None:
         return text.append(_error_sentence(program))
-    return text.append(f"{visible(program['failure']['check'])}: {shortened(program['explanation'])}")
+    return text.append(
+        f"{visible(program['failure']['check'])}: {shortened(program['explanation'], EXPLANATION)}"
+    )
 
 
 def _error_sentence(verdict: Mapping[str, Any]) -> str:
@@ -287,7 +314,7 @@ def _world(world: Mapping[str, Any], name: str) -> list[RenderableType]:
     ]
     for check in world["failed_checks"]:
         text = Text.assemble(
-            ("failed ", "red"), visible(check["check"]), f": {shortened(check['explanation'])}"
+            ("failed ", "red"), visible(check["check"]), f": {shortened(check['explanation'], EXPLANATION)}"
         )
         parts.append(Padding(text, (0, 0, 0, 2)))
     return parts
@@ -351,14 +378,8 @@ def _step(step: Mapping[str, Any]) -> RenderableType:
         case "ask":
             answer = "no answer" if step["answer"] is None else shortened(step["answer"])
             told = f"asked {text} {_options(step['options'])} → {answer}"
-        case "say":
-            told = f"said {text}"
-        case "pick":
-            told = f"picked up {text}"
-        case "place":
-            told = f"put down {text}"
         case kind:
-            told = f"{visible(kind)} {text}"
+            told = f"{DID.get(kind) or visible(kind)} {text}"
     return Padding(Text(told), (0, 0, 0, 4))
 
 

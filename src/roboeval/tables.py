@@ -22,7 +22,6 @@ from roboeval.taxonomy import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, 
 Row: TypeAlias = Mapping[str, Any]
 
 NOT_RECORDED = "instruction not recorded"
-MOST_CHARACTERS = 500
 ALWAYS_SHOWN: Mapping[str, Sequence[str]] = {PYTHON: PYTHON_KINDS, ROBOT: ROBOT_KINDS, TASK: CATEGORIES}
 
 
@@ -375,10 +374,10 @@ def visible(text: str) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
-def shortened(text: str) -> str:
+def shortened(text: str, most: int = 500) -> str:
     """A text made visible, without what is too much to read."""
-    left = len(text) - MOST_CHARACTERS
-    return visible(text) if left <= 0 else f"{visible(text[:MOST_CHARACTERS])}... {left:,} more characters"
+    left = len(text) - most
+    return visible(text) if left <= 0 else f"{visible(text[:most])}... {left:,} more characters"
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:

@@ -56,8 +56,8 @@ def test_error_names_the_file_and_the_line_where_there_are_any() -> None:
         (
             "inner:\n\tname: a\n",
             (
-                "w.yaml, line 2: this is no valid YAML: while scanning for the next token, found character that "
-                "cannot start any token; put quotes around a text, and indent with spaces"
+                "w.yaml, line 2: this is no valid YAML: while scanning for the next token, found character "
+                "that cannot start any token; put quotes around a text, and indent with spaces"
             ),
         ),
         (

@@ -264,10 +264,10 @@ def test_layout_gives_every_room_a_place_of_its_own_and_keeps_those_that_are_giv
 
 
 def test_layout_is_a_hallway_with_rooms_on_both_sides_and_keeps_standing_points() -> None:
-    world = World((Room("a"), Room("b", stand_at=(9, 9)), Room("c")), "a", may_wait_forever=True)
+    world = World((Room("a"), Room("b", stand_at=(9.0, 9.0)), Room("c")), "a", may_wait_forever=True)
     a, b, c = laid_out(world).rooms
     assert (extent(a)[:2], extent(c)[0]) == (extent(b)[:2], extent(a)[1])
     assert extent(b)[2] - extent(a)[3] == HALLWAY
-    assert b.stand_at == (9, 9)
+    assert b.stand_at == (9.0, 9.0)
     assert laid_out(world).may_wait_forever
     assert laid_out(laid_out(world)) == laid_out(world)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import logging
-import math
 import os
 import signal
 import socket
@@ -31,6 +30,7 @@ from codebotler.world import Room, World
 MEMORY = 512 * 1024 * 1024
 CPU_SECONDS = 5
 MAX_SOURCE = 5_000_000
+OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 HEADER = sandbox.HEADER
 REHEARSAL = World((Room("room"),), "room")
 
@@ -413,12 +413,13 @@ class Conversation:
                     [s.name, [[p.name, p.type.__name__] for p in s.parameters]] for s in robot.skills.values()
                 ],
                 "ticks": self.limits.ticks,
+                "seconds": self.limits.seconds,
                 "clock": robot.rules.clock_starts.timestamp(),
                 "memory": MEMORY,
                 "cpu": CPU_SECONDS,
             }
         )
-        if child.receive() != ["ready", []]:
+        if child.receive() != "ready":
             child.end()
             raise LostChildError("a child ended before it was closed")
 
@@ -439,40 +440,37 @@ class Conversation:
         return self._died(status) if final is None else self._ended(final)
 
     def _talk(self) -> dict[str, object] | None:
+        overrun = 0
         while (message := self.child.receive()) is not None:
             if isinstance(message, dict):
                 return message
             match message:
-                case [str() as name, list() as values]:
-                    kind, value = self._answer(name, values)
-                    self.child.send([self.robot.now, kind, value])
+                case [str() as name, list() as values, int() | float() as now]:
+                    self.child.send(self._answer(name, values, now))
                 case _:
                     raise ProtocolError("a request is malformed")
+            overrun += self.ledger.limit is not None
+            if overrun > OVERRUN:
+                return None
         return None
 
-    def _answer(self, name: str, values: list[object]) -> tuple[str, object]:
+    def _answer(self, name: str, values: list[object], now: float) -> tuple[str, object]:
         if self.ledger.limit is None:
-            if name == "sleep":
-                return self._sleep(values)
-            if name == "too-long":
-                self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
-            elif name in self.robot.skills:
+            self._let_time_pass(now)
+        if self.ledger.limit is None:
+            if name in self.robot.skills:
                 return self._perform(self.robot.skills[name], values)
-            else:
+            if name != "too-long":
                 raise ProtocolError("there is no such skill")
+            self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
         return ("stop", None)
 
-    def _sleep(self, values: list[object]) -> tuple[str, object]:
-        match values:
-            case [float(seconds)] if 0 <= seconds < math.inf:
-                self.robot.now += seconds
-            case _:
-                raise ProtocolError("a time to sleep is no number")
-        if self.robot.now > self.limits.seconds:
-            self.robot.now = self.limits.seconds
+    def _let_time_pass(self, now: float) -> None:
+        if now > self.limits.seconds:
+            now = self.limits.seconds
             self.ledger.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
-            return ("stop", None)
-        return ("ok", None)
+        if now >= self.robot.now:  # else the program has found the channel, and deceives itself
+            self.robot.now = float(now)
 
     def _perform(self, skill: Skill, values: list[object]) -> tuple[str, object]:
         arguments = _arguments(skill, values)

@@ -80,7 +80,7 @@ def prepared(source: str, *, lowercase: bool) -> types.CodeType:
         lower_literals(nodes)
     for node in nodes:
         add_ticks(node)
-    return compile(tree, PROGRAM, "exec")
+    return compile(tree, PROGRAM, "exec", dont_inherit=True)
 
 
 def lower_literals(nodes: list[ast.AST]) -> None:
@@ -224,19 +224,21 @@ class Run:
         return options[result] if options and isinstance(result, int) else result
 
     def sleep(self, seconds: object, /) -> None:
-        """Let simulated time pass."""
+        """Let simulated time pass; the engine hears of it with the next request, or when the time is up."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{type(seconds).__name__!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
             raise ValueError("sleep length must be non-negative and finite")
-        self.request(["sleep", [float(seconds)]])
+        self.now += seconds
+        if self.now > self.job["seconds"]:
+            self.request(["sleep", []])
 
     def request(self, message: list[object]) -> Any:  # noqa: ANN401 - what a skill returns
-        """Send one request and wait for its reply."""
+        """Send one request with the time at which it is made, and wait for its reply."""
         if self.spent:
             raise BudgetSpentError
-        send(message)
-        self.now, kind, value = receive()
+        send([*message, self.now])
+        kind, value = receive()
         if kind == "ok":
             return value
         if kind == "error":
@@ -260,6 +262,8 @@ def last_line(error: BaseException) -> int | None:
 
 def message_of(error: BaseException) -> str:
     """What an exception says; its class may be the program's own."""
+    if isinstance(error, SyntaxError) and error.filename == PROGRAM and isinstance(error.msg, str):
+        return error.msg  # without the place, which is said beside it
     try:
         return str.__str__(str(error))
     except BaseException:  # noqa: BLE001 - the program's own __str__ may raise anything
@@ -273,7 +277,7 @@ def send(message: object) -> None:
     """Write one frame: four bytes of length, then JSON."""
     data = json.dumps(message).encode()
     if len(data) > MAX_FRAME:
-        data = b'["too-long", []]'
+        data = b'["too-long", [], 0.0]'
     view = memoryview(struct.pack(">I", len(data)) + data)
     while view:
         view = view[os.write(CHANNEL, view) :]
@@ -489,7 +493,7 @@ def child(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None) -> N
     os.closerange(CHANNEL + 1, 256)
     job = receive()
     enclose(job, seccomp)
-    send(["ready", []])
+    send("ready")
     run = Run(job)
     simulate_surroundings(run)
     send(run.execute())

@@ -1,0 +1,26 @@
+"""Judge a program in every world of a task, and say why it fails where it does."""
+
+from codebotler.rtl import explain
+from roboeval.evaluate import evaluate
+from roboeval.records import Completion, trace_from
+from roboeval.suite import load_suite
+
+PROGRAM = """
+def task_program():
+    for room in get_all_rooms():
+        if "lab" in room:
+            go_to(room)
+            say("Good day!")
+"""
+
+suite = load_suite("paper")
+completion = Completion(task="SayGoodDay", prompt=0, index=0, program=PROGRAM)
+(row,) = evaluate([completion], suite)
+
+print("passed" if row["passed"] else f"failed: {row['failure']['kind']}")
+for scenario, verdict in zip(suite.tasks["SayGoodDay"].scenarios, row["verdicts"], strict=True):
+    print(f"- {verdict['world']}: {'satisfied' if verdict['satisfied'] else 'not satisfied'}")
+    for requirement in scenario.require:
+        if requirement.text in verdict["failed_checks"]:
+            why = explain(requirement.formula, trace_from(verdict["trace"]))
+            print(f"    {requirement.text}: {why.sentence if why else ''}")

@@ -1,0 +1,15 @@
+"""RTL alone: a trace by hand, a formula, a verdict, a sentence."""
+
+from codebotler.rtl import explain, holds, parse
+from codebotler.trace import Event, Option
+
+lunch = parse("""tr.AfterFirst(goto("alice's office")).AfterFirst(ask("lunch", ".*")).Exists(say("lobby"))""")
+trace = (
+    Event("goto", "alice's office"),
+    Event("ask", "Would you like to have lunch?", (Option("yes"), Option("no")), answer="yes"),
+    Event("say", "See you in the kitchen!"),
+)
+
+print(holds(lunch, trace))
+why = explain(lunch, trace)
+print(why.sentence if why else "it holds")

@@ -1,0 +1,162 @@
+"""A suite's tasks for people to read, and the start of a new one."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.badinput import BadInput
+from codebotler.world import World
+from roboeval.run import write_whole
+from roboeval.suite import Scenario, Suite, Task
+
+
+def suite_view(suite: Suite) -> RenderableType:
+    """All tasks, one a row."""
+    table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
+    table.add_column("task", no_wrap=True)
+    table.add_column("worlds", justify="right")
+    table.add_column("prompts", justify="right")
+    table.add_column("what is asked")
+    for task in suite.tasks.values():
+        table.add_row(
+            Text(task.name, "bold"), str(len(task.scenarios)), str(len(task.prompts)), Text(task.summary)
+        )
+    return Group(Text(f"{suite.name}: {suite.about}"), Text(), table)
+
+
+def task_view(task: Task) -> RenderableType:
+    """One task: its phrasings, its checks, and what each world requires."""
+    parts: list[RenderableType] = [
+        Text.assemble((task.name, "bold"), f"  {task.summary}"),
+        Text(f"takes {', '.join(task.abilities)}", "dim"),
+    ]
+    parts += _section("Prompts", [Text(f"{n}  {prompt}") for n, prompt in enumerate(task.prompts)])
+    parts += _section("Facts", [_fact(fact.fact, commonsense=fact.commonsense) for fact in task.facts])
+    parts += _section("Checks", [_check(task, index) for index in range(len(task.checks))])
+    for number, scenario in enumerate(task.scenarios, 1):
+        parts += _section(f"World {number}: {scenario.world.about}", _world_lines(scenario))
+    return Group(*parts)
+
+
+def _section(title: str, lines: list[Text]) -> list[RenderableType]:
+    return [Text(), Text(title, "bold"), *(Padding(line, (0, 0, 0, 2)) for line in lines)]
+
+
+def _fact(fact: str, *, commonsense: bool) -> Text:
+    return Text(f"{fact}{' (common sense: no prompt says it)' if commonsense else ''}")
+
+
+def _check(task: Task, index: int) -> Text:
+    check = task.checks[index]
+    head = check.name + (f"({', '.join(check.parameters)})" if check.parameters else "")
+    return Text.assemble((head, "bold"), f"  {check.category}\n  ", (" ".join(check.rtl.split()), "dim"))
+
+
+def _world_lines(scenario: Scenario) -> list[Text]:
+    world = scenario.world
+    lines = [_room(world, index) for index in range(len(world.rooms))]
+    if world.may_wait_forever:
+        lines.append(Text("a program may wait here for ever", "italic"))
+    return [*lines, *(Text(f"requires {requirement.text}") for requirement in scenario.require)]
+
+
+def _room(world: World, index: int) -> Text:
+    room = world.rooms[index]
+    who = [f"{p.name} (answers {', then '.join(p.answers) or 'nothing'})" for p in room.people]
+    there = [*room.objects, *who, *(["the robot"] if room.name == world.robot else [])]
+    return Text(f"{room.name}: {', '.join(there) or 'nobody and nothing'}")
+
+
+def suite_data(suite: Suite) -> dict[str, Any]:
+    """A suite for machines."""
+    return {
+        "suite": suite.name,
+        "version": suite.version,
+        "digest": suite.digest,
+        "tasks": [
+            {
+                "task": task.name,
+                "summary": task.summary,
+                "abilities": list(task.abilities),
+                "prompts": list(task.prompts),
+                "worlds": [scenario.world.about for scenario in task.scenarios],
+                "ablation": task.ablation is not None,
+            }
+            for task in suite.tasks.values()
+        ],
+    }
+
+
+def new_task(folder: Path, name: str) -> Path:
+    """Start a task in a suite's folder, and the suite if there is none; the file says what to fill in.
+
+    Args:
+        folder: of the suite.
+        name: of the task.
+
+    Raises:
+        BadInput: the name cannot be one, the task is there already, or the folder cannot be written.
+    """
+    if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
+        raise BadInput(f'"{name}" is no name for a task; write words together, such as WaterPlants')
+    path = folder / "tasks" / f"{name}.yaml"
+    if path.exists():
+        raise BadInput("is there already", file=path)
+    try:
+        if not (folder / "suite.yaml").exists():
+            suite = re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower()).lstrip("-0123456789") or "mine"
+            write_whole(folder / "suite.yaml", f"name: {suite}\nversion: 1\nabout: my tasks\n".encode())
+        write_whole(path, TEMPLATE.replace("NAME", name).encode())
+    except OSError as error:
+        raise BadInput(f"cannot be written ({error.strerror})", file=error.filename) from None
+    return path
+
+
+TEMPLATE = """\
+name: NAME
+summary: Tell whoever is in the kitchen that tea is ready.
+abilities: [navigation, perception, announcement]
+
+prompts:                  # the same instruction in several phrasings
+  - >-
+    Go to the kitchen. If somebody is there, say "tea is ready".
+
+facts:                    # what the requirements rest on; every prompt says each in one of these words
+  - fact: the kitchen is where to go
+    words: [kitchen]
+  - fact: what is said is that tea is ready
+    words: [tea is ready]
+
+checks:                   # RTL; {parameters} are filled in where a world requires the check
+  visits(room):
+    category: Location
+    rtl: >-
+      tr.Exists(goto("{room}"))
+  announces_tea:
+    category: SayAtLocation
+    rtl: >-
+      tr.ActAtFirst("kitchen", say(words("tea", "ready")))
+
+worlds:
+  - about: somebody is in the kitchen
+    robot: start_loc
+    rooms: [kitchen, start_loc]
+    people:
+      kitchen: [{name: kim, answers: ["yes"]}]
+    require:
+      - visits("kitchen")
+      - announces_tea
+  - about: nobody is in the kitchen
+    robot: start_loc
+    rooms: [kitchen, start_loc]
+    require:
+      - visits("kitchen")
+      - not announces_tea
+"""

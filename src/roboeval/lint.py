@@ -1,0 +1,403 @@
+"""Finds faults in tasks: requirements that can never decide anything, and checks that nothing uses or trips.
+
+That a requirement is `unsatisfiable` or `implied` is decided by `roboeval.satisfiability`: not by trying some
+traces but for all sequences of representative events, so that only a text unlike all samples could refute it.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from codebotler.badinput import YamlFile
+from codebotler.models.recorded import NAMES, read_replies, recorded_model
+from codebotler.rtl import Element, Formula, Regex, Text
+from codebotler.rtl.wording import listed
+from codebotler.simulator.engine import run
+from codebotler.simulator.robot import found_in, resolve_room
+from roboeval.evaluate import judge
+from roboeval.satisfiability import Reasoner, Undecided, elements
+from roboeval.suite import Requirement, Scenario, Suite, Task
+from roboeval.taxonomy import Verdict
+from roboeval.witnesses import can_match, patterns, representative_texts, samples
+
+Kind = Literal[
+    "unsatisfiable",
+    "implied",
+    "undecided",
+    "unused",
+    "untripped",
+    "dead-regex",
+    "absent",
+    "same-worlds",
+    "stale-acceptance",
+]
+
+Verdicts: TypeAlias = Sequence[Verdict]
+"""How one program did in all worlds of a task, or of its ablation."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a task that is likely to be a mistake.
+
+    Args:
+        kind: what sort of mistake.
+        subject: what has it, in words that stay the same while the mistake does.
+        message: one sentence.
+        path: the task file.
+        line: where in it, counted from 1.
+        accepted: why it is there on purpose, as the task file says; None where it is open.
+    """
+
+    kind: Kind
+    subject: str
+    message: str
+    path: Path
+    line: int | None
+    accepted: str | None = None
+
+    @property
+    def name(self) -> str:
+        """By which a task file accepts it, such as `implied: comes_back`."""
+        return f"{self.kind}: {self.subject}"
+
+
+def lint_suite(suite: Suite, *, workers: int = 1) -> list[Finding]:
+    """Look for mistakes in all tasks of a suite.
+
+    Args:
+        suite: tasks and rules.
+        workers: how many recorded programs are run at the same time.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+        EngineError: no isolated process can be started.
+    """
+    verdicts = judged(suite.tasks.values(), suite, workers=workers)
+    return [one for name, task in suite.tasks.items() for one in lint(task, suite, verdicts=verdicts[name])]
+
+
+def lint(task: Task, suite: Suite, *, verdicts: Sequence[Verdicts] | None = None) -> list[Finding]:
+    """Look for mistakes in a task.
+
+    Args:
+        task: the task.
+        suite: to which it belongs.
+        verdicts: on programs that are meant to be right or wrong; by default those that are recorded for the
+            task are run.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+        EngineError: no isolated process can be started.
+    """
+    if verdicts is None:
+        verdicts = judged([task], suite)[task.name]
+    rooms = [_Place(task, *numbered) for numbered in _scenarios(task)]
+    found = [
+        *_unused(task),
+        *_untripped(task, verdicts),
+        *_same_worlds(task),
+        *(finding for room in rooms for finding in room.findings()),
+    ]
+    distinct = {(finding.name, finding.line): finding for finding in reversed(found)}
+    ordered = sorted(distinct.values(), key=lambda finding: (finding.line or 0, finding.name))
+    reasons = {accepted.finding: accepted.because for accepted in task.accepted}
+    return [*(replace(one, accepted=reasons.get(one.name)) for one in ordered), *_stale(ordered, task)]
+
+
+def render(findings: Iterable[Finding]) -> str:
+    """Findings as lines for a reader, the accepted ones only counted.
+
+    Args:
+        findings: what was found.
+    """
+    every = [*findings]
+    lines = [
+        f"{_near(one.path)}:{one.line or 1}: warning: {one.message} [{one.kind}]"
+        for one in every
+        if one.accepted is None
+    ]
+    if accepted := len(every) - len(lines):
+        plural = "finding is" if accepted == 1 else "findings are"
+        lines.append(f"{accepted} more {plural} accepted by the task files")
+    return "\n".join(lines)
+
+
+def judged(tasks: Iterable[Task], suite: Suite, *, workers: int = 1) -> Mapping[str, list[Verdicts]]:
+    """Run the recorded programs of tasks in all their worlds, those of an ablation too.
+
+    Args:
+        tasks: of the suite.
+        suite: by whose rules worlds are simulated.
+        workers: how many programs are run at the same time.
+
+    Returns:
+        for each task, by name, one entry a program and one more a program where the task has an ablation.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+        EngineError: no isolated process can be started.
+    """
+    judges = [
+        (task, scenarios) for task in tasks for scenarios in (task.scenarios, task.ablation) if scenarios
+    ]
+    runs = [
+        (task.name, program, scenarios) for task, scenarios in judges for program in recorded_programs(task)
+    ]
+    pairs = ((program, scenario.world) for _, program, scenarios in runs for scenario in scenarios)
+    outcomes = run(pairs, workers=workers, rules=suite.rules)
+    verdicts: dict[str, list[Verdicts]] = {task.name: [] for task in suite.tasks.values()}
+    for name, _, scenarios in runs:
+        verdicts[name].append([judge(next(outcomes), scenario) for scenario in scenarios])
+    return verdicts
+
+
+def recorded_programs(task: Task) -> list[str]:
+    """The programs that somebody wrote for the task's prompts, right and wrong ones.
+
+    They stand in `recorded/*/TASK.yaml` of the suite's folder; where it has no such folder, in the package.
+
+    Args:
+        task: the task.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+    """
+    folder = task.path.parents[1] / "recorded"
+    if folder.is_dir():
+        written = [read_replies(path) for path in sorted(folder.glob(f"*/{task.path.name}"))]
+    else:
+        written = [recorded_model(name).replies for name in NAMES]
+    replies = (reply for one in written for prompt in task.prompts for reply in one.get(prompt, ()))
+    return [*dict.fromkeys(reply.program for reply in replies)]
+
+
+# --- the task as a whole
+
+
+def _scenarios(task: Task) -> Iterator[tuple[str, Scenario]]:
+    for number, scenario in enumerate(task.scenarios, 1):
+        yield f"world {number}", scenario
+    for number, scenario in enumerate(task.ablation or (), 1):
+        yield f"the ablation of world {number}", scenario
+
+
+def _unused(task: Task) -> Iterator[Finding]:
+    used = {requirement.check for _, scenario in _scenarios(task) for requirement in scenario.require}
+    for check in task.checks:
+        if check.name not in used:
+            message = f'no world requires the check "{check.name}"; require it or remove it'
+            yield Finding("unused", check.name, message, task.path, check.line)
+
+
+def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
+    wrong = [one for one in verdicts if not all(verdict.satisfied for verdict in one)]
+    lines = {check.name: check.line for check in task.checks}
+    if not wrong:
+        message = f'no wrong program is at hand to show that the checks of "{task.name}" can fail'
+        yield Finding("untripped", task.name, message, task.path, 1)
+        return
+    tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
+    required = [r for _, scenario in _scenarios(task) for r in scenario.require]
+    for side, requirement in {_side(r): r for r in reversed(required)}.items():
+        if side not in tripped:
+            message = (
+                f'none of the {len(wrong)} wrong programs of the task trips "{side}"; record one that does'
+            )
+            yield Finding("untripped", side, message, task.path, lines[requirement.check])
+
+
+def _side(requirement: Requirement) -> str:
+    """The name of a check, with `not` where it is required not to hold."""
+    return f"not {requirement.check}" if requirement.text.strip().startswith("not ") else requirement.check
+
+
+def _same_worlds(task: Task) -> Iterator[Finding]:
+    for (one, first), (other, second) in combinations(enumerate(task.scenarios, 1), 2):
+        if {r.formula for r in first.require} == {r.formula for r in second.require}:
+            message = (
+                f'world {other} ("{second.world.about}") requires the same as '
+                f'world {one} ("{first.world.about}")'
+            )
+            yield Finding("same-worlds", f"{one} and {other}", message, task.path, second.require[0].line)
+
+
+# --- one world
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A world of a task, and what is said about its requirements."""
+
+    task: Task
+    where: str
+    scenario: Scenario
+
+    def findings(self) -> Iterator[Finding]:
+        for requirement in self.scenario.require:
+            yield from self.dead(requirement)
+            yield from self.absent(requirement)
+        yield from self.logic()
+
+    def finding(self, kind: Kind, subject: str, message: str, line: int | None) -> Finding:
+        return Finding(kind, subject, message, self.task.path, line)
+
+    # --- requirements together
+
+    def logic(self) -> Iterator[Finding]:
+        rest = [*self.scenario.require]
+        try:
+            while (clash := self.clash([r.formula for r in rest])) is not None:
+                involved = [r for r in rest if r.formula in clash[0]]
+                yield self.unsatisfiable(involved, clash[1])
+                rest = [r for r in rest if r not in involved]
+        except Undecided:
+            yield self.undecided(self.where, f"whether {self.where} can be satisfied", rest[0].line)
+        for requirement in rest:
+            yield from self.implied(requirement, [r for r in rest if r is not requirement])
+
+    def unsatisfiable(self, involved: Sequence[Requirement], condition: str) -> Finding:
+        subject = " and ".join(r.text for r in involved)
+        never = "can never hold" if len(involved) == 1 else "can never hold together"
+        return self.finding(
+            "unsatisfiable", subject, f'"{subject}" {never} in {self.where}{condition}', involved[-1].line
+        )
+
+    def implied(self, requirement: Requirement, others: Sequence[Requirement]) -> Iterator[Finding]:
+        subject, line = requirement.text, requirement.line
+        try:
+            clash = self.clash([r.formula for r in others], requirement.formula)
+        except Undecided:
+            yield self.undecided(subject, f'whether "{subject}" is implied in {self.where}', line)
+            return
+        if clash is not None:
+            reasons = listed([f'"{r.text}"' for r in others if r.formula in clash[0]])
+            holds = f"follows from {reasons}" if reasons else "holds whatever the robot does"
+            message = f'"{subject}" {holds} in {self.where}{clash[1]}, so it is never the only one to fail'
+            yield self.finding("implied", subject, message, line)
+
+    def undecided(self, subject: str, what: str, line: int | None) -> Finding:
+        return self.finding("undecided", subject, f"{what} would take too long to find out", line)
+
+    def clash(
+        self, formulas: Sequence[Formula], denied: Formula | None = None
+    ) -> tuple[tuple[Formula, ...], str] | None:
+        """Formulas that clash, or imply the denied one, and the condition on which they do."""
+        clash = self.plain_moves.clash(formulas, denied)
+        if clash is None:
+            return None
+        always = self.any_moves.clash(formulas, denied)
+        return (clash, _PLAIN) if always is None else (always, "")
+
+    @cached_property
+    def any_moves(self) -> Reasoner:
+        return Reasoner(r.formula for r in self.scenario.require)
+
+    @cached_property
+    def plain_moves(self) -> Reasoner:
+        return Reasoner((r.formula for r in self.scenario.require), self.requests)
+
+    @cached_property
+    def requests(self) -> list[str]:
+        """For each room a request that leads there and, as far as possible, is no more than its name."""
+        rooms = self.rooms
+        return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
+
+    # --- regexes
+
+    @cached_property
+    def rooms(self) -> list[str]:
+        return [room.name for room in self.scenario.world.rooms]
+
+    def dead(self, requirement: Requirement) -> Iterator[Finding]:
+        line = next(check.line for check in self.task.checks if check.name == requirement.check)
+        for element in dict.fromkeys(elements(requirement.formula)):
+            for text in _texts(element):
+                subject = f"{text} in {requirement.check}"
+                if not can_match(text):
+                    message = f'no text can match {text}, for which "{requirement.check}" looks'
+                    yield self.finding("dead-regex", subject, message, line)
+                elif element.kind == "goto" and not self.leads_somewhere(text):
+                    message = (
+                        f'no visit that matches {text} in "{requirement.check}" gets anywhere in {self.where}'
+                    )
+                    yield self.finding("dead-regex", subject, message, line)
+
+    def leads_somewhere(self, text: Text) -> bool:
+        if any(map(text.matches, self.requests)):
+            return True
+        others = representative_texts((text, *map(Regex, self.rooms)))
+        return any(text.matches(one) and resolve_room(self.rooms, one) for one in others)
+
+    def absent(self, requirement: Requirement) -> Iterator[Finding]:
+        for what, name, known in self.named(requirement):
+            if not _is_among(name, known):
+                message = f'"{requirement.text}" is about the {what} "{name}", but {self.where} has none'
+                yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
+
+    def named(self, requirement: Requirement) -> Iterator[tuple[str, str, Sequence[str]]]:
+        """What a requirement names, of what sort it is, and what of this sort the world has."""
+        rooms = self.scenario.world.rooms
+        objects = [label for room in rooms for label in room.objects]
+        people = [person.name for room in rooms for person in room.people]
+        sorts: dict[str, tuple[str, list[str]]] = {
+            "goto": ("room", self.rooms),
+            "pick": ("object", objects),
+            "place": ("object", objects),
+            "check": ("object or person", [*objects, *people, *_PEOPLE]),
+        }
+        for element in elements(requirement.formula):
+            if element.kind in sorts:
+                what, known = sorts[element.kind]
+                yield from ((what, pattern, known) for pattern in patterns(element.text))
+        check = next(check for check in self.task.checks if check.name == requirement.check)
+        for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
+            if parameter == "person":
+                yield "person", argument, people
+
+
+def _texts(element: Element) -> list[Text]:
+    return [element.text] if element.options is None else [element.text, element.options]
+
+
+_PLAIN = ", as long as each visit names one room of the world"
+_PEOPLE = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
+
+
+def _arguments(requirement: Requirement) -> list[str]:
+    call = ast.parse(requirement.text.strip().removeprefix("not "), mode="eval").body
+    values = call.args if isinstance(call, ast.Call) else []
+    return [str(value.value) for value in values if isinstance(value, ast.Constant)]
+
+
+def _is_among(pattern: str, labels: Iterable[str]) -> bool:
+    """Whether something may be meant by a regex; true also of one that means anything, or nothing."""
+    wanted = Regex(pattern)
+    texts = samples(pattern)
+    return (
+        not texts
+        or wanted.matches("")
+        or any(wanted.matches(label) or any(found_in(label, text) for text in texts) for label in labels)
+    )
+
+
+# --- accepted findings
+
+
+def _stale(findings: Sequence[Finding], task: Task) -> Iterator[Finding]:
+    names = {finding.name for finding in findings}
+    for index, accepted in enumerate(task.accepted):
+        if accepted.finding not in names:
+            line = YamlFile.read(task.path).line(("accepted", index))
+            message = f'"{accepted.finding}" is accepted but not found; remove the entry'
+            yield Finding("stale-acceptance", accepted.finding, message, task.path, line)
+
+
+def _near(path: Path) -> Path:
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -1,0 +1,324 @@
+"""Runs of many programs: in order, once, the same everywhere, and nothing is left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from itertools import count, islice
+from pathlib import Path
+
+import pytest
+
+from codebotler.simulator.engine import EngineError, run
+from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
+from codebotler.simulator.rules import Limits, Rules
+from codebotler.trace import Outcome, Status
+from codebotler.world import Room, World
+
+WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
+OTHER = World((Room("elsewhere"),), "elsewhere")
+AS_WRITTEN = Rules(literals="as-written")
+
+
+def saying(text: str) -> str:
+    return f"def task_program():\n    say({text!r})\n"
+
+
+def said(outcome: Outcome) -> list[str]:
+    assert outcome.status == Status.FINISHED, outcome
+    return [event.text for event in outcome.trace]
+
+
+def doing(say: Behaviour) -> dict[str, Behaviour]:
+    """Behaviours of which one is another."""
+    return {**BEHAVIOURS, "say": say}
+
+
+def children_of(pid: int) -> set[int]:
+    """All processes below one."""
+    below: dict[int, list[int]] = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            stat = (folder / "stat").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            continue
+        below.setdefault(int(stat.rpartition(")")[2].split()[1]), []).append(int(folder.name))
+    found, open_ = set(), [pid]
+    while open_:
+        for child in below.get(open_.pop(), ()):
+            found.add(child)
+            open_.append(child)
+    return found
+
+
+def are_gone(pids: set[int]) -> bool:
+    """Whether processes end within a few seconds; one that waits to be buried counts as ended."""
+
+    def lives(pid: int) -> bool:
+        try:
+            return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] != "Z"
+        except OSError:
+            return False
+
+    for _ in range(200):
+        if not any(map(lives, pids)):
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def held() -> tuple[set[str], set[int], set[str]]:
+    """What this process holds: file descriptors, children and threads."""
+    descriptors = {
+        f"{number} {os.readlink(f'/proc/self/fd/{number}')}"
+        for number in os.listdir("/proc/self/fd")
+        if Path(f"/proc/self/fd/{number}").is_symlink()
+    }
+    return descriptors, children_of(os.getpid()), {thread.name for thread in threading.enumerate()}
+
+
+@pytest.fixture
+def nothing_is_left() -> Iterator[None]:
+    """Compares what this process holds after the test with what it held before."""
+    before = held()
+    yield
+    assert held() == before
+
+
+# --- order
+
+
+def test_outcomes_come_in_the_order_of_the_pairs() -> None:
+    texts = [str(number) for number in range(40)]
+    slow = "def task_program():\n    for i in range(150_000): pass\n    say('{}')\n"
+    programs = [slow.format(text) if int(text) % 7 == 0 else saying(text) for text in texts]
+    outcomes = run(((program, WORLD) for program in programs), workers=3)
+    assert [said(outcome) for outcome in outcomes] == [[text] for text in texts]
+
+
+def test_equal_pairs_are_run_once_and_have_equal_outcomes() -> None:
+    ran: list[str] = []
+
+    def say(robot: SimulatedRobot, message: str) -> None:
+        robot.record("say", message)
+        ran.append(f"{robot.room} {message}")
+
+    same_world = World((Room("start_loc"), Room("lab")), "start_loc")
+    pairs = [(saying("a"), WORLD), (saying("b"), WORLD), (saying("a"), OTHER), (saying("a"), same_world)]
+    outcomes = list(run(pairs * 30, workers=2, behaviours=doing(say)))
+    assert [said(outcome) for outcome in outcomes] == [["a"], ["b"], ["a"], ["a"]] * 30
+    assert sorted(ran) == ["elsewhere a", "start_loc a", "start_loc b"]
+
+
+def test_no_pairs_give_no_outcomes() -> None:
+    assert list(run([], workers=1)) == []
+
+
+def test_pairs_are_read_only_a_little_ahead() -> None:
+    read = count()
+    outcomes = run(((saying(str(next(read))), WORLD) for _ in count()), workers=1)
+    assert [said(outcome) for outcome in islice(outcomes, 30)] == [[str(number)] for number in range(30)]
+    outcomes.close()  # type: ignore[attr-defined]  # it is a generator
+    assert next(read) < 50
+
+
+# --- the same everywhere
+
+UNSTEADY = """
+import random, datetime, uuid
+class A: pass
+def task_program():
+    say(str(object()) + str(A()) + repr(task_program))
+    say(str(id([])) + str(id("x")) + str(id(say)))
+    say(str(hash("x")) + str(hash(("a", 1.5))) + str(hash(A())))
+    say(str({"alpha", "beta", "gamma", "delta"}) + str(set("abcdef")))
+    say(str(random.random()) + str(random.choice("abcdef")) + str(random.Random().random()))
+    random.seed(7)
+    say(str(random.random()))
+    random.seed()
+    say(str(random.randint(1, 10**9)))
+    items = list(range(9))
+    random.shuffle(items)
+    say(str(items))
+    say(str(time.time()) + str(time.perf_counter()) + str(datetime.datetime.now()))
+    say("NUMBER")
+"""
+
+
+def test_outcome_depends_neither_on_workers_nor_on_the_start_nor_on_what_ran_before() -> None:
+    programs = [UNSTEADY.replace("NUMBER", str(number)) for number in range(12)]
+    pairs = [(program, WORLD) for program in programs]
+    first = list(run(pairs, workers=1, rules=AS_WRITTEN))
+    assert list(run(pairs, workers=4, rules=AS_WRITTEN)) == first
+    before = [(saying("x" * number), WORLD) for number in range(5)]
+    assert list(run([*before, *reversed(pairs)], workers=1, rules=AS_WRITTEN))[5:] == first[::-1]
+    assert len({tuple(said(outcome)[:-1]) for outcome in first}) == 1
+    assert len(said(first[0])) == 10
+
+
+# --- nothing is left
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_nothing_is_left_after_all_outcomes_were_read() -> None:
+    assert len(list(run(((saying(str(number)), WORLD) for number in range(20)), workers=2))) == 20
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
+    outcomes = run(((saying(str(number)), WORLD) for number in count()), workers=2)
+    next(outcomes)
+    assert children_of(os.getpid())
+    outcomes.close()  # type: ignore[attr-defined]  # it is a generator
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_nothing_is_left_and_nothing_waited_for_when_the_consumer_stops_during_long_runs() -> None:
+    endless = "def task_program():\n    sum(range(10**12))\n    say({})\n"
+    pairs = [(saying("a"), WORLD), *((endless.format(number), WORLD) for number in range(8))]
+    outcomes = run(pairs, workers=2)
+    next(outcomes)
+    start = time.monotonic()
+    outcomes.close()  # type: ignore[attr-defined]  # it is a generator
+    assert time.monotonic() - start < 3
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_nothing_is_left_after_the_pairs_failed() -> None:
+    def pairs() -> Iterator[tuple[str, World]]:
+        for number in range(20):
+            yield saying(str(number)), WORLD
+        raise LookupError("no more")
+
+    with pytest.raises(LookupError, match="no more"):
+        list(run(pairs(), workers=2))
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_nothing_is_left_after_a_behaviour_failed() -> None:
+    def say(robot: SimulatedRobot, message: str) -> None:
+        raise LookupError(message + robot.room)
+
+    with pytest.raises(LookupError, match="astart_loc"):
+        list(run([(saying("a"), WORLD), (saying("b"), WORLD)], workers=1, behaviours=doing(say)))
+
+
+def script_with_the_engine() -> tuple[subprocess.Popen[str], set[int]]:
+    """A script that runs programs without end, and the processes below it."""
+    code = (
+        "from itertools import count\n"
+        "from codebotler.simulator.engine import run\n"
+        "from codebotler.world import Room, World\n"
+        "world = World((Room('a'),), 'a')\n"
+        "long = 'def task_program():\\n    for i in range(190_000): str({})\\n'\n"
+        "for n, outcome in enumerate(run(((long.format(n), world) for n in count()), workers=2)):\n"
+        "    if n == 3: print('going', flush=True)\n"
+    )
+    script = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert script.stdout is not None
+    assert script.stdout.readline() == "going\n"
+    return script, children_of(script.pid)
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_script_that_is_stopped_leaves_no_process_behind(number: signal.Signals) -> None:
+    script, below = script_with_the_engine()
+    assert len(below) >= 2
+    script.send_signal(number)
+    script.communicate(timeout=10)
+    assert are_gone(below)
+
+
+# --- what the engine survives
+
+
+def zygotes() -> set[int]:
+    below = children_of(os.getpid())
+    return {pid for pid in below if b"sandbox.py" in Path(f"/proc/{pid}/cmdline").read_bytes()}
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_engine_survives_a_zygote_that_was_killed_between_runs() -> None:
+    outcomes = run(((saying(str(number)), WORLD) for number in range(60)), workers=1)
+    assert said(next(outcomes)) == ["0"]
+    for pid in zygotes():
+        os.kill(pid, signal.SIGKILL)
+    assert [said(outcome) for outcome in outcomes] == [[str(number)] for number in range(1, 60)]
+
+
+def killing(parent_of: Callable[[int], int]) -> Callable[[SimulatedRobot, str], None]:
+    """A way to speak that kills the zygote, or its child, in the middle of a run; as often as it says."""
+    left = parent_of(0)
+
+    def say(robot: SimulatedRobot, message: str) -> None:
+        nonlocal left
+        if left:
+            left -= 1
+            for pid in zygotes():
+                if children_of(pid):
+                    os.kill(pid, signal.SIGKILL)
+        robot.record("say", message)
+
+    return say
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_run_whose_zygote_is_killed_is_run_again() -> None:
+    program = "def task_program():\n    say('a')\n    say('b')\n"
+    outcomes = list(
+        run([(program, WORLD), (saying("c"), WORLD)], workers=1, behaviours=doing(killing(lambda _: 1)))
+    )
+    assert [said(outcome) for outcome in outcomes] == [["a", "b"], ["c"]]
+
+
+@pytest.mark.usefixtures("nothing_is_left")
+def test_zygote_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
+    with pytest.raises(EngineError, match="an isolated process was lost twice"):
+        list(run([(saying("a"), WORLD)], workers=1, behaviours=doing(killing(lambda _: 99))))
+
+
+def test_child_that_is_killed_from_outside_is_told_so() -> None:
+    def say(robot: SimulatedRobot, message: str) -> None:
+        robot.record("say", message)
+        for pid in zygotes():
+            for child in children_of(pid):
+                os.kill(child, signal.SIGKILL)
+
+    first, second = run(
+        [(saying("a"), WORLD), ("def task_program(): pass", WORLD)], workers=1, behaviours=doing(say)
+    )
+    assert (first.status, second.status) == (Status.KILLED, Status.FINISHED)
+    assert [event.text for event in first.trace] == ["a"]
+
+
+# --- the rest
+
+
+def test_suite_sets_the_limits() -> None:
+    limits = Limits(seconds=10, calls=3, ticks=50, text=5, trace=12)
+    bodies = {
+        "time.sleep(11)": "10 seconds of simulated time",
+        "for i in range(4): say('a')": "3 skill calls",
+        "for i in range(60): pass": "50 turns of loops",
+        "say('abcdef')": "a text of more than 5 characters",
+        "for i in range(3): say('abcde')": "texts of more than 12 characters in all",
+    }
+    pairs = ((f"def task_program():\n    {body}\n", WORLD) for body in bodies)
+    outcomes = run(pairs, workers=1, rules=Rules(limits=limits))
+    assert [outcome.error.message for outcome in outcomes if outcome.error] == list(bodies.values())
+
+
+def test_program_of_enormous_length_is_refused_without_being_read() -> None:
+    (outcome,) = run([("#" * 6_000_000, WORLD)], workers=1)
+    assert (outcome.status, outcome.trace) == (Status.PYTHON_ERROR, ())
+    assert outcome.error is not None
+    assert "longer than 5,000,000 characters" in outcome.error.message
+
+
+def test_isolation_can_be_required() -> None:
+    assert len(list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))) == 1

@@ -1,0 +1,383 @@
+import re
+from typing import TypeAlias
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from codebotler.simulator.robot import Result, RobotError, SimulatedRobot, choose, located
+from codebotler.simulator.rules import Rules
+from codebotler.skills import SKILLS
+from codebotler.trace import Event, Option
+from codebotler.world import Person, Room, World
+
+Texts: TypeAlias = tuple[str, ...]
+
+
+def options(*texts: str) -> tuple[Option, ...]:
+    return tuple(map(Option, texts))
+
+
+def robot_in(
+    *rooms: str, objects: Texts = (), answers: Texts | None = None, start: str | None = None
+) -> SimulatedRobot:
+    """A robot in the first of some rooms, where the objects and the one person are."""
+    people = () if answers is None else (Person(".*", answers),)
+    first, *others = rooms or ("lab",)
+    here = Room(first, objects=objects, people=people)
+    return SimulatedRobot(World((here, *map(Room, others)), start or first))
+
+
+def failure(robot: SimulatedRobot, skill: str, *arguments: str | tuple[Option, ...]) -> str:
+    """The kind of error that a skill ends in."""
+    with pytest.raises(RobotError) as caught:
+        robot.perform(skill, arguments)
+    assert str(caught.value)
+    return caught.value.kind
+
+
+def go(request: str, *rooms: str) -> str:
+    robot = robot_in("start", *rooms)
+    robot.perform("go_to", [request])
+    return robot.room
+
+
+def sees(request: str, *objects: str) -> Result:
+    return robot_in(objects=objects).perform("is_in_room", [request])
+
+
+# --- how a request finds a room, an object, a person (SEMANTICS.md, section 2)
+
+
+def test_request_may_be_longer_than_the_label_of_the_room() -> None:
+    assert go("the Main Conference Room", "conference room") == "conference room"
+
+
+def test_request_may_not_be_shorter_than_the_label_of_the_room() -> None:
+    robot = robot_in("start", "conference room")
+    assert failure(robot, "go_to", "conference") == "GoToInvalidLocation"
+
+
+def test_room_12_is_found_as_room_1_where_that_comes_first() -> None:
+    rooms = [f"conference room {number}" for number in range(1, 13)]
+    assert go("conference room 12", *rooms) == "conference room 1"
+
+
+def test_of_two_rooms_in_one_request_the_first_of_the_world_is_meant() -> None:
+    assert go("alice's and bob's office", "bob's office", "alice's office") == "bob's office"
+
+
+def test_room_named_later_in_the_world_is_found_where_the_earlier_one_does_not_match() -> None:
+    assert go("alice's office", "bob's office", "alice's office") == "alice's office"
+
+
+def test_labels_are_looked_for_without_case_and_across_lines() -> None:
+    assert go("MAIN OFFICE", "Main Office") == "Main Office"
+    assert go("room\n5", "room.5") == "room.5"
+
+
+@pytest.mark.parametrize(
+    ("request_", "label", "found"),
+    [
+        ("red staplers", "stapler", True),
+        ("STAPLER", "stapler", True),
+        ("stapler", "Stapler", True),
+        ("bag", "backpack", False),
+        ("backpack", "bag", False),
+        ("", "mug", False),
+        ("cup", "mug|cup", True),
+        ("mugs", "^mug$", False),
+    ],
+)
+def test_object_is_found_where_its_label_stands_in_the_request(
+    request_: str, label: str, found: object
+) -> None:
+    assert sees(request_, label) is found
+
+
+@given(st.text())
+def test_in_an_occupied_room_anything_is_there(request: str) -> None:
+    assert robot_in(answers=("yes",)).perform("is_in_room", [request]) is True
+
+
+@given(st.text())
+def test_in_an_empty_room_nothing_is_there(request: str) -> None:
+    assert robot_in().perform("is_in_room", [request]) is False
+
+
+def test_only_the_room_where_the_robot_is_counts() -> None:
+    robot = robot_in("lab", "hall", objects=("mug",), answers=("yes",), start="hall")
+    assert robot.perform("is_in_room", ["mug"]) is False
+    assert failure(robot, "pick", "mug") == "PickInvalidObject"
+    assert failure(robot, "ask", "", "Tea?", options("yes")) == "AskNoPerson"
+
+
+def test_first_matching_object_of_the_room_is_taken() -> None:
+    robot = robot_in(objects=("water", "cold water", "tea"))
+    robot.perform("pick", ["a bottle of cold water"])
+    assert [thing.label for thing in robot.things["lab"]] == ["cold water", "tea"]
+
+
+def test_placed_object_is_found_by_its_request_as_literal_text() -> None:
+    robot = robot_in(objects=("stapler",))
+    robot.perform("pick", ["stapler ("])
+    robot.perform("place", ["stapler ("])
+    assert robot.perform("is_in_room", ["stapler"]) is False
+    assert robot.perform("is_in_room", ["the STAPLER ( there"]) is True
+    robot.perform("pick", ["stapler ("])
+
+
+def test_placed_object_with_special_characters_is_no_pattern() -> None:
+    robot = robot_in(objects=("mug",))
+    robot.perform("pick", ["mug.*"])
+    robot.perform("place", ["mug.*"])
+    assert robot.perform("is_in_room", ["mug and tea"]) is False
+
+
+# --- what the skills do (section 3)
+
+
+def test_location_is_the_label_and_leaves_no_event() -> None:
+    robot = robot_in("start", "lab")
+    robot.perform("go_to", ["The LAB"])
+    assert robot.perform("get_current_location", []) == "lab"
+    assert robot.trace == (Event("goto", "The LAB"),)
+
+
+def test_rooms_come_in_the_order_of_the_world_with_the_start_and_leave_no_event() -> None:
+    robot = robot_in("start_loc", "b", "a")
+    assert robot.perform("get_all_rooms", []) == ["start_loc", "b", "a"]
+    assert robot.trace == ()
+
+
+def test_list_of_rooms_is_a_copy() -> None:
+    robot = robot_in("start", "lab")
+    rooms = robot.perform("get_all_rooms", [])
+    assert isinstance(rooms, list)
+    rooms.remove("lab")
+    robot.perform("go_to", ["lab"])
+
+
+def test_failed_drive_is_recorded_and_leaves_the_robot_where_it_is() -> None:
+    robot = robot_in("start", "lab")
+    assert failure(robot, "go_to", "attic") == "GoToInvalidLocation"
+    assert (robot.room, robot.trace) == ("start", (Event("goto", "attic"),))
+
+
+def test_look_is_recorded_with_what_it_saw() -> None:
+    robot = robot_in(objects=("mug",))
+    robot.perform("is_in_room", ["mug"])
+    robot.perform("is_in_room", ["cup"])
+    assert robot.trace == (Event("check", "mug", found=True), Event("check", "cup", found=False))
+
+
+def test_saying_needs_nobody() -> None:
+    robot = robot_in()
+    assert robot.perform("say", ["Hello"]) is None
+    assert robot.trace == (Event("say", "Hello"),)
+
+
+@pytest.mark.parametrize("skill", ["go_to", "is_in_room", "say", "pick"])
+def test_events_hold_the_request_with_its_case_but_without_the_spaces_at_its_ends(skill: str) -> None:
+    robot = robot_in("The Lab", objects=("lab",))
+    robot.perform(skill, [" \t the Lab \n"])
+    assert [event.text for event in robot.trace] == ["the Lab"]
+
+
+def test_options_keep_their_spaces_and_the_question_loses_those_at_its_ends() -> None:
+    robot = robot_in(answers=(".*",))
+    robot.perform("ask", ["", "  Tea?\n", options(" Yes ", "No")])
+    assert robot.trace == (Event("ask", "Tea?", options(" Yes ", "No"), answer=" Yes "),)
+
+
+def test_held_object_is_the_raw_request_and_must_be_named_exactly() -> None:
+    robot = robot_in(objects=("stapler",))
+    robot.perform("pick", [" the Stapler "])
+    for wrong in ("the Stapler", " the stapler ", "stapler", ""):
+        assert failure(robot, "place", wrong) == "PlaceNoObject"
+    robot.perform("place", [" the Stapler "])
+    assert robot.trace == (Event("pick", "the Stapler"), Event("place", "the Stapler"))
+
+
+def test_picked_object_is_gone_and_placed_object_lies_in_the_room_of_the_robot() -> None:
+    robot = robot_in("lab", "hall", objects=("mug",))
+    robot.perform("pick", ["mug"])
+    assert robot.perform("is_in_room", ["mug"]) is False
+    robot.perform("go_to", ["hall"])
+    robot.perform("place", ["mug"])
+    assert robot.perform("is_in_room", ["mug"]) is True
+    robot.perform("go_to", ["lab"])
+    assert robot.perform("is_in_room", ["mug"]) is False
+
+
+def test_failed_pick_and_failed_place_leave_no_event() -> None:
+    robot = robot_in(objects=("mug",))
+    assert failure(robot, "pick", "cup") == "PickInvalidObject"
+    assert failure(robot, "place", "mug") == "PlaceNoObject"
+    assert (robot.trace, robot.held) == ((), None)
+
+
+def test_full_hands_are_noticed_before_a_missing_object() -> None:
+    robot = robot_in(objects=("mug", "cup"))
+    robot.perform("pick", ["mug"])
+    assert failure(robot, "pick", "cup") == "PickWhileHolding"
+    assert failure(robot, "pick", "sofa") == "PickWhileHolding"
+    robot.perform("place", ["mug"])
+    assert failure(robot, "place", "mug") == "PlaceNoObject"
+    robot.perform("pick", ["cup"])
+
+
+def test_empty_request_that_was_picked_can_be_placed() -> None:
+    robot = robot_in(objects=(".*",))
+    robot.perform("pick", [""])
+    assert failure(robot, "pick", "mug") == "PickWhileHolding"
+    robot.perform("place", [""])
+
+
+def test_robot_works_in_a_copy_of_the_world() -> None:
+    world = World((Room("lab", ("mug",), (Person(".*", ("a", "b")),)),), "lab")
+    for _ in range(2):
+        robot = SimulatedRobot(world)
+        robot.perform("pick", ["mug"])
+        assert robot.perform("ask", ["", "?", options("a", "b")]) == 0
+
+
+def test_events_say_where_and_when_they_happened() -> None:
+    robot = robot_in("hall", "lab")
+    robot.perform("go_to", ["lab"])
+    robot.now = 2.5
+    robot.perform("say", ["a"])
+    assert [(event.place, event.time) for event in robot.trace] == [("hall", 0.0), ("lab", 2.5)]
+
+
+def test_every_skill_of_the_table_has_a_behaviour() -> None:
+    assert set(robot_in().behaviours) == set(SKILLS)
+
+
+# --- questions (section 4)
+
+
+def test_question_without_options_is_recorded_and_fails_even_where_nobody_is() -> None:
+    for answers in (None, ("yes",)):
+        robot = robot_in(answers=answers)
+        assert failure(robot, "ask", "bob", "Tea?", ()) == "AskEmptyOptions"
+        assert robot.trace == (Event("ask", "Tea?"),)
+
+
+def test_question_without_options_uses_up_no_answer() -> None:
+    robot = robot_in(answers=("tea", "milk"))
+    assert failure(robot, "ask", "", "?", ()) == "AskEmptyOptions"
+    assert robot.perform("ask", ["", "?", options("milk", "tea")]) == 1
+
+
+def test_question_to_nobody_is_recorded_and_fails() -> None:
+    robot = robot_in()
+    assert failure(robot, "ask", "bob", "Tea?", options("yes")) == "AskNoPerson"
+    assert robot.trace == (Event("ask", "Tea?", options("yes")),)
+
+
+@given(st.text())
+def test_whoever_is_there_answers_to_any_name(name: str) -> None:
+    assert robot_in(answers=("yes",)).perform("ask", [name, "?", options("no", "yes")]) == 1
+
+
+def test_answers_are_used_up_in_order_and_the_last_one_stays() -> None:
+    robot = robot_in(answers=("a", "b", "c"))
+    chosen = [robot.perform("ask", ["", "?", options("a", "b", "c")]) for _ in range(5)]
+    assert chosen == [0, 1, 2, 2, 2]
+
+
+def test_person_without_answers_fits_no_option() -> None:
+    robot = robot_in(answers=())
+    assert failure(robot, "ask", "", "Tea?", options("yes", "no")) == "AskInvalidOptions"
+    assert robot.trace == (Event("ask", "Tea?", options("yes", "no")),)
+
+
+def test_question_that_fits_no_option_has_used_up_an_answer() -> None:
+    robot = robot_in(answers=("milk", "tea"))
+    assert failure(robot, "ask", "", "?", options("tea", "juice")) == "AskInvalidOptions"
+    assert robot.perform("ask", ["", "?", options("juice", "tea")]) == 1
+
+
+def test_event_of_a_question_holds_the_answer() -> None:
+    robot = robot_in(answers=("TEA",))
+    robot.perform("ask", ["bob", "What?", options("juice", "green tea")])
+    assert robot.trace == (Event("ask", "What?", options("juice", "green tea"), answer="green tea"),)
+
+
+@pytest.mark.parametrize(
+    ("answer", "question", "offered", "chosen"),
+    [
+        ("lemonade", "Lemonade?", ("No", "Yes"), 1),
+        ("lemonade", "Tea?", ("No", "Yes"), 0),
+        ("lemonade", "Tea?", ("Yes", "lemonade", "Lemonade!"), 1),
+        ("LEMONADE", "Tea?", ("Yes", "some lemonade"), 1),
+        (".*", "Tea?", ("x", "yes"), 0),
+        ("lemonade", "Lemonade?", ("tea", "no"), None),
+        ("lemonade", "Tea?", ("I don't kNOw", "no"), 0),
+        ("lemonade", "Lemonade?", ("oh YES please", "yes"), 0),
+        ("lemonade", "Tea?", ("tea", "juice"), None),
+        ("lemonade", "Tea?", ("yes", "juice"), None),
+        ("lemon", "Lemonade?", ("no", "yes"), 1),
+        ("^tea$", "Tea", ("no", "yes"), 1),
+        ("yes", "Yes?", ("maybe", "no"), None),
+        ("yes", "Tea?", ("maybe", "no"), 1),
+    ],
+)
+def test_answer_is_looked_for_in_the_options_and_else_is_a_yes_or_a_no(
+    answer: str, question: str, offered: Texts, chosen: int | None
+) -> None:
+    assert choose(answer, question, options(*offered)) == chosen
+
+
+@given(st.text(), st.lists(st.text(), min_size=1).map(tuple))
+def test_answer_that_fits_all_chooses_the_first_option(question: str, offered: Texts) -> None:
+    assert choose(".*", question, options(*offered)) == 0
+
+
+@given(st.text(), st.text(), st.lists(st.text(max_size=5), max_size=4).map(tuple))
+def test_chosen_option_holds_the_answer_or_else_yes_or_no(answer: str, question: str, offered: Texts) -> None:
+    def has(part: str, text: str) -> bool:
+        return re.search(part, text, re.IGNORECASE) is not None
+
+    literal = re.escape(answer)
+    chosen = choose(literal, question, options(*offered))
+    wanted = literal
+    if not any(has(literal, option) for option in offered):
+        wanted = "yes" if has(literal, question) else "no"
+    fitting = [position for position, option in enumerate(offered) if has(wanted, option)]
+    assert chosen == (fitting[0] if fitting else None)
+
+
+def test_second_person_in_a_room_is_not_asked() -> None:
+    people = (Person(".*", ("milk",)), Person(".*", ("tea",)))
+    robot = SimulatedRobot(World((Room("lab", people=people),), "lab"))
+    assert failure(robot, "ask", "", "?", options("tea")) == "AskInvalidOptions"
+
+
+def test_number_among_the_options_is_matched_as_text() -> None:
+    robot = robot_in(answers=("2",))
+    offered = (Option("1", is_text=False), Option("2", is_text=False))
+    assert robot.perform("ask", ["", "?", offered]) == 1
+    assert robot.trace == (Event("ask", "?", offered, answer="2"),)
+
+
+# --- the rest
+
+
+def test_places_of_a_trace_are_found_again_from_the_world() -> None:
+    robot = robot_in("hall", "lab", "office")
+    for request in ("the lab", "attic", "office"):
+        try:
+            robot.perform("go_to", [request])
+        except RobotError:
+            robot.perform("say", ["where?"])
+    world = World((Room("hall"), Room("lab"), Room("office")), "hall")
+    bare = tuple(Event(event.kind, event.text) for event in robot.trace)
+    assert [e.place for e in located(bare, world)] == ["hall", "lab", "lab", "lab"]
+    assert [e.place for e in located(bare, world)] == [e.place for e in robot.trace]
+
+
+def test_rules_are_the_suites_own() -> None:
+    rules = Rules(literals="as-written")
+    assert SimulatedRobot(World((Room("a"),), "a"), rules).rules is rules

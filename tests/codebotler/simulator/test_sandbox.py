@@ -1,0 +1,616 @@
+"""What a program finds around it, and that it finds no way out."""
+
+import textwrap
+from typing import TypeAlias
+
+import pytest
+
+from codebotler.simulator.engine import run
+from codebotler.simulator.rules import Rules
+from codebotler.trace import Event, Option, Outcome, RunError, Status
+from codebotler.world import Person, Room, World
+
+Outcomes: TypeAlias = dict[str, Outcome]
+
+HOUSE = World(
+    (
+        Room("start_loc"),
+        Room("amy's lab", ("stapler", "mug"), (Person(".*", ("2", "yes")),)),
+        Room("bob's lab"),
+    ),
+    "start_loc",
+)
+ASKING = 'go_to("amy\'s lab")\n'
+
+
+def task(body: str) -> str:
+    return "def task_program():\n" + textwrap.indent(body, "    ") + "\n"
+
+
+def said(outcome: Outcome) -> list[str]:
+    """What the robot said in a run that ended well."""
+    assert outcome.status == Status.FINISHED, outcome
+    return [event.text for event in outcome.trace if event.kind == "say"]
+
+
+def on_the_line(text: str) -> str:
+    """What writes a frame past the skills."""
+    return f"import os\nos.write(3, {len(text).to_bytes(4, 'big') + text.encode()!r})\n"
+
+
+def all_of(*tables: dict[str, tuple[str, object]]) -> dict[str, str]:
+    return {name: program for table in tables for name, (program, _) in table.items()}
+
+
+def run_all(programs: dict[str, str], rules: Rules) -> Outcomes:
+    pairs = ((program, HOUSE) for program in programs.values())
+    return dict(zip(programs, run(pairs, workers=2, rules=rules), strict=True))
+
+
+# --- what works: each program says these things
+
+WORKS: dict[str, tuple[str, object]] = {
+    # bugs of the original evaluator (SEMANTICS.md, section 9), by their number
+    "1 text with the name of a skill": (
+        task("""say("amy's lab".replace("'s lab", ""))"""),
+        ["amy"],
+    ),
+    "2 names that end in the name of a skill": (
+        "def do_ask(q): say(q)\ndef essay(t): return t\nclass A:\n    def pick(self): return 'picked'\n"
+        + task("do_ask('a')\nsay(essay('b'))\nsay(A().pick())"),
+        ["a", "b", "picked"],
+    ),
+    "3 skills are values": (
+        task("speak = say\nspeak('a')\nlist(map(say, ['b', 'c']))\nsay ('d')\nsay\nget_all_rooms"),
+        ["a", "b", "c", "d"],
+    ),
+    "4 a space between the brackets": ("def task_program( ):\n    say('a')\n", ["a"]),
+    "5 own call": (task("say('a')") + "task_program()\n", ["a"]),
+    "5 own call under main": (task("say('a')") + "if __name__ == '__main__':\n    task_program()\n", ["a"]),
+    "5 own call that failed and was caught": (
+        task("say('a')\nraise ValueError") + "try:\n    task_program()\nexcept ValueError:\n    say('b')\n",
+        ["a", "b"],
+    ),
+    "5 two own calls are two": (task("say('a')") + "task_program()\ntask_program()\n", ["a", "a"]),
+    "6 name in an f-string": (task("Greeting = 'Good Day!'\nsay(f'{Greeting}')"), ["good day!"]),
+    "7 code between two quotes": (task("Text = 'a'\nsay('\"' + Text + '\"')"), ['"a"']),
+    "8 literals of every kind are lowered": (
+        task("if 'LAB' in \"amy's lab\" and '''A\n''' == \"\"\"a\n\"\"\" and R'A\\B' == 'a\\\\b': say('a')"),
+        ["a"],
+    ),
+    "8 answer compared with another literal": (
+        task(ASKING + "if ask('', 'Yes?', ['2', \"Yes\"]) == '2':\n    say(ask('', '', [\"Yes\", 'No']))"),
+        ["yes"],
+    ),
+    "9 call within a text": (
+        task("say('please say(yes) and go_to(there)')"),
+        ["please say(yes) and go_to(there)"],
+    ),
+    "10 robot is an ordinary name": (task("robot = 'Robbie'\nsay(robot)"), ["robbie"]),
+    "11 sleeping costs no real time": (
+        task("time.sleep(2)\nfrom time import sleep\nsleep(1000)\ntime.sleep(1)\nsay(str(time.monotonic()))"),
+        ["1003.0"],
+    ),
+    "12 output is ignored": (task("print('now in', get_current_location())\nsay('a')"), ["a"]),
+    "13 line breaks are kept": (task(r"say('Hello!\nGood Day!')"), ["hello!\ngood day!"]),
+    "14 output is no event": (task("print('Say /$@!/ x /$@!/ None')"), []),
+    "15 list of rooms is a copy": (
+        task(
+            "rooms = get_all_rooms()\nrooms.remove('start_loc')\ngo_to('start_loc')\nsay(get_all_rooms()[0])"
+        ),
+        ["start_loc"],
+    ),
+    "17 much output of skills": (
+        task("for i in range(400): is_in_room('backpack ' * 40)\nsay('a')"),
+        ["a"],
+    ),
+    # a run (section 1)
+    "sys and time are there": (task("if sys.maxsize and time.time(): say('a')"), ["a"]),
+    "code outside functions runs first": ("say('a')\n" + task("say('b')"), ["a", "b"]),
+    "exit": (task("say('a')\nexit()\nsay('b')"), ["a"]),
+    "quit": (task("say('a')\nquit()"), ["a"]),
+    "sys.exit(0)": (task("say('a')\nsys.exit(0)"), ["a"]),
+    "sys.exit()": (task("say('a')\nsys.exit()"), ["a"]),
+    "exit before the task": ("say('a')\nexit()\n" + task("say('b')"), ["a"]),
+    "module is main": (
+        task("import __main__\nsay(__main__.__name__)\nsay(__name__)"),
+        ["__main__", "__main__"],
+    ),
+    # arguments (section 3)
+    "arguments by name": (
+        task(
+            "go_to(location=\"amy's lab\")\nis_in_room(entity='mug')\npick(obj='mug')\nplace(obj='mug')\n"
+            "say(message=ask(person='', question='q', options=['2']))"
+        ),
+        ["2"],
+    ),
+    "caught robot errors": (
+        task(
+            "for act in (lambda: go_to('x'), lambda: pick('x'), lambda: place('x'),\n"
+            "            lambda: ask('', '', [])):\n"
+            "    try:\n        act()\n    except Exception as error:\n        say(type(error).__name__)"
+        ),
+        ["GoToInvalidLocation", "PickInvalidObject", "PlaceNoObject", "AskEmptyOptions"],
+    ),
+    "very object of an option comes back": (
+        task(
+            ASKING + "two = ['2']\nclass Yes:\n    def __str__(self): return 'yes'\nyes = Yes()\n"
+            "if ask('', '', [1, two]) is two: say('a')\n"
+            "if ask('', '', [None, yes]) is yes: say('b')\n"
+            "if ask('', '', [True, 'Yes', 2.5]) == 'yes': say('c')"
+        ),
+        ["a", "b", "c"],
+    ),
+    # literals and the shape of the program
+    "format specifications are code": (
+        task("say(f'{255:X}|{3.14159:.2F}|{7!R:>5}|ABC')".replace("!R", "!r")),
+        ["FF|3.14|    7|abc"],
+    ),
+    "bytes are no text": (task("say(b'ABC'.decode())"), ["ABC"]),
+    "match": (
+        task(
+            "match {'Kind': 'Lab', 'n': 3}:\n    case {'KIND': 'LAB' | 'X', 'n': int(n)} if n > 2:\n"
+            "        say(f'got {n}')\n    case _:\n        say('none')"
+        ),
+        ["got 3"],
+    ),
+    "docstrings stay docstrings": (
+        '"""Module."""\nfrom __future__ import annotations\nclass A:\n    """Class."""\n'
+        + task('"""Task."""\nsay(task_program.__doc__)\nsay(A.__doc__)\nsay(__doc__)'),
+        ["task.", "class.", "module."],
+    ),
+    "wide Python": (
+        task(
+            "import re, json, math, collections, itertools\n"
+            "P = collections.namedtuple('p', 'x')\n"
+            "say(str(P(1))); say(str(re.findall('b+', 'abbab'))); say(json.dumps({'a': [1]}))\n"
+            "say(str(sum(x for x in range(9) if x % 2))); say(str((lambda *a, k=1: a + (k,))(1, 2)))\n"
+            "say(str([y := 3, y ** 2])); say(str(collections.Counter('aab')))\n"
+            "try:\n    raise ExceptionGroup('g', [ValueError(1)])\nexcept* ValueError:\n    say('group')"
+        ),
+        [
+            "p(x=1)",
+            "['bb', 'b']",
+            '{"a": [1]}',
+            "16",
+            "(1, 2, 1)",
+            "[3, 9]",
+            "Counter({'a': 2, 'b': 1})",
+            "group",
+        ],
+    ),
+    "generators, decorators, context managers": (
+        "import contextlib, functools\n"
+        "def gen():\n    yield from 'ab'\n"
+        "@functools.cache\ndef f(n): return n if n < 2 else f(n - 1) + f(n - 2)\n"
+        "@contextlib.contextmanager\ndef ctx():\n    yield 'in'\n    say('out')\n"
+        + task("say(''.join(gen()))\nsay(str(f(30)))\nwith ctx() as word: say(word)"),
+        ["ab", "832040", "in", "out"],
+    ),
+    "recursion as deep for a function that calls a skill": (
+        "n = 0\ndef f():\n    global n\n    get_current_location()\n    n += 1\n    f()\n"
+        + task("try:\n    f()\nexcept RecursionError:\n    say(str(n))"),
+        ["984"],
+    ),
+    "recursion as deep for a function that only calls itself": (
+        "n = 0\ndef f():\n    global n\n    n += 1\n    f()\n"
+        + task("try:\n    f()\nexcept RecursionError:\n    say(str(n))"),
+        ["991"],
+    ),
+    "prints a gigabyte": (task("text = 'x' * 10**6\nfor i in range(1000): print(text)\nsay('a')"), ["a"]),
+    "swallows a caught stop of its own": (task("try:\n    exit()\nexcept SystemExit:\n    say('a')"), ["a"]),
+}
+# --- what fails: each program ends in this error, and leaves this trace
+
+T = Status.TIMEOUT
+P = Status.PYTHON_ERROR
+SPENT = "200,000 turns of loops"
+FAILS: dict[str, tuple[str, object]] = {
+    "16 endless recursion keeps its class": (
+        (
+            "def visit(r):\n    try:\n        is_in_room(r)\n    finally:\n        visit(r)\n"
+            "def task_program():\n    visit('a')\n"
+        ),
+        (P, "RecursionError", None),
+    ),
+    "20 task with a parameter": (
+        "def task_program(robot):\n    say('a')\n",
+        (P, "TypeError", "task_program() missing 1 required positional argument: 'robot'"),
+    ),
+    "no task": ("def main():\n    say('a')\n", (P, "NameError", "name 'task_program' is not defined")),
+    "nothing": ("", (P, "NameError", "name 'task_program' is not defined")),
+    "simulator is hidden": (task("robot.go_to('x')"), (P, "NameError", "name 'robot' is not defined")),
+    "state is hidden": (task("state"), (P, "NameError", "name 'state' is not defined")),
+    "input": (task("input()"), (P, "EOFError", "EOF when reading a line")),
+    "exit with a text": (task("sys.exit('text')"), (P, "SystemExit", "text")),
+    "exit with a number": (task("sys.exit(3)"), (P, "SystemExit", "3")),
+    "no Python": ("def task_program(:\n", (P, "SyntaxError", "invalid syntax (<program>, line 1)")),
+    "a null character": ("say('a')\0", (P, "SyntaxError", None)),
+    "a lone surrogate": ("say('\ud800')", (P, "UnicodeEncodeError", None)),
+    "too many brackets": ("(" * 5000, (P, "SyntaxError", None)),
+    "too deep to parse": ("-" * 100_000 + "1", (P, None, None)),
+    "module that is not there": (task("import numpy"), (P, "ModuleNotFoundError", "No module named 'numpy'")),
+    "error without a text": (
+        task("class E(Exception):\n    def __str__(self): raise KeyError\nraise E"),
+        (P, "E", ""),
+    ),
+    # types (section 3): no event
+    "text is a number": (task("say(3)"), (P, "TypeError", "say: message must be text, not int")),
+    "text is None": (task("go_to(None)"), (P, "TypeError", "go_to: location must be text, not NoneType")),
+    "text of a subclass": (
+        task("class Str(str): pass\npick(Str('mug'))"),
+        (P, "TypeError", "pick: obj must be text, not Str"),
+    ),
+    "options are a tuple": (
+        task("ask('', '', ('a', 'b'))"),
+        (P, "TypeError", "ask: options must be a list, not tuple"),
+    ),
+    "options are a range": (task("ask('', '', range(3))"), (P, "TypeError", None)),
+    "options are a dict view": (task("ask('', '', {'a': 1}.keys())"), (P, "TypeError", None)),
+    "options are a subclass of list": (
+        task("class L(list): pass\nask('', '', L('ab'))"),
+        (P, "TypeError", "ask: options must be a list, not L"),
+    ),
+    "person is no text": (task("ask(None, '', ['a'])"), (P, "TypeError", None)),
+    "too few arguments": (
+        task("go_to()"),
+        (P, "TypeError", "go_to() missing 1 required positional argument: 'location'"),
+    ),
+    "too many arguments": (
+        task("get_all_rooms(1)"),
+        (P, "TypeError", "get_all_rooms() takes 0 positional arguments but 1 was given"),
+    ),
+    "argument by another name": (
+        task("say(text='a')"),
+        (P, "TypeError", "say() got an unexpected keyword argument 'text'"),
+    ),
+    # limits that are swallowed
+    "endless loop": (task("while True: pass"), (T, "TimeoutError", SPENT)),
+    "swallows in a loop": (
+        task("while True:\n    try:\n        while True: pass\n    except BaseException: pass"),
+        (T, "TimeoutError", SPENT),
+    ),
+    "swallows once and ends": (
+        task("try:\n    while True: pass\nexcept BaseException: pass"),
+        (T, "TimeoutError", SPENT),
+    ),
+    "swallows and acts": (
+        task("try:\n    while True: pass\nexcept: pass\nfinally:\n    say('a')"),
+        (T, "TimeoutError", SPENT),
+    ),
+    "swallows by continue in finally": (
+        task("while True:\n    try:\n        while True: pass\n    finally:\n        continue"),
+        (T, "TimeoutError", SPENT),
+    ),
+    "swallows by suppress": (
+        task(
+            "from contextlib import suppress\nwhile 1:\n    with suppress(BaseException):\n        while 1: pass"
+        ),
+        (T, "TimeoutError", SPENT),
+    ),
+    "swallows in a generator": (
+        task("def g():\n    while 1:\n        try: yield\n        except: pass\nfor _ in g(): pass"),
+        (T, "TimeoutError", SPENT),
+    ),
+    "swallows in recursion": (
+        "def f():\n    try: f()\n    except BaseException: f()\n" + task("f()"),
+        (T, "TimeoutError", None),
+    ),
+    "swallows in __del__": (
+        task("class A:\n    def __del__(self):\n        while True: pass\nA()\nsay('a')"),
+        (T, "TimeoutError", SPENT),
+    ),
+    "spends in a comprehension": (task("[0 for i in range(10**9)]"), (T, "TimeoutError", SPENT)),
+    "spends in a lambda": (task("sum(map(lambda x: x, range(10**9)))"), (T, "TimeoutError", SPENT)),
+    "exits after the budget": (
+        task("try:\n    while True: pass\nexcept BaseException:\n    pass\nexit()"),
+        (T, "TimeoutError", SPENT),
+    ),
+    "one turn too many": (task("for i in range(200_000): pass"), (T, "TimeoutError", SPENT)),
+    "a text that is too long to send": (
+        task("say('x' * 2_000_000)"),
+        (T, "TimeoutError", "a text of more than 10,000 characters"),
+    ),
+    # what hangs, and what the kernel refuses
+    "hangs in C": (
+        task("sum(range(10**12))"),
+        (T, "TimeoutError", "5 seconds of processor time in one step"),
+    ),
+    "regex that backtracks": (
+        task("import re\nre.match('(a+)+$', 'a' * 50 + 'b')"),
+        (T, "TimeoutError", "5 seconds of processor time in one step"),
+    ),
+    "deadlock": (
+        task("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()"),
+        (T, "TimeoutError", "it waits for something that can never come"),
+    ),
+    "allocates without end": (
+        task("parts = []\nwhile True: parts.append(bytearray(10**7))"),
+        (P, "MemoryError", ""),
+    ),
+    "allocates all at once": (task("'x' * 10**12"), (P, "MemoryError", "")),
+    "ends its process": (
+        task("import os\nos._exit(0)"),
+        (Status.KILLED, "Crash", "the process ended by itself (exit status 0)"),
+    ),
+    "crashes": (
+        task("import ctypes\nctypes.string_at(0)"),
+        (Status.KILLED, "Crash", "the process ended by itself (signal 11)"),
+    ),
+    "aborts": (task("import os\nos.abort()"), (Status.KILLED, "Crash", None)),
+    "kills itself": (task("import os\nos.kill(os.getpid(), 9)"), (P, "PermissionError", None)),
+    "raises a signal": (task("import signal\nsignal.raise_signal(9)"), (P, "PermissionError", None)),
+    "kills everybody": (task("import os\nos.kill(-1, 9)"), (P, "PermissionError", None)),
+    "reads a file": (task("open('/etc/passwd')"), (P, "PermissionError", None)),
+    "writes a file": (task("open('/tmp/x', 'w')"), (P, "PermissionError", None)),
+    "lists a folder": (task("import os\nos.listdir('/')"), (P, "PermissionError", None)),
+    "opens a socket": (task("import socket\nsocket.socket()"), (P, "PermissionError", None)),
+    "forks": (task("import os\nos.fork()"), (P, "PermissionError", None)),
+    "starts a process": (task("import subprocess\nsubprocess.run(['true'])"), (P, "PermissionError", None)),
+    "starts a thread": (
+        task("import threading\nthreading.Thread(target=print).start()"),
+        (P, "RuntimeError", None),
+    ),
+    "closes the line": (task("import os\nos.close(3)"), (P, "PermissionError", None)),
+    "says nonsense on the line": (
+        task(on_the_line("junk")),
+        (Status.KILLED, "Crash", "the program spoke on the robot's line: a frame is no JSON"),
+    ),
+    "says too much on the line": (
+        task("import os\nos.write(3, b'\\xff\\xff\\xff\\xff')"),
+        (Status.KILLED, "Crash", "the program spoke on the robot's line: a frame is too long"),
+    ),
+    "says null on the line": (
+        task(on_the_line("null") + "say('a')"),
+        (Status.KILLED, "Crash", None),
+    ),
+    "asks for a skill that is none": (
+        task(on_the_line('["fly", [3]]')),
+        (Status.KILLED, "Crash", "the program spoke on the robot's line: there is no such skill"),
+    ),
+    "asks with another type": (
+        task(on_the_line('["say", [3]]')),
+        (Status.KILLED, "Crash", "the program spoke on the robot's line: an argument is of another type"),
+    ),
+    "forges a robot error": (
+        task(on_the_line('{"end": "robot-error", "number": 99}')),
+        (Status.KILLED, "Crash", None),
+    ),
+}
+
+
+# --- where it ends: each program ends in this kind of error at this line
+
+LINES: dict[str, tuple[str, object]] = {
+    "a name that is none": (task("say('a')\n\nundefined"), ("NameError", 4)),
+    "in a function": ("def f():\n    1 / 0\n\n" + task("f()"), ("ZeroDivisionError", 2)),
+    "in the library": (task("import json\njson.loads('{')"), ("JSONDecodeError", 3)),
+    "in what does not parse": ("x = 1\nif x:\n", ("IndentationError", 2)),
+    "in a skill": (task("say('a')\ngo_to('attic')"), ("GoToInvalidLocation", 3)),
+    "in a loop": (task("for i in range(3):\n    pick('mug')"), ("PickInvalidObject", 3)),
+    "in a loop without end": (task("\n\nwhile True:\n    x = 1"), ("TimeoutError", 5)),
+    "nowhere": ("def main(): pass\n", ("NameError", None)),
+    **{
+        f"sleeping for {wrong or 'nothing'}": (task(f"say('a')\ntime.sleep({wrong})"), (kind, 3))
+        for wrong, kind in {
+            "-1": "ValueError",
+            "float('nan')": "ValueError",
+            "float('inf')": "ValueError",
+            "'1'": "TypeError",
+            "None": "TypeError",
+            "": "TypeError",
+        }.items()
+    },
+}
+
+# --- limits: what stays within one, what goes beyond it, and what is said then
+
+LIMITS = {
+    "time": ("for i in range(3600): time.sleep(1)", "time.sleep(0.1)", "3,600 seconds of simulated time"),
+    "calls": ("for i in range(1000): say('a')", "get_all_rooms()", "1,000 skill calls"),
+    "ticks": ("for i in range(199_998): pass", "[0 for i in 'ab']", SPENT),
+    "text": ("say('x' * 10_000)", "say('x' * 10_001)", "a text of more than 10,000 characters"),
+    "option": ("say('x')", "ask('', '', ['x' * 10_001])", "a text of more than 10,000 characters"),
+    "trace": (
+        "for i in range(100): say('x' * 10_000)",
+        "say('x')",
+        "texts of more than 1,000,000 characters in all",
+    ),
+}
+WITHIN: dict[str, tuple[str, object]] = {
+    f"within {name}": (task(inside), None) for name, (inside, _, _) in LIMITS.items()
+}
+BEYOND: dict[str, tuple[str, object]] = {
+    f"beyond {name}": (task(f"{inside}\n{outside}"), None) for name, (inside, outside, _) in LIMITS.items()
+}
+SLOW = ("hangs in C", "regex that backtracks", "deadlock")
+
+
+@pytest.fixture(scope="module")
+def outcomes() -> Outcomes:
+    """Every program's outcome, with an honest program after each that fails."""
+    programs = all_of(LINES, WITHIN, BEYOND, WORKS)
+    for number, name in enumerate(FAILS):
+        programs |= {name: FAILS[name][0], f"after {name}": task(f"say('honest {number}')")}
+    ordered = [*SLOW, *(name for name in programs if name not in SLOW)]
+    return run_all({name: programs[name] for name in ordered}, Rules())
+
+
+@pytest.mark.parametrize("name", WORKS)
+def test_program_works(outcomes: Outcomes, name: str) -> None:
+    assert said(outcomes[name]) == WORKS[name][1]
+
+
+@pytest.mark.parametrize("name", FAILS)
+def test_program_fails_with_the_right_status_and_leaves_the_next_one_alone(
+    outcomes: Outcomes, name: str
+) -> None:
+    expected = FAILS[name][1]
+    assert isinstance(expected, tuple)
+    status, kind, message = expected
+    outcome = outcomes[name]
+    assert outcome.error is not None
+    assert outcome.status == status
+    assert kind in (None, outcome.error.kind)
+    assert message in (None, outcome.error.message)
+    if kind != "RecursionError":
+        assert outcome.trace == ()
+    assert said(outcomes[f"after {name}"]) == [f"honest {list(FAILS).index(name)}"]
+
+
+def one(program: str, rules: Rules | None = None, world: World = HOUSE) -> Outcome:
+    (outcome,) = run([(program, world)], workers=1, rules=rules or Rules())
+    return outcome
+
+
+# --- the clock
+
+CLOCK: dict[str, tuple[str, object]] = {
+    "time": ("time.time()", "1704110490.5"),
+    "time_ns": ("time.time_ns()", "1704110490500000000"),
+    "monotonic": ("time.monotonic()", "90.5"),
+    "perf_counter": ("time.perf_counter()", "90.5"),
+    "perf_counter_ns": ("time.perf_counter_ns()", "90500000000"),
+    "process_time": ("time.process_time()", "90.5"),
+    "strftime": ("time.strftime('%Y-%m-%d %H:%M:%S')", "2024-01-01 12:01:30"),
+    "localtime": ("time.localtime().tm_min", "1"),
+    "gmtime": ("time.gmtime(None).tm_sec", "30"),
+    "gmtime of a time": ("time.gmtime(0).tm_year", "1970"),
+    "ctime": ("time.ctime()", "Mon Jan  1 12:01:30 2024"),
+    "asctime": ("time.asctime()", "Mon Jan  1 12:01:30 2024"),
+    "datetime.now": ("datetime.datetime.now()", "2024-01-01 12:01:30.500000"),
+    "datetime.now with a zone": ("datetime.datetime.now(datetime.UTC)", "2024-01-01 12:01:30.500000+00:00"),
+    "datetime.today": ("datetime.datetime.today()", "2024-01-01 12:01:30.500000"),
+    "datetime.utcnow": ("datetime.datetime.utcnow()", "2024-01-01 12:01:30.500000"),
+    "date.today": ("datetime.date.today()", "2024-01-01"),
+    "strptime": ("datetime.datetime.strptime('13:30', '%H:%M').hour", "13"),
+    "difference": ("datetime.datetime.now() - datetime.datetime(2024, 1, 1)", "12:01:30.500000"),
+    "instance": ("isinstance(datetime.datetime.now(), datetime.date)", "True"),
+    "repr": ("repr(datetime.datetime.now())", "datetime.datetime(2024, 1, 1, 12, 1, 30, 500000)"),
+    "timeit": ("__import__('timeit').default_timer()", "90.5"),
+}
+
+
+@pytest.fixture(scope="module")
+def clock() -> list[str]:
+    body = "".join(f"say(str({expression}))\n" for expression, _ in CLOCK.values())
+    return said(one("import datetime\n" + task("time.sleep(90.5)\n" + body), Rules(literals="as-written")))
+
+
+@pytest.mark.parametrize("name", CLOCK)
+def test_every_clock_shows_the_simulated_time(clock: list[str], name: str) -> None:
+    assert clock[list(CLOCK).index(name)] == CLOCK[name][1]
+
+
+def test_events_carry_the_simulated_time_and_sleeping_is_none() -> None:
+    outcome = one(task("say('a')\ntime.sleep(3.5)\nsay('b')\ntime.sleep(True)\nsay('c')"))
+    assert [event.time for event in outcome.trace] == [0.0, 3.5, 4.5]
+
+
+# --- limits
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_limit_is_reached_only_beyond_it(outcomes: Outcomes, name: str) -> None:
+    assert outcomes[f"within {name}"].status == Status.FINISHED
+    outcome = outcomes[f"beyond {name}"]
+    assert outcome.status == Status.TIMEOUT
+    assert outcome.error == RunError("TimeoutError", LIMITS[name][2])
+    assert outcome.line == 3
+
+
+def test_trace_up_to_the_limit_is_kept_and_nothing_happens_after_it() -> None:
+    swallowing = (
+        "n = 0\nwhile True:\n    try:\n        n += 1\n        say(str(n))\n    except BaseException: pass"
+    )
+    outcome = one(task(swallowing))
+    assert outcome.status == Status.TIMEOUT
+    assert [event.text for event in outcome.trace] == [str(n) for n in range(1, 1001)]
+
+
+# --- the rest
+
+
+def test_literals_are_kept_as_written_where_the_suite_wants_it() -> None:
+    program = task('"""Doc."""\nsay(\'ABC\')\nsay(f\'X{1:X}\')\nsay(task_program.__doc__)')
+    assert said(one(program, Rules(literals="as-written"))) == ["ABC", "X1", "Doc."]
+    assert said(one(program)) == ["abc", "x1", "doc."]
+
+
+def test_options_that_are_no_text_are_marked_in_the_trace() -> None:
+    outcome = one(task(ASKING + "ask('', 'q', [1, None, 'Two', 2])"))
+    options = (
+        Option("1", is_text=False),
+        Option("None", is_text=False),
+        Option("two"),
+        Option("2", is_text=False),
+    )
+    assert outcome.trace == (Event("goto", "amy's lab"), Event("ask", "q", options, answer="2"))
+
+
+def test_options_are_recorded_as_they_were_at_the_time_of_the_call() -> None:
+    outcome = one(task(ASKING + "options = ['2']\nask('', 'q', options)\noptions.append('3')"))
+    assert outcome.trace[-1].options == (Option("2"),)
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_outcome_names_the_line_of_the_program(outcomes: Outcomes, name: str) -> None:
+    outcome = outcomes[name]
+    assert outcome.error is not None
+    assert (outcome.error.kind, outcome.line) == LINES[name][1]
+
+
+def test_uncaught_robot_error_keeps_the_trace_and_says_why() -> None:
+    assert one(task("say('a')\ngo_to('Attic')")) == Outcome(
+        Status.ROBOT_ERROR,
+        (Event("say", "a"), Event("goto", "attic")),
+        RunError("GoToInvalidLocation", 'there is no room "attic"'),
+        3,
+    )
+
+
+def test_error_that_looks_like_the_robots_is_the_programs_own() -> None:
+    copied = "class GoToInvalidLocation(Exception): number = 0\n"
+    outcome = one(copied + task("raise GoToInvalidLocation('x')"))
+    assert (outcome.status, outcome.error) == (Status.PYTHON_ERROR, RunError("GoToInvalidLocation", "x"))
+
+
+def test_two_runs_cannot_see_each_other() -> None:
+    marks = """
+import builtins, os, random, sys
+builtins.sorted = lambda x: 99
+builtins.MARK = random.marker = 1
+os.environ["MARK"] = "1"
+sys.modules["marker"] = random
+random.random()
+time.sleep(50)
+sys.setrecursionlimit(500)
+print = say
+"""
+    looks = """
+import builtins, os, random, sys
+say(str(sorted("ba")))
+say(str(hasattr(random, "marker")))
+say(str(hasattr(builtins, "MARK")))
+say(str("MARK" in os.environ))
+say(str("marker" in sys.modules))
+say(str(time.monotonic()))
+say(str(sys.getrecursionlimit() > 900))
+print("x")
+say(str(random.random()))
+"""
+    rules = Rules(literals="as-written")
+    pairs = [(task(looks), HOUSE), (marks + task("say('a')"), HOUSE), (task(looks + "\n"), HOUSE)]
+    before, between, after = run(pairs, workers=1, rules=rules)
+    assert said(between) == ["a"]
+    assert said(before)[:-1] == ["['a', 'b']", "False", "False", "False", "False", "0.0", "True"]
+    assert after == before
+
+
+def test_worlds_of_one_program_cannot_see_each_other() -> None:
+    program = "count = 0\n" + task(
+        "global count\ndef f(x=[]):\n    x.append(1)\n    return len(x)\ncount += 1\nsay(str(f() + count))"
+    )
+    worlds = [World((Room("a"),), "a", about=str(number)) for number in range(4)]
+    outcomes = list(run([(program, world) for world in worlds], workers=1))
+    assert [said(outcome) for outcome in outcomes] == [["2"]] * 4

@@ -1,0 +1,131 @@
+"""Task and suite files: what they may say, and one sentence for each way they can be wrong."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.rtl import parse
+from roboeval.catalogue import new_task
+from roboeval.suite import load_suite
+
+SUITE = "name: mine\nversion: 1\n"
+TASK = """\
+name: T
+summary: s
+prompts: [p]
+checks:
+  goes: {category: Location, rtl: 'tr.Exists(goto("kitchen"))'}
+  says(what): {category: SayAtLocation, rtl: 'tr.Exists(say("{what}"))'}
+worlds:
+  - about: one
+    robot: kitchen
+    rooms: [kitchen]
+    require: [goes, not says("bye")]
+"""
+
+
+def a_suite(folder: Path, task: str = TASK, suite: str = SUITE, name: str = "T.yaml") -> str:
+    (folder / "tasks").mkdir()
+    (folder / "suite.yaml").write_text(suite)
+    (folder / "tasks" / name).write_text(task)
+    return str(folder)
+
+
+def test_a_requirement_is_its_check_with_the_arguments_filled_in(tmp_path: Path) -> None:
+    goes, not_bye = load_suite(a_suite(tmp_path)).task("T").scenarios[0].require
+    assert goes.formula == parse('tr.Exists(goto("kitchen"))')
+    assert not_bye.formula == parse('not tr.Exists(say("bye"))')
+    assert (not_bye.text, not_bye.check, not_bye.category) == ('not says("bye")', "says", "SayAtLocation")
+
+
+def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
+    task = TASK.replace(
+        """'tr.Exists(say("{what}"))'""", """'tr.Exists(say("a")) or tr.Exists(say("{what}"))'"""
+    )
+    requirement = load_suite(a_suite(tmp_path, task)).task("T").scenarios[0].require[1]
+    assert requirement.formula == parse('not (tr.Exists(say("a")) or tr.Exists(say("bye")))')
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("summary: s\n", "", 'line 1: the key "summary" is missing'),
+        ("name: T", "name: U", 'line 1: the task is named "U", but its file "T.yaml"'),
+        ("prompts: [p]", "prompts: []", 'line 3: "prompts" has too few entries'),
+        ("category: Location", "category: Place", "line 5: \"category\" is 'Place', but it should be"),
+        ("goes:", "2 goes:", 'line 5: "2 goes" is no head of a check; write name or name(p1, p2)'),
+        ('"kitchen"))', '"kitchen")', 'line 5: the check "goes" is no valid formula'),
+        ("goto(", "gote(", 'line 5: the check "goes" is no valid formula'),
+        ("[goes,", "[gose,", 'line 11: there is no check "gose"; add it under checks'),
+        ("[goes,", '[goes("x"),', 'line 11: the check "goes" takes no argument, but "goes("x")" gives 1'),
+        ('says("bye")', "says(bye)", "is no requirement; write check, check"),
+        ("require: [goes,", "demand: [goes,", 'line 8: the key "require" is missing'),
+        ("robot: kitchen", "robot: hall", 'line 9: the robot starts in "hall", but the rooms are: kitchen'),
+        ("summary: s", "summary: s\nsummary: t", 'line 3: the key "summary" stands here a second time'),
+        ("summary: s", "summary: [s", "line 3: this is no valid YAML"),
+    ],
+)
+def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+    assert old in TASK
+    with pytest.raises(BadInput) as caught:
+        load_suite(a_suite(tmp_path, TASK.replace(old, new, 1)))
+    assert str(caught.value).startswith(f"{tmp_path}/tasks/T.yaml, ")
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("suite", "sentence"),
+    [
+        ("name: mine\nversion: one\n", "line 2: \"version\" is 'one', but it should be a valid integer"),
+        (SUITE + "rules: {literals: loud}\n", "line 3: \"literals\" is 'loud', but it should be"),
+        (SUITE + "rules: {gravity: 9.81}\n", 'line 3: the key "gravity" means nothing here'),
+        (SUITE + "rules: {skill_seconds: 2}\n", 'line 3: "skill_seconds" is 2, but it should be 0'),
+        (SUITE + "rules: {limits: {calls: 0}}\n", 'line 3: "calls" is 0, but it should be greater than 0'),
+        ("", "suite.yaml: the file is empty"),
+    ],
+)
+def test_a_rule_that_is_not_known_gets_a_sentence(tmp_path: Path, suite: str, sentence: str) -> None:
+    with pytest.raises(BadInput, match=re.escape(sentence)):
+        load_suite(a_suite(tmp_path, suite=suite))
+
+
+def test_an_unknown_suite_gets_a_sentence() -> None:
+    with pytest.raises(BadInput, match='no suite "nonsense": neither one of paper nor a folder'):
+        load_suite("nonsense")
+
+
+def test_the_hash_covers_what_verdicts_rest_on_and_no_comments(tmp_path: Path) -> None:
+    digests = []
+    for number, task in enumerate([TASK, "# a comment\n" + TASK, TASK.replace('"bye"', '"good bye"')]):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        digests.append(load_suite(a_suite(folder, task)).digest)
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) -> None:
+    folder = tmp_path / "my suite"
+    new_task(folder, "MakeTea")
+    suite = load_suite(str(folder))
+    assert [requirement.check for requirement in suite.task("MakeTea").scenarios[0].require] == [
+        "visits",
+        "announces_tea",
+    ]
+    with pytest.raises(BadInput, match="is there already"):
+        new_task(folder, "MakeTea")
+    with pytest.raises(BadInput, match="is no name for a task"):
+        new_task(folder, "../x")
+
+
+def test_the_rules_of_the_paper() -> None:
+    suite = load_suite("paper")
+    assert (suite.rules.limits.seconds, suite.rules.limits.calls, suite.rules.limits.ticks) == (
+        3600,
+        1000,
+        200_000,
+    )
+    assert suite.rules.literals == "lowercase"
+    assert suite.rules.clock_starts.isoformat() == "2024-01-01T12:00:00+00:00"

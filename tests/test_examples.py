@@ -1,0 +1,23 @@
+"""Every example runs and prints what it is there to show."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SHOWS = {
+    "judge_a_program.py": "looks_into_every_lab: the robot went to sam's lab at step 1 but did not look",
+    "rtl.py": 'the robot never said anything with "lobby"',
+}
+
+
+def test_every_example_is_listed() -> None:
+    assert {path.name for path in EXAMPLES.glob("*.py")} == set(SHOWS)
+
+
+@pytest.mark.parametrize("name", SHOWS)
+def test_an_example_shows_what_it_should(name: str) -> None:
+    ended = subprocess.run([sys.executable, str(EXAMPLES / name)], capture_output=True, text=True, check=True)
+    assert SHOWS[name] in ended.stdout

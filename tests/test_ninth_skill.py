@@ -1,0 +1,107 @@
+"""One more skill is one row of the table and one behaviour; everything else follows from them."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from codebotler.program import Problem, Program
+from codebotler.rtl import holds, parse
+from codebotler.simulator.engine import run
+from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
+from codebotler.skills import SKILLS, Parameter, Recording, RosAction, Skill
+from codebotler.trace import Event, Outcome, RunError, Status
+from codebotler.world import Person, Room, World
+
+TABLE = SKILLS.with_skill(
+    Skill(
+        "wave",
+        (Parameter("person"),),
+        "None",
+        "Wave at a person in the room.",
+        Recording("wave", "person"),
+        RosAction("Wave", "/wave_server", ("string person",)),
+    )
+)
+
+
+def wave(robot: SimulatedRobot, person: str) -> None:
+    robot.record("wave", person)
+    if not robot.answers[robot.room]:
+        raise RobotError("WaveNoPerson", f'nobody is here to be waved at as "{person}"')
+
+
+DOES: dict[str, Behaviour] = {**BEHAVIOURS, "wave": wave}
+WORLD = World((Room("hall"), Room("lab", people=(Person("alice"),))), "hall")
+
+
+def test_simulated_robot_performs_it() -> None:
+    robot = SimulatedRobot(WORLD, skills=TABLE, behaviours=DOES)
+    with pytest.raises(RobotError, match="nobody is here"):
+        robot.perform("wave", ["alice"])
+    robot.perform("go_to", ["lab"])
+    robot.perform("wave", ["alice"])
+    assert robot.trace == (Event("wave", "alice"), Event("goto", "lab"), Event("wave", "alice"))
+
+
+PROGRAMS = {
+    "waves": "def task_program():\n    go_to('lab')\n    wave('alice')\n    wave(person='bob')\n",
+    "nobody": "def task_program():\n    say('a')\n    wave('alice')\n",
+    "too many": "def task_program():\n    wave('a', 'b')\n",
+    "unknown name": "def task_program():\n    wave(who='a')\n",
+    "no text": "def task_program():\n    wave(3)\n",
+}
+
+
+@pytest.fixture(scope="module")
+def outcomes() -> dict[str, Outcome]:
+    pairs: Iterator[tuple[str, World]] = ((program, WORLD) for program in PROGRAMS.values())
+    return dict(zip(PROGRAMS, run(pairs, workers=1, skills=TABLE, behaviours=DOES), strict=True))
+
+
+def test_program_calls_it_and_it_stands_in_the_trace(outcomes: dict[str, Outcome]) -> None:
+    assert outcomes["waves"] == Outcome(
+        Status.FINISHED, (Event("goto", "lab"), Event("wave", "alice"), Event("wave", "bob"))
+    )
+
+
+def test_its_own_error_ends_the_run_as_a_robot_error(outcomes: dict[str, Outcome]) -> None:
+    assert outcomes["nobody"] == Outcome(
+        Status.ROBOT_ERROR,
+        (Event("say", "a"), Event("wave", "alice")),
+        RunError("WaveNoPerson", 'nobody is here to be waved at as "alice"'),
+        3,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("too many", "wave() takes 1 positional argument but 2 were given"),
+        ("unknown name", "wave() got an unexpected keyword argument 'who'"),
+        ("no text", "wave: person must be text, not int"),
+    ],
+)
+def test_wrong_arguments_are_pythons_type_error_and_leave_no_event(
+    outcomes: dict[str, Outcome], name: str, message: str
+) -> None:
+    assert outcomes[name] == Outcome(Status.PYTHON_ERROR, (), RunError("TypeError", message), 2)
+
+
+def test_program_cannot_call_it_where_the_table_has_only_eight() -> None:
+    (outcome,) = run([(PROGRAMS["waves"], WORLD)], workers=1)
+    assert outcome.error == RunError("NameError", "name 'wave' is not defined")
+
+
+def test_formula_judges_it(outcomes: dict[str, Outcome]) -> None:
+    trace = outcomes["waves"].trace
+    assert holds(parse('tr.Exists(wave("alice"))', skills=TABLE), trace)
+    assert holds(parse('tr.ActAtFirst("lab", wave("bob"))', skills=TABLE), trace)
+    assert not holds(parse('tr.Exists(wave("carol"))', skills=TABLE), trace)
+
+
+def test_static_check_knows_it() -> None:
+    assert Program(PROGRAMS["waves"]).problems(TABLE) == ()
+    assert [problem.kind for problem in Program(PROGRAMS["waves"]).problems()] == ["NameError", "NameError"]
+    (problem,) = Program(PROGRAMS["too many"]).problems(TABLE)
+    assert isinstance(problem, Problem)
+    assert (problem.line, problem.kind) == (2, "TypeError")
