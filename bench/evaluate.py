@@ -1,8 +1,8 @@
 """How fast is the engine, compared with no isolation at all and with one fresh interpreter a run?
 
 The list is fixed: every distinct (program, world) pair of the corpus, where CODEBOTLER_CORPUS names it, or
-else of the recorded models. Nothing is deduplicated. The three ways take turns over parts of the list, so that
-the ratios hold on a machine whose speed drifts. Pairs that reach a limit are timed and printed apart.
+else of the recorded models. Nothing is deduplicated. The three ways take turns over parts of the list, so
+that the ratios hold on a machine whose speed drifts. Pairs that reach a limit are timed and printed apart.
 """
 
 import builtins

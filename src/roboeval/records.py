@@ -1,4 +1,4 @@
-"""Rows of completions.jsonl and of evaluations: read with line numbers, written so that no crash loses one."""
+"""Rows of completions and of evaluations: read with line numbers, written so that no crash loses one."""
 
 from __future__ import annotations
 
@@ -117,8 +117,9 @@ def read_completions(path: Path) -> Iterator[Completion]:
             field = ".".join(map(str, first["loc"]))
             raise BadInput(f'"{field}" {what}', file=path, line=number) from None
         if completion.key in seen:
+            first_line = seen[completion.key]
             raise BadInput(
-                f"{name_of(completion.key)} stands here again; it stood in line {seen[completion.key]} already",
+                f"{name_of(completion.key)} stands here again; it stood in line {first_line} already",
                 file=path,
                 line=number,
             )
@@ -182,7 +183,7 @@ PUBLISHED = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d+)_(?P<index>\d+)\.
 
 
 def published_completions(path: Path) -> Iterator[Completion]:
-    """Read a folder or zip of `TASK_PROMPT_INDEX.py`, the format in which the paper's authors published theirs.
+    """Read a folder or zip of `TASK_PROMPT_INDEX.py`, as the paper's authors published theirs.
 
     The files assign texts to `name`, `prompt` and `completion`; they are parsed and never imported.
 

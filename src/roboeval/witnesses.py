@@ -99,7 +99,7 @@ def samples(pattern: str) -> tuple[str, ...]:
     """
     matches = Regex(pattern).matches
     spelled = _spelled(_parsed(pattern))
-    forms = (form.strip() for word in spelled for form in (word, f"x {word} x", f"x{word}x", f"x {word}"))
+    forms = (form.format(word).strip() for form in ("{}", "x {}", "x {} x", "x{}x") for word in spelled)
     found = dict.fromkeys(form for form in forms if matches(form))
     return tuple(islice(found or _guessed(pattern), _MOST_SAMPLES))
 

@@ -221,7 +221,7 @@ def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Pat
 
 def test_only_tasks_with_an_ablation_are_ablated(paper: Suite) -> None:
     kept, left = tasks_to_judge(paper, "LunchTime,SayGoodDay", ablated=True)
-    assert kept == {"LunchTime"}
+    assert kept == frozenset({"LunchTime"})
     assert left == ("SayGoodDay",)
     with pytest.raises(BadInput, match="none of SayGoodDay has an ablation"):
         tasks_to_judge(paper, "SayGoodDay", ablated=True)
