@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
     from roboeval.records import Completion
     from roboeval.suite import Suite
+
+Item = TypeVar("Item")
 
 app = typer.Typer(
     help="How good are language models at writing programs for service robots?",
@@ -72,11 +74,14 @@ def evaluate(
         run = Run(out)
         with run.writing():
             run.keep(opened, judged_by)
-    cores = workers or os.cpu_count() or 1
     if run is None:
         completions = opened.checked(judged_by, wanted)
         rows: Iterator[dict[str, Any]] = judge_all(
-            completions, judged_by, ablated=ablation, workers=cores, require_isolation=require_isolation
+            completions,
+            judged_by,
+            ablated=ablation,
+            workers=workers or cores(),
+            require_isolation=require_isolation,
         )
     else:
         rows = evaluate_run(
@@ -85,10 +90,11 @@ def evaluate(
             ablated=ablation,
             tasks=wanted,
             redo=redo,
-            workers=cores,
+            workers=workers or cores(),
             require_isolation=require_isolation,
         )
-    print_summary(watched(rows, total), judged_by, title=str(source), ablated=ablation, as_json=json)
+    title = f"{source} (programs written by hand)" if source.startswith("recorded") else source
+    print_summary(watched(rows, total), judged_by, title=title, ablated=ablation, as_json=json)
     if run is not None:
         note(f"verdicts are in {run.path}; `roboeval show {run.path} TASK/PROMPT/INDEX` says why one fails")
 
@@ -120,7 +126,7 @@ def show(
 def tasks(
     task: Annotated[str | None, typer.Argument(help="Show this task.")] = None,
     suite: SuiteOption = "paper",
-    lint: Annotated[bool, typer.Option("--lint", help="Look for faults in the tasks.")] = False,
+    lint: Annotated[bool, typer.Option("--lint", help="Look for faults; status 1 if there are any.")] = False,
     new: Annotated[
         str | None, typer.Option(help="Start a task of this name in the folder of --suite.")
     ] = None,
@@ -222,7 +228,15 @@ def print_summary(
 
 
 def lint_tasks(suite: Suite, task: str | None) -> None:
-    """Print what the linter finds in all tasks or one."""
+    """Print what the linter finds in all tasks or one; status 1 if anything is open."""
+    from roboeval.lint import lint, render
+
+    wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
+    linted = (lint(one, suite) for one in wanted)
+    findings = [found for several in watched(linted, len(wanted), "linting") for found in several]
+    print(render(findings))
+    if any(finding.accepted is None for finding in findings):
+        raise SystemExit(1)
 
 
 def print_rich(what: RenderableType) -> None:
@@ -245,20 +259,25 @@ def print_json(data: object) -> None:
     print(json.dumps(data, indent=2))
 
 
-def watched(rows: Iterable[dict[str, Any]], total: int) -> Iterator[dict[str, Any]]:
-    """Pass rows on, with a progress bar where somebody watches and a line now and then where nobody does."""
+def watched(rows: Iterable[Item], total: int, doing: str = "judging") -> Iterator[Item]:
+    """Pass things on, with a progress bar where somebody watches and a line now and then where nobody does."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    columns = (TextColumn("judging"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        job = progress.add_task("judging", total=total)
+        job = progress.add_task(doing, total=total)
         for done, row in enumerate(rows, 1):
             progress.update(job, completed=done)
             if not console.is_terminal and done % 1000 == 0:
-                note(f"judged {done:,} of {total:,}")
+                note(f"{doing}: {done:,} of {total:,}")
             yield row
+
+
+def cores() -> int:
+    """How many programs to run at the same time."""
+    return os.cpu_count() or 1
 
 
 def note(sentence: str) -> None:

@@ -1,7 +1,8 @@
 """Finds faults in tasks: requirements that can never decide anything, and checks that nothing uses or trips.
 
-That a requirement is `unsatisfiable` or `implied` is decided by `roboeval.satisfiability`: not by trying some
-traces but for all sequences of representative events, so that only a text unlike all samples could refute it.
+Whether a requirement is `unsatisfiable` or `implied` is decided by RTL alone, for all sequences of
+representative events (see `roboeval.satisfiability`), first with visits that name one room of the world each,
+then with any. Only a text unlike all samples, or an option that is no text, could refute such a finding.
 """
 
 from __future__ import annotations
@@ -67,6 +68,12 @@ class Finding:
         """By which a task file accepts it, such as `implied: comes_back`."""
         return f"{self.kind}: {self.subject}"
 
+    def told(self) -> str:
+        """As a line for a reader, with the path as seen from the current folder."""
+        here = Path.cwd()
+        path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
+        return f"{path}:{self.line or 1}: warning: {self.message} [{self.kind}]"
+
 
 def lint_suite(suite: Suite, *, workers: int = 1) -> list[Finding]:
     """Look for mistakes in all tasks of a suite.
@@ -98,12 +105,12 @@ def lint(task: Task, suite: Suite, *, verdicts: Sequence[Verdicts] | None = None
     """
     if verdicts is None:
         verdicts = judged([task], suite)[task.name]
-    rooms = [_Place(task, *numbered) for numbered in _scenarios(task)]
+    places = [_Place(task, *numbered) for numbered in _scenarios(task)]
     found = [
         *_unused(task),
         *_untripped(task, verdicts),
         *_same_worlds(task),
-        *(finding for room in rooms for finding in room.findings()),
+        *(finding for place in places for finding in place.findings()),
     ]
     distinct = {(finding.name, finding.line): finding for finding in reversed(found)}
     ordered = sorted(distinct.values(), key=lambda finding: (finding.line or 0, finding.name))
@@ -118,14 +125,11 @@ def render(findings: Iterable[Finding]) -> str:
         findings: what was found.
     """
     every = [*findings]
-    lines = [
-        f"{_near(one.path)}:{one.line or 1}: warning: {one.message} [{one.kind}]"
-        for one in every
-        if one.accepted is None
-    ]
+    lines = [one.told() for one in every if one.accepted is None]
     if accepted := len(every) - len(lines):
-        plural = "finding is" if accepted == 1 else "findings are"
-        lines.append(f"{accepted} more {plural} accepted by the task files")
+        lines.append(
+            f"{accepted} {'finding is' if accepted == 1 else 'findings are'} accepted by the task files"
+        )
     return "\n".join(lines)
 
 
@@ -144,17 +148,13 @@ def judged(tasks: Iterable[Task], suite: Suite, *, workers: int = 1) -> Mapping[
         BadInput: a file of recorded programs is wrong.
         EngineError: no isolated process can be started.
     """
-    judges = [
-        (task, scenarios) for task in tasks for scenarios in (task.scenarios, task.ablation) if scenarios
-    ]
-    runs = [
-        (task.name, program, scenarios) for task, scenarios in judges for program in recorded_programs(task)
-    ]
-    pairs = ((program, scenario.world) for _, program, scenarios in runs for scenario in scenarios)
-    outcomes = run(pairs, workers=workers, rules=suite.rules)
+    judges = [(task, worlds) for task in tasks for worlds in (task.scenarios, task.ablation) if worlds]
+    runs = [(task.name, program, worlds) for task, worlds in judges for program in recorded_programs(task)]
+    pairs = ((program, scenario.world) for _, program, worlds in runs for scenario in worlds)
+    outcomes = iter([*run(pairs, workers=workers, rules=suite.rules)])
     verdicts: dict[str, list[Verdicts]] = {task.name: [] for task in suite.tasks.values()}
-    for name, _, scenarios in runs:
-        verdicts[name].append([judge(next(outcomes), scenario) for scenario in scenarios])
+    for name, _, worlds in runs:
+        verdicts[name].append([judge(next(outcomes), scenario) for scenario in worlds])
     return verdicts
 
 
@@ -264,10 +264,9 @@ class _Place:
 
     def unsatisfiable(self, involved: Sequence[Requirement], condition: str) -> Finding:
         subject = " and ".join(r.text for r in involved)
-        never = "can never hold" if len(involved) == 1 else "can never hold together"
-        return self.finding(
-            "unsatisfiable", subject, f'"{subject}" {never} in {self.where}{condition}', involved[-1].line
-        )
+        together = "" if len(involved) == 1 else " together"
+        message = f'"{subject}" can never hold{together} in {self.where}{condition}'
+        return self.finding("unsatisfiable", subject, message, involved[-1].line)
 
     def implied(self, requirement: Requirement, others: Sequence[Requirement]) -> Iterator[Finding]:
         subject, line = requirement.text, requirement.line
@@ -321,7 +320,7 @@ class _Place:
             for text in _texts(element):
                 subject = f"{text} in {requirement.check}"
                 if not can_match(text):
-                    message = f'no text can match {text}, for which "{requirement.check}" looks'
+                    message = f'no text was found that matches {text}, for which "{requirement.check}" looks'
                     yield self.finding("dead-regex", subject, message, line)
                 elif element.kind == "goto" and not self.leads_somewhere(text):
                     message = (
@@ -397,7 +396,3 @@ def _stale(findings: Sequence[Finding], task: Task) -> Iterator[Finding]:
             line = YamlFile.read(task.path).line(("accepted", index))
             message = f'"{accepted.finding}" is accepted but not found; remove the entry'
             yield Finding("stale-acceptance", accepted.finding, message, task.path, line)
-
-
-def _near(path: Path) -> Path:
-    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -375,11 +375,19 @@ def representative_events(wanted: Iterable[Element]) -> list[Event]:
     events = []
     for kind, alike in kinds.items():
         texts = representative_texts(_distinct(element.text for element in alike))
-        choices: list[tuple[Option, ...]] = [()]
-        if options := _distinct(element.options for element in alike if element.options is not None):
-            choices += [(Option(text),) for text in representative_texts(options)]
+        choices = _choices(_distinct(element.options for element in alike if element.options is not None))
         events += [Event(kind, text, choice) for text in texts for choice in choices]
     return events
+
+
+def _choices(wanted: tuple[Text, ...]) -> Iterable[tuple[Option, ...]]:
+    """Options of which some match, in all combinations; one may match what another cannot match as well."""
+    found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
+    for text in representative_texts(wanted):
+        matched = frozenset(one for one in wanted if one.matches(text))
+        for already, choice in tuple(found.items()):
+            found.setdefault(already | matched, (*choice, Option(text)))
+    return found.values()
 
 
 def _distinct(texts: Iterable[Text]) -> tuple[Text, ...]:

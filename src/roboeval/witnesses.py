@@ -7,6 +7,7 @@ there may still be one, so "no text was found" is as much as can be said.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import import_module
@@ -18,6 +19,7 @@ from codebotler.rtl import Regex, Text, Without, Words
 
 _MOST_SAMPLES = 4
 _MOST_SUBSETS = 400
+_LONGEST = 10_000
 
 
 @cache
@@ -117,7 +119,9 @@ def _forbidden(pattern: str) -> tuple[str, ...]:
 
 
 def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
-    return import_module("re._parser").parse(pattern, re.IGNORECASE | re.DOTALL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        return import_module("re._parser").parse(pattern, re.IGNORECASE | re.DOTALL)
 
 
 def _spelled(items: Any) -> list[str]:  # noqa: ANN401 - the same
@@ -146,7 +150,7 @@ def _spelled_one(op: str, value: Any) -> list[str]:  # noqa: ANN401, PLR0911 - t
             return _spelled(value)
         case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
             least, _, items = value
-            repeated = [text * min(max(least, 1), 100) for text in _spelled(items)]
+            repeated = [text * max(least, 1) for text in _spelled(items) if len(text) * least <= _LONGEST]
             return repeated if least else ["", *repeated]
     return [""]
 

@@ -1,0 +1,191 @@
+"""One run, seen from outside: answers what a program asks of its robot, and says how the run ended."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import dataclass
+
+from codebotler.simulator.child import Child, LostChildError, ProtocolError
+from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
+from codebotler.skills import Skill
+from codebotler.trace import Option, Outcome, RunError, Status
+
+MEMORY = 512 * 1024 * 1024
+CPU_SECONDS = 5
+OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
+
+
+class Conversation:
+    """One run: answers what the child asks until it ends, and says how it ended.
+
+    Args:
+        child: the fresh child.
+        source: the program.
+        robot: who executes its skills.
+
+    Raises:
+        LostChildError: the child ended before its walls were closed.
+    """
+
+    def __init__(self, child: Child, source: str, robot: SimulatedRobot) -> None:
+        self.child, self.robot, self.limits = child, robot, robot.rules.limits
+        self.ledger = Ledger()
+        self.errors: list[RobotError] = []
+        child.send(
+            {
+                "source": source,
+                "literals": robot.rules.literals,
+                "skills": [
+                    [s.name, [[p.name, p.type.__name__] for p in s.parameters]] for s in robot.skills.values()
+                ],
+                "ticks": self.limits.ticks,
+                "seconds": self.limits.seconds,
+                "clock": robot.rules.clock_starts.timestamp(),
+                "memory": MEMORY,
+                "cpu": CPU_SECONDS,
+            }
+        )
+        if child.receive() != "ready":
+            child.end()
+            raise LostChildError("a child ended before it was closed")
+
+    def outcome(self) -> Outcome:
+        """Talk to the end."""
+        try:
+            final = self._talk()
+        except TimeoutError:
+            self.ledger.limit = "it waits for something that can never come"
+            final = None
+        except ProtocolError as error:
+            self.child.end()
+            return self._outcome(Status.KILLED, "Crash", f"the program spoke on the robot's line: {error}")
+        status = self.child.end() if final or self.ledger.limit else self.child.ended()
+        if self.ledger.limit is not None:
+            line = final.get("line") if final else None
+            return self._outcome(Status.TIMEOUT, "TimeoutError", self.ledger.limit, line)
+        return self._died(status) if final is None else self._ended(final)
+
+    def _talk(self) -> dict[str, object] | None:
+        overrun = 0
+        while (message := self.child.receive()) is not None:
+            if isinstance(message, dict):
+                return message
+            match message:
+                case [str() as name, list() as values, int() | float() as now]:
+                    self.child.send(self._answer(name, values, now))
+                case _:
+                    raise ProtocolError("a request is malformed")
+            overrun += self.ledger.limit is not None
+            if overrun > OVERRUN:
+                return None
+        return None
+
+    def _answer(self, name: str, values: list[object], now: float) -> tuple[str, object]:
+        if self.ledger.limit is None:
+            self._let_time_pass(now)
+        if self.ledger.limit is None:
+            if name in self.robot.skills:
+                return self._perform(self.robot.skills[name], values)
+            if name != "too-long":
+                raise ProtocolError("there is no such skill")
+            self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
+        return ("stop", None)
+
+    def _let_time_pass(self, now: float) -> None:
+        if now > self.limits.seconds:
+            now = self.limits.seconds
+            self.ledger.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
+        if now >= self.robot.now:  # else the program has found the channel, and deceives itself
+            self.robot.now = float(now)
+
+    def _perform(self, skill: Skill, values: list[object]) -> tuple[str, object]:
+        arguments = _arguments(skill, values)
+        self.ledger.calls += 1
+        texts = [t for a in arguments for t in ([a] if isinstance(a, str) else [o.text for o in a])]
+        self.ledger.text += sum(map(len, texts))
+        if self.ledger.calls > self.limits.calls:
+            self.ledger.limit = f"{self.limits.calls:,} skill calls"
+        elif any(len(text) > self.limits.text for text in texts):
+            self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
+        elif self.ledger.text > self.limits.trace:
+            self.ledger.limit = f"texts of more than {self.limits.trace:,} characters in all"
+        if self.ledger.limit is not None:
+            return ("stop", None)
+        try:
+            return ("ok", self.robot.perform(skill.name, arguments))
+        except RobotError as error:
+            self.errors.append(error)
+            return ("error", [len(self.errors) - 1, error.kind, str(error)])
+
+    def _ended(self, final: dict[str, object]) -> Outcome:
+        line = final.get("line")
+        match final:
+            case {"end": "finished"}:
+                return Outcome(Status.FINISHED, self.robot.trace)
+            case {"end": "timeout"}:
+                return self._outcome(
+                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
+                )
+            case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.errors):
+                error = self.errors[number]
+                return self._outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
+            case {"end": "python-error", "kind": str(kind), "message": str(message)}:
+                name = kind if kind.isidentifier() else "Exception"
+                return self._outcome(Status.PYTHON_ERROR, name[:100], message[:1000], line)
+            case _:
+                return self._outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")
+
+    def _died(self, status: int) -> Outcome:
+        if status == -signal.SIGXCPU:
+            return self._outcome(
+                Status.TIMEOUT, "TimeoutError", f"{CPU_SECONDS} seconds of processor time in one step"
+            )
+        if status == -signal.SIGSYS:
+            return self._outcome(
+                Status.KILLED, "ForbiddenCall", "the program asked the kernel for what is forbidden"
+            )
+        if status == -signal.SIGKILL:
+            return self._outcome(Status.KILLED, "MemoryError", "the process was killed from outside")
+        how = f"signal {-status}" if status < 0 else f"exit status {status}"
+        return self._outcome(Status.KILLED, "Crash", f"the process ended by itself ({how})")
+
+    def _outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
+        where = line if isinstance(line, int) and line > 0 else None
+        return Outcome(status, self.robot.trace, RunError(kind, message), where)
+
+
+def _arguments(skill: Skill, values: list[object]) -> list[Argument]:
+    if len(values) != len(skill.parameters):
+        raise ProtocolError("a skill has other parameters")
+    arguments: list[Argument] = []
+    for parameter, value in zip(skill.parameters, values, strict=True):
+        if parameter.type is str and isinstance(value, str):
+            arguments.append(value)
+        elif parameter.type is list and isinstance(value, list):
+            arguments.append(tuple(_option(option) for option in value))
+        else:
+            raise ProtocolError("an argument is of another type")
+    return arguments
+
+
+def _option(value: object) -> Option:
+    match value:
+        case [str(text), bool(is_text)]:
+            return Option(text, is_text)
+        case _:
+            raise ProtocolError("an option is malformed")
+
+
+@dataclass
+class Ledger:
+    """What a run has spent, kept on this side of the wall.
+
+    Args:
+        calls: skill calls.
+        text: characters of all texts.
+        limit: the limit that was reached, in words.
+    """
+
+    calls: int = 0
+    text: int = 0
+    limit: str | None = None
