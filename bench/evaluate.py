@@ -18,10 +18,11 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from codebotler.simulator import sandbox
 from codebotler.simulator.engine import Lanes, simulate
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
+from codebotler.simulator.sandbox.execution import BudgetSpentError, Run
+from codebotler.simulator.sandbox.ticks import ENTER, ENTRY, TICK, prepared
 from codebotler.trace import Option, Status
 from codebotler.world import World
 from roboeval.records import recorded_completions
@@ -65,7 +66,7 @@ def isolated(lanes: Lanes, part: Sequence[Pair]) -> list[Status]:
     return list(lanes.map_distinct(one, range(len(part))))
 
 
-class Bare(sandbox.Run):
+class Bare(Run):
     """A program that runs in this process and calls the simulated robot as a function."""
 
     def __init__(self, robot: SimulatedRobot) -> None:
@@ -79,7 +80,7 @@ class Bare(sandbox.Run):
         self.calls += name != "sleep"
         self.spent = name == "sleep" or self.calls > PAPER.limits.calls
         if self.spent:
-            raise sandbox.BudgetSpentError
+            raise BudgetSpentError
         arguments = [
             tuple(Option(text, is_text) for text, is_text in value) if isinstance(value, list) else value
             for value in values
@@ -91,7 +92,7 @@ class Bare(sandbox.Run):
 def compiled(source: str) -> types.CodeType | BaseException:
     """A program's code, or why there is none."""
     try:
-        return sandbox.prepared(source, lowercase=True)
+        return prepared(source, lowercase=True)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         return error
 
@@ -104,8 +105,10 @@ def run_bare(pair: Pair) -> None:
         return
     run = Bare(SimulatedRobot(world))
     namespace = {"__name__": "__main__", **run.names()}
-    setattr(builtins, sandbox.TICK, run.ticker())
-    setattr(builtins, sandbox.ENTER, run.enter)
+    tick = run.ticker()
+    setattr(builtins, TICK, tick)
+    setattr(builtins, ENTRY, tick)
+    setattr(builtins, ENTER, run.enter)
     time.sleep = run.sleep
     try:
         exec(code, namespace)

@@ -260,7 +260,7 @@ def print_json(data: object) -> None:
 
 
 def watched(rows: Iterable[Item], total: int, doing: str = "judging") -> Iterator[Item]:
-    """Pass things on, with a progress bar where somebody watches and a line now and then where nobody does."""
+    """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 

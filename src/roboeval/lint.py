@@ -72,7 +72,7 @@ class Finding:
         """As a line for a reader, with the path as seen from the current folder."""
         here = Path.cwd()
         path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
-        return f"{path}:{self.line or 1}: warning: {self.message} [{self.kind}]"
+        return f"{path}:{self.line or 1}: warning: {self.message} [{self.name}]"
 
 
 def lint_suite(suite: Suite, *, workers: int = 1) -> list[Finding]:

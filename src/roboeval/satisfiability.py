@@ -41,6 +41,10 @@ MOST_VISITED = 20_000
 """How many states of a product are visited."""
 
 
+States: TypeAlias = tuple[int, ...]
+"""One state of each automaton of a product."""
+
+
 class Undecided(Exception):  # noqa: N818 - no mistake of the caller
     """More states would have to be visited than there is time for."""
 
@@ -104,12 +108,11 @@ class Reasoner:
         if denied is not None:
             automaton, letters = self._reading(denied)
             readings.append((automaton.complement, letters))
-        automata = [automaton for automaton, _ in readings]
         # Events that no automaton tells apart are one letter of their product.
         alphabet: dict[tuple[int, ...], Event] = {}
         for event, *letters_of_event in zip(self.events, *(letters for _, letters in readings), strict=True):
             alphabet.setdefault(tuple(letters_of_event), event)
-        return _path(automata, alphabet)
+        return _path([automaton for automaton, _ in readings], alphabet)
 
     def _reading(self, formula: Formula) -> tuple[Automaton, tuple[int, ...]]:
         """The formula's automaton, and which of its letters each representative event is."""
@@ -125,7 +128,7 @@ class Reasoner:
 def _path(automata: Sequence[Automaton], alphabet: Mapping[tuple[int, ...], Event]) -> Trace | None:
     """Events that lead all automata to acceptance, found by going first where acceptance is nearest."""
     start = (0,) * len(automata)
-    came: dict[tuple[int, ...], tuple[tuple[int, ...], Event] | None] = {start: None}
+    came: dict[States, tuple[States, Event] | None] = {start: None}
     tables = [(automaton.rows, automaton.distances) for automaton in automata]
     steps = count()
     heap = [(0, 0, start)]
@@ -147,9 +150,7 @@ def _path(automata: Sequence[Automaton], alphabet: Mapping[tuple[int, ...], Even
     return None
 
 
-def _back(
-    state: tuple[int, ...], came: Mapping[tuple[int, ...], tuple[tuple[int, ...], Event] | None]
-) -> Iterator[Event]:
+def _back(state: States, came: Mapping[States, tuple[States, Event] | None]) -> Iterator[Event]:
     while (step := came[state]) is not None:
         state, event = step
         yield event

@@ -271,3 +271,17 @@ def test_layout_is_a_hallway_with_rooms_on_both_sides_and_keeps_standing_points(
     assert b.stand_at == (9.0, 9.0)
     assert laid_out(world).may_wait_forever
     assert laid_out(laid_out(world)) == laid_out(world)
+
+
+def test_rooms_without_a_place_stand_a_hallway_to_the_right_of_those_with_one() -> None:
+    given = ((-1.0, 0.0), (7.0, 0.0), (7.0, 5.0))
+    world = World((Room("new"), Room("given", footprint=given)), "new")
+    assert extent(laid_out(world).rooms[0])[0] == 7 + HALLWAY
+
+
+def test_world_file_is_written_for_people_to_read() -> None:
+    world = World((Room("café", ("Ölkanne",), (Person("Łucja", ("tak",)),)), Room("hall")), "café", "früh")
+    assert world.to_yaml() == (
+        "about: früh\nrobot: café\nrooms:\n- café\n- hall\nobjects:\n  café:\n  - Ölkanne\n"
+        "people:\n  café:\n  - name: Łucja\n    answers:\n    - tak\n"
+    )

@@ -208,6 +208,7 @@ def test_something_that_is_not_in_the_world(linted: Lint, formula: str) -> None:
         'goto("conference")',
         'goto("the conference room")',
         'goto(".*")',
+        'goto("(attic)?")',
         'pick("mug")',
         'check("red mug")',
         'check("person")',
@@ -251,7 +252,7 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     findings = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
     path = findings[0].path
     monkeypatch.chdir(path.parent)
-    line = 'Hello.yaml:6: warning: no world requires the check "goes"; require it or remove it [unused]'
+    line = 'Hello.yaml:6: warning: no world requires the check "goes"; require it or remove it [unused: goes]'
     assert render(findings) == line
     accepted = replace(findings[0], accepted="for later")
     assert render([*findings, accepted]) == f"{line}\n1 finding is accepted by the task files"

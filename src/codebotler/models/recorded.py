@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.badinput import BadInput, YamlFile
 
@@ -79,8 +80,9 @@ def read_replies(path: Path) -> Mapping[str, tuple[Reply, ...]]:
         BadInput: it is missing or wrong.
     """
     file = YamlFile.read(path)
-    data = file.data if isinstance(file.data, list) else []
-    recordings = [file.validate(RecordingFile, item, at=(index,)) for index, item in enumerate(data)]
+    if not isinstance(file.data, list):
+        raise file.wrong("this is no list of instructions with their replies; start each with a dash")
+    recordings = [file.validate(RecordingFile, item, at=(index,)) for index, item in enumerate(file.data)]
     return {
         recording.instruction: tuple(Reply(r.about, r.program, r.fails) for r in recording.replies)
         for recording in recordings
@@ -103,4 +105,4 @@ class RecordingFile(_Form):
     """An instruction and its replies as the file writes them."""
 
     instruction: str
-    replies: list[ReplyFile]
+    replies: Annotated[list[ReplyFile], Field(min_length=1)]

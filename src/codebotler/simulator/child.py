@@ -14,7 +14,6 @@ from pathlib import Path
 
 from codebotler.simulator.sandbox.channel import HEADER, MAX_FRAME
 
-
 SENDING = 30.0  # seconds for a long program on a busy machine; a child that does not listen is ended
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
@@ -87,9 +86,12 @@ class Child:
 
 def _parsed(frame: bytes) -> object:
     try:
-        return json.loads(frame)
+        message: object = json.loads(frame)
     except (ValueError, RecursionError):
-        raise ProtocolError("a frame is no JSON") from None
+        message = None
+    if message is None:
+        raise ProtocolError("a frame says nothing")
+    return message
 
 
 class Stuck:

@@ -59,6 +59,9 @@ class Conversation:
         except ProtocolError as error:
             self.child.end()
             return self._outcome(Status.KILLED, "Crash", f"the program spoke on the robot's line: {error}")
+        except BaseException:
+            self.child.end()
+            raise
         status = self.child.end() if final or self.ledger.limit else self.child.ended()
         if self.ledger.limit is not None:
             line = final.get("line") if final else None

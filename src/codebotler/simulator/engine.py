@@ -102,12 +102,14 @@ class Lanes:
             LOG.warning(NO_SECCOMP)
         self._lanes = [first]
         self._idle = [first]
+        self._stopping = False
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown(wait=False, cancel_futures=True)
+        self._stopping = True
         for lane in self._lanes:
             lane.stop()
         self._pool.shutdown(wait=True)
@@ -123,6 +125,8 @@ class Lanes:
             except IndexError:
                 lane = Lane()
                 self._lanes.append(lane)
+                if self._stopping:
+                    lane.stop()
             self._local.lane = lane
         return lane
 

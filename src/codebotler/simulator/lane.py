@@ -96,9 +96,9 @@ class Lane:
 
     def _fork(self) -> Child:
         ours, theirs = socket.socketpair()
-        with theirs:
-            socket.send_fds(self._door, [b"x"], [theirs.fileno()])
         try:
+            with theirs:
+                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
             os.write(self._wake, b"x")
             pid = self._read_report()
         except (LostChildError, OSError):

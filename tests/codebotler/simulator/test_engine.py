@@ -72,13 +72,9 @@ def are_gone(pids: set[int]) -> bool:
 
 
 def zygotes() -> set[int]:
-    """The processes directly below this one that fork those of the runs."""
-    below = {pid for pid in children_of(os.getpid()) if parent_of(pid) == os.getpid()}
-    return {pid for pid in below if b"zygote.py" in Path(f"/proc/{pid}/cmdline").read_bytes()}
-
-
-def parent_of(pid: int) -> int:
-    return int(Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[1])
+    """The processes directly below this one, which fork those of the runs."""
+    below = children_of(os.getpid())
+    return below - {grandchild for child in below for grandchild in children_of(child)}
 
 
 def links_in(folder: Path) -> list[Path]:

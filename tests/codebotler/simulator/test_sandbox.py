@@ -190,12 +190,12 @@ WORKS: dict[str, tuple[str, object]] = {
     "recursion as deep for a function that calls a skill": (
         "n = 0\ndef f():\n    global n\n    get_current_location()\n    n += 1\n    f()\n"
         + task("try:\n    f()\nexcept RecursionError:\n    say(str(n))"),
-        ["984"],
+        ["990"],
     ),
     "recursion as deep for a function that only calls itself": (
         "n = 0\ndef f():\n    global n\n    n += 1\n    f()\n"
         + task("try:\n    f()\nexcept RecursionError:\n    say(str(n))"),
-        ["991"],
+        ["990"],
     ),
     "prints a gigabyte": (task("text = 'x' * 10**6\nfor i in range(1000): print(text)\nsay('a')"), ["a"]),
     "swallows a caught stop of its own": (task("try:\n    exit()\nexcept SystemExit:\n    say('a')"), ["a"]),
@@ -206,6 +206,7 @@ T = Status.TIMEOUT
 P = Status.PYTHON_ERROR
 ON_THE_LINE = "the program spoke on the robot's line"
 SPENT = "200,000 turns of loops"
+SUPPRESSED = "from contextlib import suppress\nwith suppress(BaseException):\n    while 1: pass\n"
 FAILS: dict[str, tuple[str, object]] = {
     "16 endless recursion keeps its class": (
         (
@@ -304,10 +305,10 @@ FAILS: dict[str, tuple[str, object]] = {
     ),
     "spends in a comprehension": (task("[0 for i in range(10**9)]"), (T, "TimeoutError", SPENT)),
     "spends in a lambda": (task("sum(map(lambda x: x, range(10**9)))"), (T, "TimeoutError", SPENT)),
-    "exits after the budget": (
-        task("try:\n    while True: pass\nexcept BaseException:\n    pass\nexit()"),
-        (T, "TimeoutError", SPENT),
-    ),
+    "exits after the budget": (task(SUPPRESSED + "exit()"), (T, "TimeoutError", SPENT)),
+    "ends after the budget": (task(SUPPRESSED + "1"), (T, "TimeoutError", SPENT)),
+    "fails after the budget": (task(SUPPRESSED + "1 / 0"), (T, "TimeoutError", SPENT)),
+    "acts after the budget": (task(SUPPRESSED + "say('a')"), (T, "TimeoutError", SPENT)),
     "one turn too many": (task("for i in range(200_000): pass"), (T, "TimeoutError", SPENT)),
     "a text that is too long to send": (
         task("say('x' * 2_000_000)"),

@@ -10,7 +10,11 @@ from collections.abc import Callable
 from typing import Any
 
 from codebotler.simulator.sandbox.channel import receive, send
-from codebotler.simulator.sandbox.ticks import ENTER, PROGRAM, TICK, prepared
+from codebotler.simulator.sandbox.ticks import ENTER, ENTRY, PROGRAM, TICK, prepared
+
+# Python 3.11 counts calls into C as well: with one more, a function can call itself as often as under 3.12.
+RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
+HEADROOM = 50  # for what a skill calls, so that the limit is met by the program, not on the way to the robot
 
 
 class Run:
@@ -32,7 +36,10 @@ class Run:
         for name, function in self.names().items():
             setattr(namespace, name, function)
         sys.modules["__main__"] = namespace
-        setattr(builtins, TICK, self.ticker())
+        tick = self.ticker()
+        setattr(builtins, TICK, tick)
+        # A call deeper than what a skill needs before it lifts the limit of recursion: it meets the limit first.
+        setattr(builtins, ENTRY, lambda: tick())  # noqa: PLW0108 - the call in between is what it is for
         setattr(builtins, ENTER, self.enter)
         try:
             code = prepared(self.job["source"], lowercase=self.job["literals"] == "lowercase")
@@ -91,8 +98,17 @@ class Run:
         types_: list[tuple[str, type]] = [
             (parameter, list if kind == "list" else str) for parameter, kind in parameters
         ]
-        scope = {"perform": lambda *values: self.perform(name, types_, values)}
-        exec(f"def {name}({names}): return perform({arguments})", scope)  # noqa: S102 - of trusted text
+        scope = {
+            "perform": lambda *values: self.perform(name, types_, values),
+            "limit": sys.setrecursionlimit,
+        }
+        exec(  # noqa: S102 - of trusted text
+            f"def {name}({names}):\n"
+            f"    limit({RECURSION_LIMIT + HEADROOM})\n"
+            f"    try: return perform({arguments})\n"
+            f"    finally: limit({RECURSION_LIMIT})\n",
+            scope,
+        )
         return scope[name]
 
     def perform(self, name: str, parameters: list[tuple[str, type]], values: tuple[Any, ...]) -> Any:  # noqa: ANN401

@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
+import datetime as real  # noqa: ICN001 - the stand-ins bear its usual name
 import io
 import os
+import random
 import site
 import sys
+import time
+import timeit
 from typing import Any
 
-from codebotler.simulator.sandbox.execution import Run
-
-# Python 3.11 counts calls into C as well: with three more, a function can call itself as often as under 3.12.
-RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1003
+from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, Run
 
 
 def simulate_surroundings(run: Run) -> None:
     """Give the program a clock of the engine's, chance that repeats, an empty input, a deaf output."""
     simulate_time(run)
+    simulate_dates()
     simulate_chance()
     sys.stdin = io.StringIO("")
     sys.stdout = sys.stderr = io.TextIOWrapper(Nowhere(), encoding="utf-8", errors="replace")
     sys.argv = ["program"]
+    os.environ.clear()
     os.getpid = lambda: 1
     site.setquit()
     sys.setrecursionlimit(RECURSION_LIMIT)
@@ -39,10 +42,7 @@ class Nowhere(io.BufferedIOBase):
 
 
 def simulate_time(run: Run) -> None:
-    """Let `time` and `datetime` read the engine's clock."""
-    import datetime as real  # noqa: ICN001, PLC0415 - the module is changed, not used
-    import time  # noqa: PLC0415 - the same
-
+    """Let `time` and all that reads it follow the engine's clock."""
     start = run.job["clock"]
     for name in ("time", "monotonic", "perf_counter", "process_time", "thread_time"):
         origin = start if name == "time" else 0.0
@@ -59,13 +59,31 @@ def simulate_time(run: Run) -> None:
     time.strftime = lambda form, *when: strftime(form, *(when or [time.localtime()]))
     time.asctime = lambda *when: asctime(*(when or [time.localtime()]))
     time.ctime = lambda *seconds: asctime(time.localtime(*seconds))
+    timeit.default_timer = time.perf_counter
 
-    class date(real.date):  # noqa: N801 - it takes the place of the real one
+
+class Stand(type):
+    """The class of a class that takes the place of another: what is one of those is one of these."""
+
+    def __instancecheck__(cls, thing: object) -> bool:
+        return isinstance(thing, cls.__bases__[0])
+
+    def __subclasscheck__(cls, other: type) -> bool:
+        return issubclass(other, cls.__bases__[0])
+
+
+def simulate_dates() -> None:
+    """Let `datetime` read the time from `time`."""
+
+    class date(real.date, metaclass=Stand):  # noqa: N801 - it takes the place of the real one
         @classmethod
         def today(cls) -> date:
             return cls.fromtimestamp(time.time())
 
-    class datetime(real.datetime):  # noqa: N801 - the same
+        def __repr__(self) -> str:
+            return f"datetime.{super().__repr__()}"
+
+    class datetime(real.datetime, metaclass=Stand):  # noqa: N801 - the same
         @classmethod
         def now(cls, tz: real.tzinfo | None = None) -> datetime:
             return cls.fromtimestamp(time.time(), tz)
@@ -78,6 +96,9 @@ def simulate_time(run: Run) -> None:
         def today(cls) -> datetime:
             return cls.fromtimestamp(time.time())
 
+        def __repr__(self) -> str:
+            return f"datetime.{super().__repr__()}"
+
     for fake in (date, datetime):
         fake.__module__, fake.__qualname__ = "datetime", fake.__name__
         setattr(real, fake.__name__, fake)
@@ -85,7 +106,6 @@ def simulate_time(run: Run) -> None:
 
 def simulate_chance() -> None:
     """Let `random` repeat, also where a program asks for an unpredictable seed."""
-    import random  # noqa: PLC0415 - the module is changed, not used
 
     class Random(random.Random):
         def seed(self, a: Any = None, version: int = 2) -> None:  # noqa: ANN401 - as in random

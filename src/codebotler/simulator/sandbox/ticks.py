@@ -6,7 +6,7 @@ import ast
 import types
 
 PROGRAM = "<program>"
-TICK, ENTER = "<tick>", "<enter>"  # names that no source text can spell
+TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"  # names that no source text can spell
 
 
 def prepared(source: str, *, lowercase: bool) -> types.CodeType:
@@ -43,7 +43,7 @@ def add_ticks(node: ast.AST) -> None:
     """Count a node's turns or entries: a tick at the head of what it runs again."""
     match node:
         case ast.FunctionDef() | ast.AsyncFunctionDef():
-            head = [call(TICK, node.body[0])]
+            head = [call(ENTRY, node.body[0])]
             if node.name == "task_program":
                 head.append(call(ENTER, node.body[0]))
             at = 1 if ast.get_docstring(node, clean=False) is not None else 0
@@ -54,7 +54,7 @@ def add_ticks(node: ast.AST) -> None:
             if node.finalbody:
                 node.finalbody.insert(0, call(TICK, node.finalbody[0]))
         case ast.Lambda():
-            tick = call(TICK, node.body).value
+            tick = call(ENTRY, node.body).value
             node.body = ast.copy_location(ast.BoolOp(ast.Or(), [tick, node.body]), node.body)
         case ast.comprehension():
             tick = call(TICK, node.iter).value
