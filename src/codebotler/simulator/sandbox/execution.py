@@ -38,7 +38,7 @@ class Run:
         sys.modules["__main__"] = namespace
         tick = self.ticker()
         setattr(builtins, TICK, tick)
-        # A call deeper than what a skill needs before it lifts the limit of recursion: it meets the limit first.
+        # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
         setattr(builtins, ENTRY, lambda: tick())  # noqa: PLW0108 - the call in between is what it is for
         setattr(builtins, ENTER, self.enter)
         try:

@@ -53,13 +53,13 @@ def serve() -> None:
         pass
 
 
-def child(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None) -> NoReturn:
+def child(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None, parent: int) -> NoReturn:
     """Be the child of one run: take the channel, close the walls, run the program, say how it ended."""
     descriptors = socket.recv_fds(door, 1, 1)[1]
     os.dup2(descriptors[0], CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     job = receive()
-    enclose(job, seccomp)
+    enclose(job, seccomp, parent)
     send("ready")
     run = Run(job)
     simulate_surroundings(run)
@@ -77,10 +77,11 @@ def one_run(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None) ->
         return False
     with contextlib.suppress(ChildProcessError):
         os.waitpid(-1, 0)
+    parent = os.getpid()
     pid = os.fork()
     if pid == 0:
         try:
-            child(door, seccomp)
+            child(door, seccomp, parent)
         finally:
             os._exit(1)
     os.write(REPORT, struct.pack("=q", pid))

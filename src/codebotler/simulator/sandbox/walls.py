@@ -13,7 +13,7 @@ from typing import Any
 from codebotler.simulator.sandbox.channel import CHANNEL
 
 
-def enclose(job: dict[str, Any], seccomp: ctypes.Array[ctypes.c_char] | None) -> None:
+def enclose(job: dict[str, Any], seccomp: ctypes.Array[ctypes.c_char] | None, parent: int) -> None:
     """Close everything but the channel and give up every right, in the only order that works."""
     for name in ("CORE", "FSIZE", "NPROC", "MEMLOCK", "MSGQUEUE"):
         resource.setrlimit(getattr(resource, "RLIMIT_" + name), (0, 0))
@@ -25,6 +25,8 @@ def enclose(job: dict[str, Any], seccomp: ctypes.Array[ctypes.c_char] | None) ->
         os.setresgid(NOBODY, NOBODY, NOBODY)
         os.setresuid(NOBODY, NOBODY, NOBODY)
     prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before that: no signal will come
+        os._exit(1)
     prctl(PR_SET_DUMPABLE, 0)
     prctl(PR_SET_NO_NEW_PRIVS, 1)
     if seccomp is not None:
