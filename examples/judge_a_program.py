@@ -1,8 +1,9 @@
 """Judge a program in every world of a task, and say why it fails where it does."""
 
 from codebotler.rtl import explain
+from codebotler.tracefile import trace_from
 from roboeval.evaluate import evaluate
-from roboeval.records import Completion, trace_from
+from roboeval.records import Completion
 from roboeval.suite import load_suite
 
 PROGRAM = """

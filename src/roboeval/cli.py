@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
@@ -105,6 +105,7 @@ def show(
     what: Annotated[str | None, typer.Argument(help="TASK, TASK/PROMPT or TASK/PROMPT/INDEX.")] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
+    k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
@@ -115,7 +116,8 @@ def show(
     selection = parse_selection(what, judged_by)
     rows, completions = read_evaluation(run, judged_by, ablated=ablation)
     if selection.task is None:
-        print_summary(rows, judged_by, title=str(run), ablated=ablation, as_json=json)
+        ks = sorted({1, *(k or [])})
+        print_summary(rows, judged_by, title=str(run), ablated=ablation, as_json=json, k=ks)
     elif json:
         print_json(view_data(selection, rows, completions, judged_by, ablated=ablation))
     else:
@@ -200,7 +202,7 @@ def read_evaluation(
 ) -> tuple[list[dict[str, Any]], list[Completion]]:
     """A run's rows and the completions they judge."""
     from codebotler.badinput import BadInput
-    from roboeval.records import read_completions, read_rows
+    from roboeval.records import read_completions, read_evaluations
     from roboeval.run import Run, evaluation_key, load_head
 
     folder, key = Run(run), evaluation_key(suite, ablated=ablated)
@@ -211,16 +213,22 @@ def read_evaluation(
         raise BadInput(f"has not been judged; `roboeval evaluate {run}{flag}` does it", file=run)
     if load_head(folder.head(key)).get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
-    return [row for _, row in read_rows(folder.rows(key))], list(read_completions(folder.completions))
+    return [row for _, row in read_evaluations(folder.rows(key))], list(read_completions(folder.completions))
 
 
 def print_summary(
-    rows: Iterable[dict[str, Any]], suite: Suite, *, title: str, ablated: bool, as_json: bool
+    rows: Iterable[dict[str, Any]],
+    suite: Suite,
+    *,
+    title: str,
+    ablated: bool,
+    as_json: bool,
+    k: Sequence[int] = (1,),
 ) -> None:
     """Print the tables of an evaluation."""
     from roboeval.tables import render, summary, summary_data
 
-    counted = summary(rows, suite)
+    counted = summary(rows, suite, k=k)
     if as_json:
         print_json(summary_data(counted))
     else:

@@ -11,8 +11,9 @@ from codebotler.rtl import CannotJudge, holds
 from codebotler.simulator.engine import Lanes, simulate
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Outcome, Status, Trace
+from codebotler.tracefile import outcome_data
 from codebotler.world import World
-from roboeval.records import Completion, outcome_data, trace_data
+from roboeval.records import Completion
 from roboeval.suite import Requirement, Scenario, Suite
 from roboeval.taxonomy import Verdict, failure
 
@@ -97,12 +98,13 @@ def evaluation(completion: Completion, verdicts: list[Verdict]) -> dict[str, Any
 
 def verdict_data(verdict: Verdict) -> dict[str, Any]:
     """A verdict as a row writes it."""
+    outcome = outcome_data(verdict.outcome)
     return {
         "world": verdict.world,
         "satisfied": verdict.satisfied,
-        **outcome_data(verdict.outcome),
+        **{name: value for name, value in outcome.items() if name != "trace"},
         "failed_checks": [requirement.text for requirement in verdict.failed],
-        "trace": trace_data(verdict.outcome.trace),
+        "trace": outcome["trace"],
     }
 
 

@@ -16,7 +16,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from codebotler.badinput import BadInput, read_text
 from codebotler.models.recorded import recorded_model
-from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
 from roboeval.suite import Suite
 
 MAX_ROW = 5_000_000
@@ -127,6 +126,18 @@ def read_completions(path: Path) -> Iterator[Completion]:
         yield completion
     if not seen:
         raise BadInput("there is no completion in it", file=path)
+
+
+def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Read the rows of an evaluation with the numbers of their lines.
+
+    Raises:
+        BadInput: the file is missing, or a line is no row of an evaluation.
+    """
+    for number, row in read_rows(path):
+        if not row.keys() >= {"task", "prompt", "index", "passed", "failure", "verdicts"}:
+            raise BadInput("this line is no row of an evaluation; --redo starts over", file=path, line=number)
+        yield number, row
 
 
 def check_known(completions: Iterable[Completion], suite: Suite, source: object) -> Iterator[Completion]:
@@ -308,55 +319,3 @@ def whole_length(path: Path) -> int:
                 return start + end + 1
             position = start
     return 0
-
-
-# --- traces and outcomes in rows
-
-
-def trace_data(trace: Trace) -> list[list[Any]]:
-    """A trace as rows write it: `[kind, text]`, with what was found, or with options and answer."""
-    return [_event_data(event) for event in trace]
-
-
-def _event_data(event: Event) -> list[Any]:
-    if event.kind == "ask":
-        return ["ask", event.text, [_option_data(option) for option in event.options], event.answer]
-    if event.found is not None:
-        return [event.kind, event.text, event.found]
-    return [event.kind, event.text]
-
-
-def _option_data(option: Option) -> Any:  # noqa: ANN401 - JSON
-    return option.text if option.is_text else {"no text": option.text}
-
-
-def trace_from(data: Iterable[list[Any]]) -> Trace:
-    """The trace that a row holds; its events have no place and no time."""
-    return tuple(_event_from(element) for element in data)
-
-
-def _event_from(element: list[Any]) -> Event:
-    match element:
-        case ["ask", str(text), list(options), answer]:
-            return Event("ask", text, tuple(_option_from(o) for o in options), answer=answer)
-        case [str(kind), str(text), bool(found)]:
-            return Event(kind, text, found=found)
-        case [str(kind), str(text)]:
-            return Event(kind, text)
-    raise ValueError(f"{element!r} is no element of a trace")
-
-
-def _option_from(data: Any) -> Option:  # noqa: ANN401 - JSON
-    return Option(data) if isinstance(data, str) else Option(data["no text"], is_text=False)
-
-
-def outcome_data(outcome: Outcome) -> dict[str, Any]:
-    """The part of a verdict that says how the run ended."""
-    error = None if outcome.error is None else {"kind": outcome.error.kind, "message": outcome.error.message}
-    return {"status": outcome.status.value, "error": error, "line": outcome.line}
-
-
-def outcome_from(data: dict[str, Any]) -> Outcome:
-    """The outcome that a verdict holds."""
-    error = None if data["error"] is None else RunError(data["error"]["kind"], data["error"]["message"])
-    return Outcome(Status(data["status"]), trace_from(data["trace"]), error, data["line"])

@@ -22,7 +22,7 @@ from roboeval.records import (
     name_of,
     published_completions,
     read_completions,
-    read_rows,
+    read_evaluations,
     recorded_completions,
     to_line,
 )
@@ -191,7 +191,7 @@ def evaluate_run(
 
 
 def _judged(rows: Path, completions: Iterator[Completion]) -> Iterator[dict[str, Any]]:
-    for number, row in read_rows(rows):
+    for number, row in read_evaluations(rows):
         completion = next(completions, None)
         if completion is None or completion.key != (row["task"], row["prompt"], row["index"]):
             expected = "nothing more" if completion is None else name_of(completion.key)

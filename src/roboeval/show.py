@@ -16,8 +16,9 @@ from rich.text import Text
 from codebotler.rtl import explain
 from codebotler.simulator.robot import located, resolve_room
 from codebotler.trace import Event, Trace
+from codebotler.tracefile import trace_from
 from codebotler.world import World
-from roboeval.records import Completion, name_of, trace_from
+from roboeval.records import Completion, name_of
 from roboeval.suite import Scenario, Suite
 from roboeval.tables import (
     NOT_RECORDED,

@@ -237,6 +237,20 @@ def test_show_says_why(run: Path) -> None:
     assert "the robot never went to" in other
 
 
+def test_show_gives_pass_at_any_k_that_the_run_can_estimate(run: Path) -> None:
+    assert "pass@3" in roboeval("show", run, "--k", "3").out
+    assert "4" in refused("show", run, "--k", "4")
+
+
+def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row())
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
+    (tmp_path / "run" / "evaluations" / "paper.jsonl").write_text('{"task": "SayGoodDay"}\n')
+    expected = "run/evaluations/paper.jsonl, line 1: this line is no row of an evaluation; --redo starts over"
+    assert refused("show", "run", cwd=tmp_path) == expected
+    assert refused("evaluate", "run", cwd=tmp_path) == expected
+
+
 def test_export_writes_a_row_for_each_completion_and_world(run: Path) -> None:
     assert roboeval("export", run).status == 0
     rows = list(csv.DictReader((run / "evaluations" / "paper.csv").read_text().splitlines()))

@@ -1,0 +1,79 @@
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from codebotler.badinput import BadInput
+from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
+from codebotler.tracefile import outcome_data, outcome_yaml, read_outcome, trace_data, trace_from
+
+texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=10)
+options = st.builds(Option, texts, st.booleans())
+events = st.one_of(
+    st.builds(Event, st.sampled_from(["goto", "say", "pick", "place", "wave"]), texts),
+    st.builds(Event, st.just("check"), texts, found=st.booleans()),
+    st.builds(Event, st.just("ask"), texts, st.lists(options).map(tuple), st.none() | texts),
+)
+traces = st.lists(events, max_size=5).map(tuple)
+errors = st.builds(RunError, texts, texts)
+lines = st.none() | st.integers(1, 9999)
+outcomes = st.one_of(
+    st.builds(Outcome, st.just(Status.FINISHED), traces),
+    st.builds(
+        Outcome, st.sampled_from([s for s in Status if s is not Status.FINISHED]), traces, errors, lines
+    ),
+)
+
+
+@given(traces)
+def test_a_trace_comes_back_from_json(trace: Trace) -> None:
+    assert trace_from(json.loads(json.dumps(trace_data(trace)))) == trace
+
+
+@given(outcomes)
+def test_an_outcome_comes_back_from_yaml(tmp_path_factory: pytest.TempPathFactory, outcome: Outcome) -> None:
+    path = tmp_path_factory.getbasetemp() / "outcome.yaml"
+    path.write_text(outcome_yaml(outcome))
+    assert read_outcome(path) == outcome
+
+
+def test_the_data_of_an_outcome_are_those_of_a_row() -> None:
+    question = Event("ask", "Tea?", (Option("yes"), Option("1", is_text=False)), answer="yes")
+    trace = (Event("goto", "lab"), Event("check", "kim", found=True), question)
+    assert outcome_data(Outcome(Status.ROBOT_ERROR, trace, RunError("AskNoPerson", "nobody"), 4)) == {
+        "status": "robot-error",
+        "error": {"kind": "AskNoPerson", "message": "nobody"},
+        "line": 4,
+        "trace": [["goto", "lab"], ["check", "kim", True], ["ask", "Tea?", ["yes", {"no text": "1"}], "yes"]],
+    }
+
+
+GOOD = "status: robot-error\nerror: {kind: K, message: m}\nline: 3\ntrace:\n- [goto, lab]\n- [say, hi]\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("robot-error", "tired", "line 1: \"status\" is 'tired', but it should be 'finished'"),
+        ("status: robot-error\n", "", 'line 1: the key "status" is missing'),
+        ("error: {kind: K, message: m}\n", "", "an outcome has an error exactly when it is not finished"),
+        ("robot-error", "finished", "an outcome has an error exactly when it is not finished"),
+        ("kind: K", "kind: 3", 'line 2: "kind" is a number, not a text'),
+        ("line: 3", "line: 0", 'line 3: "line" is 0, but it should be greater than or equal to 1'),
+        ("line: 3", "place: lab", 'line 3: the key "place" means nothing here'),
+        ("[say, hi]", "[say]", "line 6: this entry is not as it should be: ['say'] is no element of a trace"),
+        ("[say, hi]", "[ask, q, [3], a]", "line 6: this entry is not as it should be: 3 is no option"),
+        ("[say, hi]", "say hi", "line 6: this entry is 'say hi', but 'say hi' is no element of a trace"),
+    ],
+)
+def test_a_wrong_file_gets_a_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+    assert old in GOOD
+    path = tmp_path / "o.yaml"
+    path.write_text(GOOD.replace(old, new))
+    with pytest.raises(BadInput) as caught:
+        read_outcome(path)
+    assert sentence in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
