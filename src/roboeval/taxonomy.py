@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from codebotler.trace import Outcome, Status
-from roboeval.suite import Category, Requirement
+from roboeval.suite import Requirement
+from roboeval.suitefile import Category
 
 PYTHON, ROBOT, TASK = "PythonError", "RobotExecutionError", "TaskCompletionError"
 CLASSES = (PYTHON, ROBOT, TASK)

@@ -1,0 +1,117 @@
+"""What a suite.yaml and a task file may say."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from codebotler.simulator.rules import Limits, Rules
+from codebotler.world import Name, PersonFile, Text, WorldFile
+
+Category = Literal[
+    "SayAtLocation",
+    "AskAtLocation",
+    "ManipulationAtLocation",
+    "CheckEntityAtLocation",
+    "InitialTerminal",
+    "EventOrdering",
+    "Location",
+    "ExhaustiveSearch",
+]
+Ability = Literal[
+    "navigation",
+    "perception",
+    "conversation",
+    "manipulation",
+    "announcement",
+    "report-back",
+    "waiting",
+    "arithmetic",
+    "commonsense",
+]
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CheckFile(_Form):
+    """A check as a task file writes it."""
+
+    category: Category
+    commonsense: bool = False
+    rtl: Text
+
+
+class FactFile(_Form):
+    """A fact as a task file writes it."""
+
+    fact: Text
+    words: Annotated[list[Text], Field(min_length=1)]
+    commonsense: bool = False
+
+
+class AcceptedFile(_Form):
+    """An accepted finding as a task file writes it."""
+
+    finding: Text
+    because: Text
+
+
+class ScenarioFile(WorldFile):
+    """A world with its requirements as a task file writes it."""
+
+    about: Name
+    require: Annotated[list[Text], Field(min_length=1)]
+    ablation: list[Text] | None = None
+    ablation_people: dict[str, list[PersonFile]] | None = None
+
+
+class TaskFile(_Form):
+    """A task file."""
+
+    name: Name
+    summary: Name
+    abilities: list[Ability] = []
+    prompts: Annotated[list[Name], Field(min_length=1)]
+    facts: list[FactFile] = []
+    checks: dict[str, CheckFile]
+    worlds: Annotated[list[ScenarioFile], Field(min_length=1)]
+    accepted: list[AcceptedFile] = []
+
+
+class LimitsFile(_Form):
+    """The limits as a suite file writes them."""
+
+    seconds: Annotated[float, Field(gt=0)] = 3600.0
+    calls: Annotated[int, Field(gt=0)] = 1_000
+    ticks: Annotated[int, Field(gt=0)] = 200_000
+
+
+class RulesFile(_Form):
+    """The rules as a suite file writes them."""
+
+    literals: Literal["lowercase", "as-written"] = "lowercase"
+    matching: Literal["label-in-request"] = "label-in-request"
+    people: Literal["answer-to-any-name"] = "answer-to-any-name"
+    limits: LimitsFile = LimitsFile()
+    skill_seconds: Literal[0] = 0
+    clock_starts: Annotated[
+        datetime, BeforeValidator(lambda v: v.isoformat() if isinstance(v, datetime) else v)
+    ] = Rules().clock_starts
+
+    def rules(self) -> Rules:
+        """The rules it describes."""
+        limits = Limits(self.limits.seconds, self.limits.calls, self.limits.ticks)
+        return Rules(self.literals, self.matching, self.people, limits, self.clock_starts)
+
+
+class SuiteFile(_Form):
+    """A suite.yaml."""
+
+    name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
+    version: int
+    about: Text = ""
+    rules: RulesFile = RulesFile()
