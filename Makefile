@@ -14,7 +14,7 @@ demo: $(VENV)/installed
 	@$(BIN)/roboeval evaluate recorded:hasty
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest $(TESTS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(TESTS)
 
 lint: $(VENV)/linted
 	$(BIN)/ruff check .

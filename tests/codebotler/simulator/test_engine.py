@@ -1,5 +1,6 @@
 """Runs of many programs: in order, once, the same everywhere, and nothing is left behind."""
 
+import contextlib
 import gc
 import os
 import signal
@@ -38,20 +39,22 @@ def doing(say: Behaviour) -> dict[str, Behaviour]:
     return {**BEHAVIOURS, "say": say}
 
 
+def parents() -> dict[int, int]:
+    """The parent of each process, at one moment."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            stat = (folder / "stat").read_text(encoding="ascii", errors="replace")
+            found[int(folder.name)] = int(stat.rpartition(")")[2].split()[1])
+    return found
+
+
 def children_of(pid: int) -> set[int]:
     """All processes below one."""
-    below: dict[int, list[int]] = {}
-    for folder in Path("/proc").glob("[0-9]*"):
-        try:
-            stat = (folder / "stat").read_text(encoding="ascii", errors="replace")
-        except OSError:
-            continue
-        below.setdefault(int(stat.rpartition(")")[2].split()[1]), []).append(int(folder.name))
-    found, open_ = set(), [pid]
-    while open_:
-        for child in below.get(open_.pop(), ()):
-            found.add(child)
-            open_.append(child)
+    above = parents()
+    found: set[int] = set()
+    while more := {one for one, parent in above.items() if parent in {pid, *found}} - found:
+        found |= more
     return found
 
 
@@ -73,8 +76,7 @@ def are_gone(pids: set[int]) -> bool:
 
 def zygotes() -> set[int]:
     """The processes directly below this one, which fork those of the runs."""
-    below = children_of(os.getpid())
-    return below - {grandchild for child in below for grandchild in children_of(child)}
+    return {pid for pid, parent in parents().items() if parent == os.getpid()}
 
 
 def links_in(folder: Path) -> list[Path]:
