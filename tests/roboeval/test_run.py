@@ -178,15 +178,36 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
     assert len(judged(run, paper)) == 1
 
 
-def test_another_suite_is_refused_unless_all_is_redone(tmp_path: Path, paper: Suite) -> None:
+@pytest.mark.parametrize(
+    ("name", "value", "what"),
+    [
+        ("digest", "0" * 64, "content of the suite"),
+        ("python", "2.7", "python"),
+        ("codebotler", "0.0.1", "version of this tool"),
+        ("tasks", ["LunchTime"], "tasks"),
+        ("ablation", True, "ablation"),
+    ],
+)
+def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
+    tmp_path: Path, paper: Suite, name: str, value: object, what: str
+) -> None:
     run = a_run(tmp_path / "run", [GREETS])
     judged(run, paper)
     about = json.loads(run.head("paper").read_text())
-    run.head("paper").write_text(json.dumps(about | {"digest": "0" * 64}))
-    with pytest.raises(BadInput, match=r"another content of the suite .* --redo starts over"):
+    run.head("paper").write_text(json.dumps(about | {name: value}))
+    with pytest.raises(BadInput, match=rf"was judged with another {what} \(.* --redo starts over"):
         judged(run, paper)
     assert len(judged(run, paper, redo=True)) == 1
     assert json.loads(run.head("paper").read_text()) == about
+
+
+def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    with run.completions.open("ab") as file:
+        file.write(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": GREETS}))
+    source = open_source(str(run.path), paper)
+    assert [c.task for c in source.checked(paper, frozenset({"LunchTime"}))] == ["LunchTime"]
+    assert [c.task for c in source.checked(paper)] == ["SayGoodDay", "LunchTime"]
 
 
 def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> None:

@@ -61,6 +61,12 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("[goes,", "[gose,", 'line 11: there is no check "gose"; add it under checks'),
         ("[goes,", '[goes("x"),', 'line 11: the check "goes" takes no argument, but "goes("x")" gives 1'),
         ('says("bye")', "says(bye)", "is no requirement; write check, check"),
+        ('says("bye")', 'says(what="bye")', "is no requirement; write check, check"),
+        (
+            'says("bye")]\n',
+            'says("bye")]\n    ablation: []\n  - {about: b, robot: r, rooms: [r], require: [goes]}\n',
+            "line 7: some worlds have an ablation and some have none",
+        ),
         ("require: [goes,", "demand: [goes,", 'line 8: the key "require" is missing'),
         ("robot: kitchen", "robot: hall", 'line 9: the robot starts in "hall", but the rooms are: kitchen'),
         ("summary: s", "summary: s\nsummary: t", 'line 3: the key "summary" stands here a second time'),
@@ -104,6 +110,9 @@ def test_the_hash_covers_what_verdicts_rest_on_and_no_comments(tmp_path: Path) -
         folder.mkdir()
         digests.append(load_suite(a_suite(folder, task)).digest)
     assert digests[0] == digests[1] != digests[2]
+    folder = tmp_path / "stricter"
+    folder.mkdir()
+    assert load_suite(a_suite(folder, suite=SUITE + "rules: {limits: {calls: 7}}\n")).digest != digests[0]
 
 
 def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) -> None:
