@@ -25,11 +25,12 @@ lint: $(VENV)/linted
 bench: $(VENV)/installed
 	$(BIN)/python bench/evaluate.py
 
-$(BIN)/python:
-	$(PYTHON) -m venv $(VENV)
-	$(PIP) install --upgrade "pip>=25.1"
+$(VENV)/made:
+	@$(PYTHON) -m venv --clear $(VENV)
+	@$(PIP) install --upgrade "pip>=25.1"
+	@touch $@
 
-$(VENV)/installed: $(SOURCES) | $(BIN)/python
+$(VENV)/installed: $(SOURCES) | $(VENV)/made
 	@echo "installing into $(VENV)"
 	@$(PIP) install --constraint constraints.txt --upgrade $(PACKAGE)
 	@touch $@

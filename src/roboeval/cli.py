@@ -213,7 +213,9 @@ def read_evaluation(
         raise BadInput(f"has not been judged; `roboeval evaluate {run}{flag}` does it", file=run)
     if load_head(folder.head(key)).get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
-    return [row for _, row in read_evaluations(folder.rows(key))], list(read_completions(folder.completions))
+    return [row for _, row in read_evaluations(folder.rows(key))], list(
+        read_completions(folder.completions, growing=True)
+    )
 
 
 def print_summary(

@@ -8,6 +8,7 @@ then with any. Only a text unlike all samples, or an option that is no text, cou
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,12 +21,12 @@ from codebotler.models.recorded import NAMES, read_replies, recorded_model
 from codebotler.rtl import Element, Formula, Regex, Text
 from codebotler.rtl.wording import listed
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import found_in, resolve_room
+from codebotler.simulator.robot import resolve_room
 from roboeval.evaluate import judge
 from roboeval.satisfiability import Reasoner, Undecided, elements
 from roboeval.suite import Requirement, Scenario, Suite, Task
 from roboeval.taxonomy import Verdict
-from roboeval.witnesses import can_match, patterns, representative_texts, samples
+from roboeval.witnesses import alternatives, can_match, is_among, patterns, representative_texts, samples
 
 Kind = Literal[
     "unsatisfiable",
@@ -265,7 +266,7 @@ class _Place:
     def unsatisfiable(self, involved: Sequence[Requirement], condition: str) -> Finding:
         subject = " and ".join(r.text for r in involved)
         together = "" if len(involved) == 1 else " together"
-        message = f'"{subject}" can never hold{together} in {self.where}{condition}'
+        message = f'no text was found with which "{subject}" can hold{together} in {self.where}{condition}'
         return self.finding("unsatisfiable", subject, message, involved[-1].line)
 
     def implied(self, requirement: Requirement, others: Sequence[Requirement]) -> Iterator[Finding]:
@@ -319,13 +320,12 @@ class _Place:
         for element in dict.fromkeys(elements(requirement.formula)):
             for text in _texts(element):
                 subject = f"{text} in {requirement.check}"
-                if not can_match(text):
+                if not can_match(text, outer=text is element.options):
                     message = f'no text was found that matches {text}, for which "{requirement.check}" looks'
                     yield self.finding("dead-regex", subject, message, line)
                 elif element.kind == "goto" and not self.leads_somewhere(text):
-                    message = (
-                        f'no visit that matches {text} in "{requirement.check}" gets anywhere in {self.where}'
-                    )
+                    there = f'in "{requirement.check}" and gets anywhere in {self.where}'
+                    message = f"no visit was found that matches {text} {there}"
                     yield self.finding("dead-regex", subject, message, line)
 
     def leads_somewhere(self, text: Text) -> bool:
@@ -336,7 +336,7 @@ class _Place:
 
     def absent(self, requirement: Requirement) -> Iterator[Finding]:
         for what, name, known in self.named(requirement):
-            if not _is_among(name, known):
+            if not is_among(name, known):
                 message = f'"{requirement.text}" is about the {what} "{name}", but {self.where} has none'
                 yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
 
@@ -354,10 +354,11 @@ class _Place:
         for element in elements(requirement.formula):
             if element.kind in sorts:
                 what, known = sorts[element.kind]
-                yield from ((what, pattern, known) for pattern in patterns(element.text))
+                found = (one for pattern in patterns(element.text) for one in alternatives(pattern))
+                yield from ((what, one, known) for one in found)
         check = next(check for check in self.task.checks if check.name == requirement.check)
         for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
-            if parameter == "person":
+            if parameter == "person" or argument.lower() in _people(self.task):
                 yield "person", argument, people
 
 
@@ -369,21 +370,18 @@ _PLAIN = ", as long as each visit names one room of the world"
 _PEOPLE = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
 
 
+def _people(task: Task) -> set[str]:
+    """Who is in some world of a task, or has an office or a lab there; their names in small letters."""
+    rooms = [room for _, scenario in _scenarios(task) for room in scenario.world.rooms]
+    owners = [re.fullmatch(r"(.+)'s (?:office|lab)", room.name, re.IGNORECASE) for room in rooms]
+    names = [*(person.name for room in rooms for person in room.people), *(o[1] for o in owners if o)]
+    return {name.lower() for name in names}
+
+
 def _arguments(requirement: Requirement) -> list[str]:
     call = ast.parse(requirement.text.strip().removeprefix("not "), mode="eval").body
     values = call.args if isinstance(call, ast.Call) else []
     return [str(value.value) for value in values if isinstance(value, ast.Constant)]
-
-
-def _is_among(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether something may be meant by a regex; true also of one that means anything, or nothing."""
-    wanted = Regex(pattern)
-    texts = samples(pattern)
-    return (
-        not texts
-        or wanted.matches("")
-        or any(wanted.matches(label) or any(found_in(label, text) for text in texts) for label in labels)
-    )
 
 
 # --- accepted findings

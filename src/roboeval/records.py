@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import json
+import lzma
 import os
 import re
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -19,6 +21,7 @@ from codebotler.models.recorded import recorded_model
 from roboeval.suite import Suite
 
 MAX_ROW = 5_000_000
+MAX_EVALUATION = 1_000_000_000  # of our own rows: a trace may be a million characters in each of many worlds
 COMPLETIONS = "completions.jsonl"
 
 Key: TypeAlias = tuple[str, int, int]
@@ -54,10 +57,16 @@ class Completion(BaseModel):
 # --- reading
 
 
-def read_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+def read_rows(
+    path: Path, *, limit: int = MAX_ROW, growing: bool = False
+) -> Iterator[tuple[int, dict[str, Any]]]:
     """Read a file of JSON lines: the line's number, counted from 1, and its object.
 
-    A last line without an end is one that a crash has torn; it is passed over.
+    Args:
+        path: the file.
+        limit: the longest line in bytes.
+        growing: whether it is one that we write: then a broken last line without an end was torn by a crash,
+            and is passed over.
 
     Raises:
         BadInput: the file is missing, or a line is too long or no JSON object.
@@ -70,15 +79,17 @@ def read_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
         raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
     with file:
         for number in _count():
-            line = file.readline(MAX_ROW + 1)
+            line = file.readline(limit + 1)
             if not line:
                 return
-            if len(line) > MAX_ROW:
-                raise BadInput(f"this row is longer than {MAX_ROW:,} bytes", file=path, line=number)
+            if len(line) > limit:
+                raise BadInput(f"this row is longer than {limit:,} bytes", file=path, line=number)
             if line.strip():
                 row = _parsed(line, path, number)
-                if row is None:
+                if row is None and growing and not line.endswith(b"\n"):
                     return
+                if row is None:
+                    raise BadInput("this line is no JSON", file=path, line=number)
                 yield number, row
 
 
@@ -92,22 +103,24 @@ def _parsed(line: bytes, path: Path, number: int) -> dict[str, Any] | None:
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
-        if not line.endswith(b"\n"):
-            return None
-        raise BadInput("this line is no JSON", file=path, line=number) from None
+        return None
     if not isinstance(row, dict):
         raise BadInput("this line is no JSON object", file=path, line=number)
     return row
 
 
-def read_completions(path: Path) -> Iterator[Completion]:
+def read_completions(path: Path, *, growing: bool = False) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
+
+    Args:
+        path: the file.
+        growing: whether it stands in a run, where a torn last line is passed over.
 
     Raises:
         BadInput: the file is missing or empty, or a row is wrong or repeats another.
     """
     seen: dict[Key, int] = {}
-    for number, row in read_rows(path):
+    for number, row in read_rows(path, growing=growing):
         try:
             completion = Completion.model_validate(row)
         except ValidationError as error:
@@ -134,7 +147,7 @@ def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
     Raises:
         BadInput: the file is missing, or a line is no row of an evaluation.
     """
-    for number, row in read_rows(path):
+    for number, row in read_rows(path, limit=MAX_EVALUATION, growing=True):
         if not row.keys() >= {"task", "prompt", "index", "passed", "failure", "verdicts"}:
             raise BadInput("this line is no row of an evaluation; --redo starts over", file=path, line=number)
         yield number, row
@@ -190,7 +203,17 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
         raise BadInput(f'{name} knows no instruction of the suite "{suite.name}"')
 
 
-PUBLISHED = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d+)_(?P<index>\d+)\.py")
+UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    UnicodeDecodeError,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+    OSError,
+)
+PUBLISHED = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
 
 
 def published_completions(path: Path) -> Iterator[Completion]:
@@ -238,7 +261,7 @@ def _zipped(path: Path) -> Iterator[tuple[str, str]]:
                     raise BadInput(f'"{member.filename}" is larger than {MAX_ROW:,} bytes', file=path)
                 if name.suffix == ".py":
                     yield f"{path}/{member.filename}", archive.read(member).decode()
-    except (zipfile.BadZipFile, UnicodeDecodeError, NotImplementedError, RuntimeError) as error:
+    except UNREADABLE as error:
         raise BadInput(f"is no readable zip ({error})", file=path) from None
 
 

@@ -73,7 +73,7 @@ def open_source(text: str, suite: Suite) -> Source:
         )
     if (path / COMPLETIONS).is_file():
         run = Run(path)
-        return Source(text, lambda: read_completions(run.completions), run)
+        return Source(text, lambda: read_completions(run.completions, growing=True), run)
     if path.is_dir() or path.suffix == ".zip":
         return Source(text, lambda: published_completions(path))
     return Source(text, lambda: read_completions(path))
@@ -168,7 +168,7 @@ def evaluate_run(
         BadInput: the run is being written, or was judged otherwise or holds other completions than it did.
     """
     key = evaluation_key(suite, ablated=ablated)
-    source = Source(str(run.completions), lambda: read_completions(run.completions), run)
+    source = Source(str(run.completions), lambda: read_completions(run.completions, growing=True), run)
     with run.writing():
         rows = run.rows(key)
         rows.parent.mkdir(exist_ok=True)

@@ -375,8 +375,9 @@ def representative_events(wanted: Iterable[Element]) -> list[Event]:
         kinds.setdefault(element.kind, []).append(element)
     events = []
     for kind, alike in kinds.items():
-        texts = representative_texts(_distinct(element.text for element in alike))
-        choices = _choices(_distinct(element.options for element in alike if element.options is not None))
+        texts = representative_texts(tuple(dict.fromkeys(element.text for element in alike)))
+        options = (element.options for element in alike if element.options is not None)
+        choices = _choices(tuple(dict.fromkeys(options)))
         events += [Event(kind, text, choice) for text in texts for choice in choices]
     return events
 
@@ -384,15 +385,11 @@ def representative_events(wanted: Iterable[Element]) -> list[Event]:
 def _choices(wanted: tuple[Text, ...]) -> Iterable[tuple[Option, ...]]:
     """Options of which some match, in all combinations; one may match what another cannot match as well."""
     found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
-    for text in representative_texts(wanted):
+    for text in representative_texts(wanted, outer=True):
         matched = frozenset(one for one in wanted if one.matches(text))
         for already, choice in tuple(found.items()):
             found.setdefault(already | matched, (*choice, Option(text)))
     return found.values()
-
-
-def _distinct(texts: Iterable[Text]) -> tuple[Text, ...]:
-    return tuple(dict.fromkeys(texts))
 
 
 def _fits(element: Element, event: Event) -> bool:

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from importlib import import_module
-from itertools import chain, combinations, islice, permutations, product
+from itertools import chain, combinations, islice, permutations, product, zip_longest
 from random import Random
 from typing import Any
 
 from codebotler.rtl import Regex, Text, Without, Words
+from codebotler.simulator.robot import found_in
 
 _MOST_SAMPLES = 4
 _MOST_SUBSETS = 400
@@ -23,34 +24,36 @@ _LONGEST = 10_000
 
 
 @cache
-def representative_texts(wanted: tuple[Text, ...]) -> tuple[str, ...]:
+def representative_texts(wanted: tuple[Text, ...], *, outer: bool = False) -> tuple[str, ...]:
     """Texts that match in different combinations; one, and a short one, for each combination that was found.
 
     Args:
         wanted: what the texts are to be told apart by.
+        outer: whether they may begin or end with spaces, as options may and texts of events may not.
     """
     found: dict[tuple[bool, ...], str] = {}
-    for candidate in _candidates(wanted):
+    for candidate in _candidates(wanted, outer=outer):
         found.setdefault(tuple([text.matches(candidate) for text in wanted]), candidate)
     return tuple(found.values())
 
 
 @cache
-def can_match(text: Text) -> bool:
+def can_match(text: Text, *, outer: bool = False) -> bool:
     """Whether a text was found that matches.
 
     Args:
         text: what it is to match.
+        outer: whether the text that was found may begin or end with spaces.
     """
-    return any(text.matches(candidate) for candidate in _candidates((text,)))
+    return any(text.matches(candidate) for candidate in _candidates((text,), outer=outer))
 
 
 @cache
-def _candidates(texts: tuple[Text, ...]) -> tuple[str, ...]:
+def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
     groups = [
         group
         for pattern in dict.fromkeys(chain.from_iterable(map(patterns, texts)))
-        for group in (samples(pattern), _forbidden(pattern))
+        for group in (samples(pattern, outer=outer), _forbidden(pattern))
         if group
     ]
     words = [*dict.fromkeys(chain.from_iterable(groups))]
@@ -64,16 +67,19 @@ def _candidates(texts: tuple[Text, ...]) -> tuple[str, ...]:
     several = (
         " ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1])
     )
-    joined = chain.from_iterable(_joined(text.parts) for text in texts if isinstance(text, Words))
+    joined = chain.from_iterable(
+        _joined(text.parts, outer=outer) for text in texts if isinstance(text, Words)
+    )
     spaced = (form for word in whole for form in (f"x {word}", f"{word} x"))
-    every = chain(["", "x"], words, hidden, spaced, pairs, several, joined)
-    return tuple(dict.fromkeys(text for text in every if text == text.strip()))
+    wide = (form for word in words for form in (f" {word}", f"{word} ", f" {word} "))
+    every = chain(["", "x"], words, hidden, spaced, pairs, several, joined, wide)
+    return tuple(dict.fromkeys(text for text in every if outer or text == text.strip()))
 
 
-def _joined(parts: Sequence[Text]) -> Iterator[str]:
+def _joined(parts: Sequence[Text], *, outer: bool) -> Iterator[str]:
     """Texts made of a sample for each part, in several orders."""
     groups = [
-        [word for pattern in patterns(part) for word in samples(pattern)] or [""]
+        [word for pattern in patterns(part) for word in samples(pattern, outer=outer)] or [""]
         for part in parts
         if not isinstance(part, Without)
     ]
@@ -92,30 +98,59 @@ def patterns(text: Text) -> Iterator[str]:
             yield pattern
 
 
-@cache
-def samples(pattern: str) -> tuple[str, ...]:
-    """Texts without spaces at their ends in which a regex is found; none where none was thought of.
+def alternatives(pattern: str) -> list[str]:
+    """The parts of a regex that is no more than words with bars between them; otherwise the regex.
 
     Args:
         pattern: the regex.
     """
+    return pattern.split("|") if re.fullmatch(r"[\w' ]+(\|[\w' ]+)+", pattern) else [pattern]
+
+
+def is_among(pattern: str, labels: Iterable[str]) -> bool:
+    """Whether something may be meant by a regex; true also of one that means anything, or nothing.
+
+    Args:
+        pattern: the regex.
+        labels: what things are called.
+    """
+    wanted = Regex(pattern)
+    texts = samples(pattern)
+    return (
+        not texts
+        or wanted.matches("")
+        or any(wanted.matches(label) or any(found_in(label, text) for text in texts) for label in labels)
+    )
+
+
+@cache
+def samples(pattern: str, *, outer: bool = False) -> tuple[str, ...]:
+    """Texts in which a regex is found; none where none was thought of.
+
+    Args:
+        pattern: the regex.
+        outer: whether they may begin or end with spaces.
+    """
     matches = Regex(pattern).matches
-    spelled = _spelled(_parsed(pattern))
-    forms = (form.format(word).strip() for form in ("{}", "x {}", "x {} x", "x{}x") for word in spelled)
+    spelled = _spelled_in_all_ways(_parsed(pattern))
+    whole = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in spelled]
+    forms = [*(form.strip() for form in whole), *(whole if outer else ())]
     found = dict.fromkeys(form for form in forms if matches(form))
-    return tuple(islice(found or _guessed(pattern), _MOST_SAMPLES))
+    return tuple(islice(found or _guessed(pattern, outer=outer), _MOST_SAMPLES))
 
 
-def _guessed(pattern: str) -> Iterator[str]:
+def _guessed(pattern: str, *, outer: bool) -> Iterator[str]:
     random, letters = Random(pattern), f"{pattern}x1 "  # noqa: S311 - no secret
-    guesses = ("".join(random.choices(letters, k=random.randint(0, 8))).strip() for _ in range(3_000))
+    drawn = ("".join(random.choices(letters, k=random.randint(0, 8))) for _ in range(3_000))
+    guesses = (guess if outer else guess.strip() for guess in drawn)
     return (guess for guess in guesses if Regex(pattern).matches(guess))
 
 
 def _forbidden(pattern: str) -> tuple[str, ...]:
     """What stands in the negative lookaheads of a regex: what a text must hold not to match."""
     inner = (value[1] for op, value in _parsed(pattern) if str(op) == "ASSERT_NOT")
-    return tuple(word.strip() for items in inner for word in _spelled(items) if word.strip())
+    words = (word.strip() for items in inner for word in _spelled_in_all_ways(items)[: 4 * _MOST_SAMPLES])
+    return tuple(dict.fromkeys(word for word in words if word))
 
 
 def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
@@ -124,40 +159,54 @@ def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module
         return import_module("re._parser").parse(pattern, re.IGNORECASE | re.DOTALL)
 
 
-def _spelled(items: Any) -> list[str]:  # noqa: ANN401 - the same
+def _spelled_in_all_ways(items: Any) -> list[str]:  # noqa: ANN401 - the same
+    """Spelled close together and apart, and with what is looked ahead for behind all else."""
+    behind = sorted(items, key=lambda item: str(item[0]) == "ASSERT")
+    ways = zip_longest(_spelled(items), _spelled(items, " "), _spelled(behind, " "))
+    return [*dict.fromkeys(text for way in ways for text in way if text is not None)]
+
+
+def _spelled(items: Any, gap: str = "") -> list[str]:  # noqa: ANN401 - the same
     texts = [""]
     for op, value in items:
-        parts = _spelled_one(str(op), value)
+        parts = _spelled_one(str(op), value, gap)
         texts = [*dict.fromkeys(text + part for part in parts for text in texts)][: 4 * _MOST_SAMPLES]
     return texts
 
 
-def _spelled_one(op: str, value: Any) -> list[str]:  # noqa: ANN401, PLR0911 - the same, one for each node
+def _spelled_one(op: str, value: Any, gap: str) -> list[str]:  # noqa: ANN401, PLR0911 - one for each node
     match op:
         case "LITERAL":
             return [chr(value)]
         case "NOT_LITERAL":
-            return ["a" if value != ord("a") else "b"]
+            return [char for char in (*gap, "a", "b") if ord(char) != value][:1]
         case "ANY":
-            return ["a"]
+            return [gap or "a"]
         case "IN":
-            return _spelled_set(value)
+            return _spelled_set(value, gap)
         case "BRANCH":
-            return [text for branch in value[1] for text in _spelled(branch)[:_MOST_SAMPLES]]
-        case "SUBPATTERN" | "ASSERT":
-            return _spelled(value[-1])
+            return [text for branch in value[1] for text in _spelled(branch, gap)[:_MOST_SAMPLES]]
+        case "SUBPATTERN":
+            return _spelled(value[-1], gap)
+        case "ASSERT":
+            return [text + gap for text in _spelled(value[-1], gap)]
         case "ATOMIC_GROUP":
-            return _spelled(value)
+            return _spelled(value, gap)
         case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
             least, _, items = value
-            repeated = [text * max(least, 1) for text in _spelled(items) if len(text) * least <= _LONGEST]
-            return repeated if least else ["", *repeated]
+            repeated = [
+                text * max(least, 1) for text in _spelled(items, gap) if len(text) * least <= _LONGEST
+            ]
+            none = [] if least else [""]
+            return [*repeated, *none] if gap else [*none, *repeated]
     return [""]
 
 
-def _spelled_set(members: Any) -> list[str]:  # noqa: ANN401 - the same
+def _spelled_set(members: Any, gap: str) -> list[str]:  # noqa: ANN401 - the same
     ends = [end for op, value in members for end in _ends(str(op), value)]
-    return [char for char in dict.fromkeys([*ends, *"a1 _-.'z"]) if _is_in(char, members)][:_MOST_SAMPLES]
+    return [char for char in dict.fromkeys([*gap, *ends, *"a1 _-.'z"]) if _is_in(char, members)][
+        :_MOST_SAMPLES
+    ]
 
 
 def _ends(op: str, value: Any) -> list[str]:  # noqa: ANN401 - the same

@@ -68,6 +68,20 @@ def test_a_line_that_is_no_json(tmp_path: Path) -> None:
     assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl, line 2: this line is no JSON"
 
 
+def test_a_last_line_that_is_no_json_and_has_no_end(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row() + '{"task": "SayGoodDay", "program": "x')
+    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl, line 2: this line is no JSON"
+
+
+def test_a_zip_with_a_damaged_member(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("SayGoodDay_0_0.py", "completion = ''" * 100)
+    data = bytearray((tmp_path / "a.zip").read_bytes())
+    data[50:60] = b"\xff" * 10
+    (tmp_path / "a.zip").write_bytes(data)
+    assert refused("evaluate", "a.zip", cwd=tmp_path).startswith("a.zip: is no readable zip")
+
+
 def test_a_line_that_is_no_object(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "[]\n")
     assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl, line 2: this line is no JSON object"

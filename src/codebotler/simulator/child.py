@@ -9,12 +9,14 @@ import signal
 import socket
 import struct
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 from codebotler.simulator.sandbox.channel import HEADER, MAX_FRAME
 
 SENDING = 30.0  # seconds for a long program on a busy machine; a child that does not listen is ended
+LONGEST = 120.0  # seconds; nothing that computes takes so long, so a child that does only waits
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
 
@@ -30,13 +32,22 @@ class Child:
     def __init__(self, pid: int, channel: socket.socket, wait: Callable[[], int]) -> None:
         self.pid, self._channel, self._wait = pid, channel, wait
         self._buffer = b""
+        self._deadline = time.monotonic() + LONGEST
 
     def send(self, message: object) -> None:
-        """Send a frame; a child that is gone or does not listen is noticed when it is listened to."""
+        """Send a frame; a child that is gone is noticed when it is listened to.
+
+        Raises:
+            TimeoutError: the child does not listen.
+        """
         data = json.dumps(message).encode()
         self._channel.settimeout(SENDING)
-        with contextlib.suppress(OSError):
+        try:
             self._channel.sendall(struct.pack(">I", len(data)) + data)
+        except TimeoutError:
+            raise
+        except OSError:
+            return
 
     def receive(self) -> object:
         """The child's next message; None when it has hung up.
@@ -65,6 +76,8 @@ class Child:
             if not piece:
                 return None
             self._buffer += piece
+            if time.monotonic() > self._deadline:
+                raise TimeoutError
 
     def end(self) -> int:
         """End it, if it has not ended, and return its exit status, or minus the signal."""

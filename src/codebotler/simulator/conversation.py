@@ -12,6 +12,8 @@ from codebotler.trace import Option, Outcome, RunError, Status
 
 MEMORY = 512 * 1024 * 1024
 CPU_SECONDS = 5
+OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
+LAST_LINE = 1_000_000
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 
 
@@ -105,7 +107,7 @@ class Conversation:
         arguments = _arguments(skill, values)
         self.ledger.calls += 1
         texts = [t for a in arguments for t in ([a] if isinstance(a, str) else [o.text for o in a])]
-        self.ledger.text += sum(map(len, texts))
+        self.ledger.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - len(arguments))
         if self.ledger.calls > self.limits.calls:
             self.ledger.limit = f"{self.limits.calls:,} skill calls"
         elif any(len(text) > self.limits.text for text in texts):
@@ -153,7 +155,7 @@ class Conversation:
         return self._outcome(Status.KILLED, "Crash", f"the process ended by itself ({how})")
 
     def _outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
-        where = line if isinstance(line, int) and line > 0 else None
+        where = line if type(line) is int and 0 < line <= LAST_LINE else None
         return Outcome(status, self.robot.trace, RunError(kind, message), where)
 
 

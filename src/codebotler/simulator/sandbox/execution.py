@@ -55,7 +55,9 @@ class Run:
         line = last_line(error)
         if self.spent or isinstance(error, BudgetSpentError):
             return {"end": "timeout", "line": line}
-        if isinstance(error, SystemExit) and (error.code is None or error.code == 0):
+        if isinstance(error, SystemExit) and (
+            error.code is None or (type(error.code) is int and error.code == 0)
+        ):
             return {"end": "finished"}
         if isinstance(error, RobotError) and error.number >= 0:
             return {"end": "robot-error", "number": error.number, "line": line}

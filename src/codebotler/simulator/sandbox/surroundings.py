@@ -59,7 +59,12 @@ def simulate_time(run: Run) -> None:
     time.strftime = lambda form, *when: strftime(form, *(when or [time.localtime()]))
     time.asctime = lambda *when: asctime(*(when or [time.localtime()]))
     time.ctime = lambda *seconds: asctime(time.localtime(*seconds))
+    time.clock_gettime = lambda clock: (start if clock == time.CLOCK_REALTIME else 0.0) + run.now
+    time.clock_gettime_ns = lambda clock: int(time.clock_gettime(clock) * 1e9)
     timeit.default_timer = time.perf_counter
+    for function in (timeit.timeit, timeit.repeat, timeit.Timer.__init__):
+        given = function.__defaults__ or ()
+        function.__defaults__ = tuple(time.perf_counter if callable(one) else one for one in given)
 
 
 class Stand(type):
