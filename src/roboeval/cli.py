@@ -56,11 +56,7 @@ def evaluate(
     from roboeval.evaluate import evaluate as judge_all
     from roboeval.run import Run, evaluate_run, open_source, tasks_to_judge
 
-    if worlds is not None or engine != "local":
-        asked = f"--engine {engine}" if worlds is None else "--worlds"
-        fail(f"{asked} is not there yet; leave it out to judge in the suite's own worlds, on this machine")
-    if suite == "plus" and not Path(suite).exists():
-        fail('the suite "plus" is not there yet; leave --suite out to judge by the suite of the paper')
+    refuse_what_comes_later(suite, worlds, engine)
     judged_by = load(suite)
     wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
     if left:
@@ -188,6 +184,15 @@ def import_(
     with run.writing():
         run.keep(source, known)
     note(f"{sum(1 for _ in source.read()):,} completions are in {out}; `roboeval evaluate {out}` judges them")
+
+
+def refuse_what_comes_later(suite: str, worlds: int | None, engine: str) -> None:
+    """End with a sentence about options that are promised and not there yet."""
+    if worlds is not None or engine != "local":
+        asked = f"--engine {engine}" if worlds is None else "--worlds"
+        fail(f"{asked} is not there yet; leave it out to judge in the suite's own worlds, on this machine")
+    if suite == "plus" and not Path(suite).exists():
+        fail('the suite "plus" is not there yet; leave --suite out to judge by the suite of the paper')
 
 
 def load(suite: str) -> Suite:

@@ -393,11 +393,8 @@ def _where(deed: Deed, trace: Trace) -> list[int]:
     return [at for at in range(len(trace)) if any(_seen(element, trace, at) for element in deed)]
 
 
-_SHOWN = 6  # steps that a sentence can bear
-
-
 def _steps(found: list[int]) -> str:
     numbers = [str(at + 1) for at in found]
-    if len(numbers) > _SHOWN:
-        numbers[_SHOWN - 1 :] = [f"{len(numbers) - _SHOWN + 1:,} more"]
+    if len(numbers) > _MOST:
+        numbers[_MOST:] = [f"{len(numbers) - _MOST:,} more"]
     return f"step {numbers[0]}" if len(numbers) == 1 else f"steps {listed(numbers)}"
