@@ -8,7 +8,7 @@ from typing import Any
 
 from codebotler import __version__
 from codebotler.rtl import CannotJudge, holds
-from codebotler.simulator.engine import Lanes, simulate
+from codebotler.simulator.engine import Lanes
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
@@ -69,7 +69,7 @@ def evaluate(
         return [judge(run(program, scenario.world), scenario) for scenario in scenarios]
 
     def run(program: str, world: World) -> Outcome:
-        return simulate(lanes.here(), program, lambda: SimulatedRobot(world, suite.rules))
+        return lanes.here().run(program, lambda: SimulatedRobot(world, suite.rules))
 
     rows: list[Completion] = []
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import json
+import marshal
 import os
 import signal
 import socket
-import struct
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from codebotler.simulator.sandbox.channel import HEADER, MAX_FRAME
+from codebotler.simulator.sandbox.walls import CPU_SECONDS
+from codebotler.trace import RunError, Status
 
 SENDING = 30.0  # seconds for a long program on a busy machine; a child that does not listen is ended
 LONGEST = 120.0  # seconds; nothing that computes takes so long, so a child that does only waits
@@ -31,7 +33,7 @@ class Child:
 
     def __init__(self, pid: int, channel: socket.socket, wait: Callable[[], int]) -> None:
         self.pid, self._channel, self._wait = pid, channel, wait
-        self._buffer = b""
+        self._buffer = bytearray()
         self._deadline = time.monotonic() + LONGEST
 
     def send(self, message: object) -> None:
@@ -40,20 +42,33 @@ class Child:
         Raises:
             TimeoutError: the child does not listen.
         """
-        data = json.dumps(message).encode()
+        data = marshal.dumps(message)  # type: ignore[arg-type]  # made of texts, numbers and the like
         self._channel.settimeout(SENDING)
         try:
-            self._channel.sendall(struct.pack(">I", len(data)) + data)
+            self._channel.sendall(len(data).to_bytes(HEADER, "big") + data)
         except TimeoutError:
             raise
         except OSError:
             return
 
     def receive(self) -> object:
-        """The child's next message; None when it has hung up.
+        """The child's next message, which is JSON; None when it has hung up.
 
         Raises:
             ProtocolError: it is none.
+            TimeoutError: the child waits for something that will never come.
+        """
+        frame = self.receive_bytes(MAX_FRAME)
+        return None if frame is None else _parsed(frame)
+
+    def receive_bytes(self, most: int) -> bytes | None:
+        """The child's next frame; None when it has hung up.
+
+        Args:
+            most: how long it may be, in bytes.
+
+        Raises:
+            ProtocolError: it is longer.
             TimeoutError: the child waits for something that will never come.
         """
         stuck = Stuck(self.pid)
@@ -61,11 +76,12 @@ class Child:
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
-                if end - HEADER > MAX_FRAME:
+                if end - HEADER > most:
                     raise ProtocolError("a frame is too long")
                 if len(self._buffer) >= end:
-                    frame, self._buffer = self._buffer[HEADER:end], self._buffer[end:]
-                    return _parsed(frame)
+                    frame = bytes(self._buffer[HEADER:end])
+                    del self._buffer[:end]
+                    return frame
             try:
                 piece = self._channel.recv(1 << 16)
             except TimeoutError:
@@ -79,14 +95,30 @@ class Child:
             if time.monotonic() > self._deadline:
                 raise TimeoutError
 
-    def end(self) -> int:
-        """End it, if it has not ended, and return its exit status, or minus the signal."""
+    def kill(self) -> None:
+        """End it, if it has not ended."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
+
+    def end(self) -> int:
+        """End it, if it has not ended, and return its exit status, or minus the signal."""
+        self.kill()
         try:
             return self._wait()
         finally:
             self._channel.close()
+
+    def rest(self) -> None:
+        """Start to wait anew: what it was asked has been answered."""
+        self._deadline = time.monotonic() + LONGEST
+
+    def was_closed(self) -> bool:
+        """Whether its walls were closed; also told of the dead, until the next run."""
+        try:
+            status = Path(f"/proc/{self.pid}/status").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            return False
+        return "\nNoNewPrivs:\t1\n" in status
 
     def ended(self) -> int:
         """Wait a moment for it to end by itself; then like `end`."""
@@ -95,6 +127,27 @@ class Child:
                 break
             threading.Event().wait(0.002)
         return self.end()
+
+
+def cause_of_death(status: int) -> tuple[Status, RunError]:
+    """What a process died of that did not say how it ended.
+
+    Args:
+        status: its exit status, or minus the signal.
+    """
+    match -status:
+        case signal.SIGXCPU:
+            return Status.TIMEOUT, RunError(
+                "TimeoutError", f"{CPU_SECONDS} seconds of processor time in one step"
+            )
+        case signal.SIGSYS:
+            return Status.KILLED, RunError(
+                "ForbiddenCall", "the program asked the kernel for what is forbidden"
+            )
+        case signal.SIGKILL:
+            return Status.KILLED, RunError("MemoryError", "the process was killed from outside")
+    how = f"signal {-status}" if status < 0 else f"exit status {status}"
+    return Status.KILLED, RunError("Crash", f"the process ended by itself ({how})")
 
 
 def _parsed(frame: bytes) -> object:

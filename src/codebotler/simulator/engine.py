@@ -11,7 +11,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
 from typing import Self, TypeVar
 
-from codebotler.simulator.child import LostChildError
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
@@ -19,7 +18,7 @@ from codebotler.skills import SKILLS, SkillTable
 from codebotler.trace import Outcome
 from codebotler.world import World
 
-__all__ = ["EngineError", "Lanes", "run", "simulate"]
+__all__ = ["EngineError", "Lanes", "run"]
 
 LOG = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
@@ -54,29 +53,9 @@ def run(
 
         def run_pair(pair: tuple[str, World]) -> Outcome:
             source, world = pair
-            return simulate(lanes.here(), source, lambda: SimulatedRobot(world, rules, skills, behaviours))
+            return lanes.here().run(source, lambda: SimulatedRobot(world, rules, skills, behaviours))
 
         yield from lanes.map_distinct(run_pair, pairs)
-
-
-def simulate(lane: Lane, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
-    """Run a program with a simulated robot, once more if its process was lost through no fault of its own.
-
-    Args:
-        lane: where to run it.
-        source: the program, which need not even parse.
-        new_robot: makes the robot, in the initial state of its world.
-
-    Raises:
-        EngineError: its process was lost twice.
-    """
-    try:
-        return lane.run(source, new_robot())
-    except LostChildError:
-        try:
-            return lane.run(source, new_robot())
-        except LostChildError as error:
-            raise EngineError(f"an isolated process was lost twice: {error}") from None
 
 
 class Lanes:

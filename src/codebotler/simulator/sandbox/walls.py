@@ -5,27 +5,32 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
-import signal
-import struct
 import sys
-from typing import Any
+from posix import getppid
 
 from codebotler.simulator.sandbox.channel import CHANNEL
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import TypeAlias
 
-def enclose(job: dict[str, Any], seccomp: ctypes.Array[ctypes.c_char] | None, parent: int) -> None:
-    """Close everything but the channel and give up every right, in the only order that works."""
-    for name in ("CORE", "FSIZE", "NPROC", "MEMLOCK", "MSGQUEUE"):
-        resource.setrlimit(getattr(resource, "RLIMIT_" + name), (0, 0))
-    resource.setrlimit(resource.RLIMIT_NOFILE, (4, 4))
-    resource.setrlimit(resource.RLIMIT_AS, (job["memory"], job["memory"]))
-    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu"], job["cpu"] + 1))
-    if os.geteuid() == 0:
-        os.setgroups([])
-        os.setresgid(NOBODY, NOBODY, NOBODY)
-        os.setresuid(NOBODY, NOBODY, NOBODY)
-    prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before that: no signal will come
+    Filter: TypeAlias = ctypes.Array[ctypes.c_char]
+
+MEMORY = 512 * 1024 * 1024
+CPU_SECONDS = 5
+
+
+def enclose(seccomp: Filter | None, parent: int | None) -> None:
+    """Close everything but the channel and give up every right, in the only order that works.
+
+    Args:
+        seccomp: what may be asked of the kernel; None where it takes no such list.
+        parent: the process that must still be there; None for a process whose line tells it.
+    """
+    limit_resources()
+    give_up_identity()
+    die_with_parent()
+    if parent is not None and getppid() != parent:  # it died before that: no signal will come
         os._exit(1)
     prctl(PR_SET_DUMPABLE, 0)
     prctl(PR_SET_NO_NEW_PRIVS, 1)
@@ -33,8 +38,38 @@ def enclose(job: dict[str, Any], seccomp: ctypes.Array[ctypes.c_char] | None, pa
         prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
 
 
+def limit_resources() -> None:
+    """Set what this process may use; it can never ask for more again."""
+    for kind in (
+        resource.RLIMIT_CORE,
+        resource.RLIMIT_FSIZE,
+        resource.RLIMIT_NPROC,
+        resource.RLIMIT_MEMLOCK,
+        resource.RLIMIT_MSGQUEUE,
+    ):
+        resource.setrlimit(kind, (0, 0))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (CHANNEL + 1, CHANNEL + 1))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 1))
+
+
+def give_up_identity() -> None:
+    """Become nobody, if this is root: RLIMIT_NPROC does not bind root."""
+    if os.geteuid() == 0:
+        os.setgroups([])
+        os.setresgid(NOBODY, NOBODY, NOBODY)
+        os.setresuid(NOBODY, NOBODY, NOBODY)
+
+
+def die_with_parent() -> None:
+    """End when the thread ends that has started this process."""
+    prctl(PR_SET_PDEATHSIG, SIGKILL)
+
+
 NOBODY = 65534
+SIGKILL = 9
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 38
+MACHINE = os.uname().machine
 SECCOMP_MODE_FILTER = 2
 LIBC = ctypes.CDLL(None, use_errno=True)
 
@@ -67,7 +102,7 @@ X32 = 0x40000000
 PROT_EXEC = 4
 
 
-def seccomp_filter(machine: str) -> ctypes.Array[ctypes.c_char] | None:
+def seccomp_filter(machine: str = MACHINE) -> Filter | None:
     """The list of what a child may ask of the kernel, as a BPF program; None on an unknown machine.
 
     Reading and writing go to the channel only, memory is never executable; all else is refused with EPERM.
@@ -94,14 +129,30 @@ def seccomp_filter(machine: str) -> ctypes.Array[ctypes.c_char] | None:
         body = [(LOAD, 0, 0, argument), test, (RETURN, 0, 0, ALLOW), (RETURN, 0, 0, DENY)]
         code += [(EQUAL, 0, len(body), numbers[name]), *body]
     code.append((RETURN, 0, 0, DENY))
-    instructions = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *line) for line in code))
-    header = ctypes.create_string_buffer(struct.pack("HxxxxxxP", len(code), ctypes.addressof(instructions)))
+    instructions = ctypes.create_string_buffer(b"".join(map(instruction, code)))
+    header = ctypes.create_string_buffer(
+        len(code).to_bytes(8, sys.byteorder) + ctypes.addressof(instructions).to_bytes(8, sys.byteorder)
+    )
     header.instructions = instructions  # type: ignore[attr-defined]  # keeps them alive
     return header
 
 
-def can_install(seccomp: ctypes.Array[ctypes.c_char]) -> bool:
-    """Whether the kernel takes the filter here, which a container may forbid; tried in another process."""
+def instruction(line: tuple[int, int, int, int]) -> bytes:
+    """One instruction of a BPF program: operation, jump if true, jump if false, operand."""
+    operation, if_true, if_false, operand = line
+    return (
+        operation.to_bytes(2, sys.byteorder) + bytes((if_true, if_false)) + operand.to_bytes(4, sys.byteorder)
+    )
+
+
+def usable_filter() -> Filter | None:
+    """The filter for this machine, if its kernel takes it, which a container may forbid."""
+    seccomp = seccomp_filter()
+    return seccomp if seccomp is not None and can_install(seccomp) else None
+
+
+def can_install(seccomp: Filter) -> bool:
+    """Whether the kernel takes the filter; tried in another process."""
     pid = os.fork()
     if pid == 0:
         try:
