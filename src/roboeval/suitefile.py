@@ -85,9 +85,9 @@ class TaskFile(_Form):
 class LimitsFile(_Form):
     """The limits as a suite file writes them."""
 
-    seconds: Annotated[float, Field(gt=0)] = 3600.0
-    calls: Annotated[int, Field(gt=0)] = 1_000
-    ticks: Annotated[int, Field(gt=0)] = 200_000
+    seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0
+    calls: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 1_000
+    ticks: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 200_000
 
 
 class RulesFile(_Form):
@@ -112,6 +112,6 @@ class SuiteFile(_Form):
     """A suite.yaml."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
-    version: int
+    version: Annotated[int, Field(strict=True, ge=0)]
     about: Text = ""
     rules: RulesFile = RulesFile()

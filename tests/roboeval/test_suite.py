@@ -85,7 +85,16 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, s
 @pytest.mark.parametrize(
     ("suite", "sentence"),
     [
-        ("name: mine\nversion: one\n", "line 2: \"version\" is 'one', but it should be a valid integer"),
+        ("name: mine\nversion: one\n", 'line 2: "version" is a text, not a whole number'),
+        (
+            "name: mine\nversion: 1\nrules: {limits: {seconds: .inf}}\n",
+            'line 3: "seconds" is no finite number',
+        ),
+        (SUITE + "rules: {limits: {calls: yes}}\n", 'line 3: "calls" is a truth value, not a whole number'),
+        (
+            SUITE + "rules: {limits: {ticks: 1000000001}}\n",
+            'line 3: "ticks" is 1000000001, but it should be less than or equal to 1000000000',
+        ),
         (SUITE + "rules: {literals: loud}\n", "line 3: \"literals\" is 'loud', but it should be"),
         (SUITE + "rules: {gravity: 9.81}\n", 'line 3: the key "gravity" means nothing here'),
         (SUITE + "rules: {skill_seconds: 2}\n", 'line 3: "skill_seconds" is 2, but it should be 0'),
