@@ -74,7 +74,7 @@ def recordings(file: YamlFile) -> object:
 
 
 def outcome(file: YamlFile) -> object:
-    return file.validate(OutcomeFile).outcome()
+    return file.validate(OutcomeFile).outcome(file)
 
 
 def suite(file: YamlFile) -> object:
