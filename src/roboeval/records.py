@@ -9,7 +9,7 @@ import os
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any, BinaryIO, TypeAlias
@@ -42,8 +42,8 @@ class Completion(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True, strict=True)
 
     task: str
-    prompt: Annotated[int, Field(ge=0)]
-    index: Annotated[int, Field(ge=0)]
+    prompt: Annotated[int, Field(ge=0, lt=1_000_000_000)]
+    index: Annotated[int, Field(ge=0, lt=1_000_000_000)]
     program: str
     instruction: str | None = None
     model: str | None = None
@@ -136,9 +136,21 @@ def read_completions(path: Path, *, growing: bool = False) -> Iterator[Completio
                 line=number,
             )
         seen[completion.key] = number
+        check_length(row, path, number)
         yield completion
     if not seen:
         raise BadInput("there is no completion in it", file=path)
+
+
+def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
+    """Refuse what would be too long to be read again once it is copied into a run.
+
+    Raises:
+        BadInput: it is.
+    """
+    if len(to_line(row)) > MAX_ROW:
+        sentence = f"as a row this is longer than {MAX_ROW:,} bytes; shorten the program"
+        raise BadInput(sentence, file=str(file), line=line)
 
 
 def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -285,12 +297,10 @@ def _assigned(text: str, name: str) -> dict[str, str]:
 # --- writing
 
 
-def to_line(row: dict[str, Any]) -> bytes:
-    """A row as a line of JSON, in UTF-8 where that is possible."""
-    try:
-        return json.dumps(row, ensure_ascii=False).encode() + b"\n"
-    except UnicodeEncodeError:  # half of a surrogate pair, which JSON can escape and UTF-8 cannot hold
-        return json.dumps(row).encode() + b"\n"
+def to_line(row: Mapping[str, Any]) -> bytes:
+    """A row as a line of JSON, in UTF-8."""
+    # Half of a surrogate pair, which UTF-8 cannot hold, becomes an escape, which JSON reads.
+    return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
 @dataclass
