@@ -257,13 +257,27 @@ def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
         raise BadInput("is a folder; name a file", file=path) from None
     except OSError as error:
         raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+    return text_of(data, path, limit=limit)
+
+
+def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
+    """The text that a file's bytes are, with the line ends of any system.
+
+    Args:
+        data: the bytes; of a larger file one more than the limit is enough.
+        name: what error sentences call the file.
+        limit: the largest size in bytes.
+
+    Raises:
+        BadInput: it is larger than the limit, or no UTF-8.
+    """
     if len(data) > limit:
-        raise BadInput(f"is larger than {limit:,} bytes", file=path)
+        raise BadInput(f"is larger than {limit:,} bytes", file=name)
     try:
         return io.StringIO(data.decode(), newline=None).read()
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise BadInput("is no UTF-8 text; save it as UTF-8", file=path, line=line) from None
+        raise BadInput("is no UTF-8 text; save it as UTF-8", file=name, line=line) from None
 
 
 EXPECTED = {

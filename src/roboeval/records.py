@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import json
-import lzma
 import os
-import re
-import zipfile
-import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Annotated, Any, BinaryIO, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from codebotler.badinput import BadInput, read_text
+from codebotler.badinput import BadInput
 from codebotler.models.recorded import recorded_model
 from roboeval.suite import Suite
 
@@ -213,85 +208,6 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
                 )
     if not found:
         raise BadInput(f'{name} knows no instruction of the suite "{suite.name}"')
-
-
-UNREADABLE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    UnicodeDecodeError,
-    NotImplementedError,
-    RuntimeError,
-    EOFError,
-    OSError,
-)
-PUBLISHED = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
-
-
-def published_completions(path: Path) -> Iterator[Completion]:
-    """Read a folder or zip of `TASK_PROMPT_INDEX.py`, as the paper's authors published theirs.
-
-    The files assign texts to `name`, `prompt` and `completion`; they are parsed and never imported.
-
-    Raises:
-        BadInput: it holds no such file, or one of them is wrong.
-    """
-    files = _zipped(path) if path.is_file() else _in_folder(path)
-    found = [(match, name, text) for name, text in files if (match := PUBLISHED.fullmatch(Path(name).name))]
-    if not found:
-        raise BadInput("there is no file named TASK_PROMPT_INDEX.py in it", file=path)
-    found.sort(key=lambda item: (item[0]["task"], int(item[0]["prompt"]), int(item[0]["index"])))
-    seen: dict[Key, str] = {}
-    for match, name, text in found:
-        key = match["task"], int(match["prompt"]), int(match["index"])
-        if key in seen:
-            raise BadInput(f"{name_of(key)} stands here again; {seen[key]} holds it already", file=name)
-        seen[key] = name
-        values = _assigned(text, name)
-        yield Completion(
-            task=key[0],
-            prompt=key[1],
-            index=key[2],
-            instruction=values.get("prompt"),
-            program=values["completion"],
-        )
-
-
-def _in_folder(path: Path) -> Iterator[tuple[str, str]]:
-    for file in sorted(path.rglob("*.py")):
-        yield str(file), read_text(file, limit=MAX_ROW)
-
-
-def _zipped(path: Path) -> Iterator[tuple[str, str]]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            for member in archive.infolist():
-                name = PurePosixPath(member.filename)
-                if name.is_absolute() or ".." in name.parts:
-                    raise BadInput(f'the zip names a file outside itself, "{member.filename}"', file=path)
-                if member.file_size > MAX_ROW:
-                    raise BadInput(f'"{member.filename}" is larger than {MAX_ROW:,} bytes', file=path)
-                if name.suffix == ".py":
-                    yield f"{path}/{member.filename}", archive.read(member).decode()
-    except UNREADABLE as error:
-        raise BadInput(f"is no readable zip ({error})", file=path) from None
-
-
-def _assigned(text: str, name: str) -> dict[str, str]:
-    try:
-        statements = ast.parse(text).body
-        values = {
-            target.id: ast.literal_eval(statement.value)
-            for statement in statements
-            if isinstance(statement, ast.Assign)
-            for target in statement.targets
-            if isinstance(target, ast.Name) and target.id in ("name", "prompt", "completion")
-        }
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise BadInput(f"cannot be read as assignments of texts ({error})", file=name) from None
-    if not isinstance(values.get("completion"), str):
-        raise BadInput("does not assign a text to `completion`", file=name)
-    return {key: value for key, value in values.items() if isinstance(value, str)}
 
 
 # --- writing
