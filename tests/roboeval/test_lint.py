@@ -13,10 +13,14 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
+from codebotler.models.recorded import read_replies
 from codebotler.rtl import Formula, Regex, Without, Words, holds, parse
 from codebotler.rtl.formula import CutName
 from codebotler.trace import Event, Option, Trace
+from roboeval.catalogue import new_task
+from roboeval.evaluate import evaluate
 from roboeval.lint import Finding, lint, lint_suite, render
+from roboeval.records import Completion
 from roboeval.satisfiability import Automaton, Reasoner, Undecided
 from roboeval.suite import Suite, load_suite
 from roboeval.witnesses import can_match, representative_texts, samples
@@ -297,6 +301,31 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert render([]) == ""
     monkeypatch.chdir(tmp_path / "suite0" / "recorded")
     assert render(findings).startswith(f"{path}:6: ")
+
+
+# --- a new task
+
+
+def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path: Path) -> None:
+    new_task(tmp_path, "MakeTea")
+    suite = load_suite(str(tmp_path))
+    assert lint_suite(suite) == []
+    task = suite.task("MakeTea")
+    replies = read_replies(tmp_path / "recorded" / "mine" / "MakeTea.yaml")[task.prompts[0]]
+    rows = [
+        Completion(task="MakeTea", prompt=0, index=i, program=reply.program)
+        for i, reply in enumerate(replies)
+    ]
+    kinds = [(row["failure"] or {"kind": None})["kind"] for row in evaluate(rows, suite, workers=1)]
+    assert kinds == [reply.fails for reply in replies] == [None, "SayAtLocation", "SayAtLocation"]
+
+
+def test_a_new_task_leaves_programs_that_are_recorded_for_it(tmp_path: Path) -> None:
+    recorded = tmp_path / "recorded" / "careful" / "MakeTea.yaml"
+    recorded.parent.mkdir(parents=True)
+    recorded.write_text("[]\n")
+    new_task(tmp_path, "MakeTea")
+    assert [*tmp_path.glob("recorded/*/*")] == [recorded]
 
 
 # --- the paper's suite
