@@ -324,7 +324,7 @@ def _sentence(error: ErrorDetails, name: str) -> str:
     plain = plain[:1].lower() + plain[1:]
     if isinstance(value, Mapping | Sequence) and not isinstance(value, str):
         return f"{name} is not as it should be: {plain}"
-    return f"{name} is {value!r}, but {plain}"
+    return f"{name} is {value if isinstance(value, date) else repr(value)}, but {plain}"
 
 
 def _instead_of(expected: str, value: object) -> str:

@@ -95,6 +95,18 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, s
             SUITE + "rules: {limits: {ticks: 1000000001}}\n",
             'line 3: "ticks" is 1000000001, but it should be less than or equal to 1000000000',
         ),
+        (
+            SUITE + "rules: {clock_starts: 5}\n",
+            'line 3: "clock_starts" is 5, but it should be a time from 1970',
+        ),
+        (
+            SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00\n",
+            'line 4: "clock_starts" is 2024-01-01 12:00:00, but it should be a time from 1970 to 2099',
+        ),
+        (
+            SUITE + "rules:\n  clock_starts: 9999-12-31T23:59:59Z\n",
+            "but it should be a time from 1970 to 2099",
+        ),
         (SUITE + "rules: {literals: loud}\n", "line 3: \"literals\" is 'loud', but it should be"),
         (SUITE + "rules: {gravity: 9.81}\n", 'line 3: the key "gravity" means nothing here'),
         (SUITE + "rules: {skill_seconds: 2}\n", 'line 3: "skill_seconds" is 2, but it should be 0'),
@@ -105,6 +117,11 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, s
 def test_a_rule_that_is_not_known_gets_a_sentence(tmp_path: Path, suite: str, sentence: str) -> None:
     with pytest.raises(BadInput, match=re.escape(sentence)):
         load_suite(a_suite(tmp_path, suite=suite))
+
+
+def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
+    suite = load_suite(a_suite(tmp_path, suite=SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00+02:00\n"))
+    assert suite.rules.clock_starts.timestamp() == 1_704_103_200
 
 
 def test_an_unknown_suite_gets_a_sentence() -> None:
