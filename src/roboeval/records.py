@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import json
-import lzma
 import os
-import re
-import zipfile
-import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Annotated, Any, BinaryIO, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from codebotler.badinput import BadInput, read_text
+from codebotler.badinput import BadInput
 from codebotler.models.recorded import recorded_model
 from roboeval.suite import Suite
 
@@ -42,8 +37,8 @@ class Completion(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True, strict=True)
 
     task: str
-    prompt: Annotated[int, Field(ge=0)]
-    index: Annotated[int, Field(ge=0)]
+    prompt: Annotated[int, Field(ge=0, lt=1_000_000_000)]
+    index: Annotated[int, Field(ge=0, lt=1_000_000_000)]
     program: str
     instruction: str | None = None
     model: str | None = None
@@ -136,9 +131,21 @@ def read_completions(path: Path, *, growing: bool = False) -> Iterator[Completio
                 line=number,
             )
         seen[completion.key] = number
+        check_length(row, path, number)
         yield completion
     if not seen:
         raise BadInput("there is no completion in it", file=path)
+
+
+def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
+    """Refuse what would be too long to be read again once it is copied into a run.
+
+    Raises:
+        BadInput: it is.
+    """
+    if len(to_line(row)) > MAX_ROW:
+        sentence = f"as a row this is longer than {MAX_ROW:,} bytes; shorten the program"
+        raise BadInput(sentence, file=str(file), line=line)
 
 
 def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -203,94 +210,13 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
         raise BadInput(f'{name} knows no instruction of the suite "{suite.name}"')
 
 
-UNREADABLE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    lzma.LZMAError,
-    UnicodeDecodeError,
-    NotImplementedError,
-    RuntimeError,
-    EOFError,
-    OSError,
-)
-PUBLISHED = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
-
-
-def published_completions(path: Path) -> Iterator[Completion]:
-    """Read a folder or zip of `TASK_PROMPT_INDEX.py`, as the paper's authors published theirs.
-
-    The files assign texts to `name`, `prompt` and `completion`; they are parsed and never imported.
-
-    Raises:
-        BadInput: it holds no such file, or one of them is wrong.
-    """
-    files = _zipped(path) if path.is_file() else _in_folder(path)
-    found = [(match, name, text) for name, text in files if (match := PUBLISHED.fullmatch(Path(name).name))]
-    if not found:
-        raise BadInput("there is no file named TASK_PROMPT_INDEX.py in it", file=path)
-    found.sort(key=lambda item: (item[0]["task"], int(item[0]["prompt"]), int(item[0]["index"])))
-    seen: dict[Key, str] = {}
-    for match, name, text in found:
-        key = match["task"], int(match["prompt"]), int(match["index"])
-        if key in seen:
-            raise BadInput(f"{name_of(key)} stands here again; {seen[key]} holds it already", file=name)
-        seen[key] = name
-        values = _assigned(text, name)
-        yield Completion(
-            task=key[0],
-            prompt=key[1],
-            index=key[2],
-            instruction=values.get("prompt"),
-            program=values["completion"],
-        )
-
-
-def _in_folder(path: Path) -> Iterator[tuple[str, str]]:
-    for file in sorted(path.rglob("*.py")):
-        yield str(file), read_text(file, limit=MAX_ROW)
-
-
-def _zipped(path: Path) -> Iterator[tuple[str, str]]:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            for member in archive.infolist():
-                name = PurePosixPath(member.filename)
-                if name.is_absolute() or ".." in name.parts:
-                    raise BadInput(f'the zip names a file outside itself, "{member.filename}"', file=path)
-                if member.file_size > MAX_ROW:
-                    raise BadInput(f'"{member.filename}" is larger than {MAX_ROW:,} bytes', file=path)
-                if name.suffix == ".py":
-                    yield f"{path}/{member.filename}", archive.read(member).decode()
-    except UNREADABLE as error:
-        raise BadInput(f"is no readable zip ({error})", file=path) from None
-
-
-def _assigned(text: str, name: str) -> dict[str, str]:
-    try:
-        statements = ast.parse(text).body
-        values = {
-            target.id: ast.literal_eval(statement.value)
-            for statement in statements
-            if isinstance(statement, ast.Assign)
-            for target in statement.targets
-            if isinstance(target, ast.Name) and target.id in ("name", "prompt", "completion")
-        }
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise BadInput(f"cannot be read as assignments of texts ({error})", file=name) from None
-    if not isinstance(values.get("completion"), str):
-        raise BadInput("does not assign a text to `completion`", file=name)
-    return {key: value for key, value in values.items() if isinstance(value, str)}
-
-
 # --- writing
 
 
-def to_line(row: dict[str, Any]) -> bytes:
-    """A row as a line of JSON, in UTF-8 where that is possible."""
-    try:
-        return json.dumps(row, ensure_ascii=False).encode() + b"\n"
-    except UnicodeEncodeError:  # half of a surrogate pair, which JSON can escape and UTF-8 cannot hold
-        return json.dumps(row).encode() + b"\n"
+def to_line(row: Mapping[str, Any]) -> bytes:
+    """A row as a line of JSON, in UTF-8."""
+    # Half of a surrogate pair, which UTF-8 cannot hold, becomes an escape, which JSON reads.
+    return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 
 
 @dataclass

@@ -6,7 +6,7 @@ import contextlib
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,13 @@ from typing import Any
 from codebotler import __version__
 from codebotler.badinput import BadInput, read_text
 from roboeval.evaluate import evaluate, head
+from roboeval.published import published_completions
 from roboeval.records import (
     COMPLETIONS,
     Appender,
     Completion,
     check_known,
     name_of,
-    published_completions,
     read_completions,
     read_evaluations,
     recorded_completions,
@@ -132,14 +132,15 @@ class Run:
         Raises:
             BadInput: one of them is wrong, or other completions are here; then nothing is changed.
         """
-        lines = b"".join(to_line(c.model_dump(exclude_unset=True)) for c in source.checked(suite))
+        models = {completion.model for completion in source.checked(suite)}
+        lines = (to_line(c.model_dump(exclude_unset=True)) for c in source.read())
         if self.completions.exists():
-            if self.completions.read_bytes() != lines:
-                raise BadInput("this run holds other completions; name another folder", file=self.path)
+            with self.completions.open("rb") as file:
+                if not all(file.read(len(line)) == line for line in lines) or file.read(1):
+                    raise BadInput("this run holds other completions; name another folder", file=self.path)
             return
-        models = {c.model for c in source.read()}
         about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
-        write_whole(self.path / "run.json", to_text(about))
+        write_whole(self.path / "run.json", [to_text(about)])
         write_whole(self.completions, lines)
 
 
@@ -206,7 +207,7 @@ def _judged(rows: Path, completions: Iterator[Completion]) -> Iterator[dict[str,
 
 def _go_on_or_refuse(path: Path, about: dict[str, Any]) -> None:
     if not path.exists():
-        write_whole(path, to_text(about))
+        write_whole(path, [to_text(about)])
         return
     was = load_head(path)
     changed = [name for name in about if was.get(name) != about[name]]
@@ -273,15 +274,19 @@ def tasks_to_judge(
     return kept, left
 
 
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or as it was."""
+def write_whole(path: Path, content: Iterable[bytes]) -> None:
+    """Write a file piece by piece, so that it is there whole or as it was."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".new")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    try:
+        with temporary.open("wb") as file:
+            file.writelines(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def to_text(data: dict[str, Any]) -> bytes:

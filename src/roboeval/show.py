@@ -142,7 +142,7 @@ def _scenario(suite: Suite, row: Row, number: int, *, ablated: bool) -> Scenario
 
 
 def _trace(verdict: Row, scenario: Scenario | None) -> Trace:
-    trace = trace_from(verdict["trace"])
+    trace = trace_from(verdict["trace"], further=True)
     return trace if scenario is None else located(trace, scenario.world)
 
 
