@@ -116,7 +116,7 @@ def _started() -> Child:
     ours, theirs = socket.socketpair()
     with theirs:
         process = start(PREPARER, theirs.fileno())
-    return Child(process.pid, ours, process.wait)
+    return Child(process.pid, ours, process.wait, closes=False)
 
 
 def refused(kind: str, message: str, line: int | None = None) -> Outcome:

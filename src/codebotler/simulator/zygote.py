@@ -64,7 +64,7 @@ class Zygote:
             ours.close()
             raise LostChildError("the zygote has ended") from None
         self._has_child = True
-        return Child(pid, ours, self._end_of_child)
+        return Child(pid, ours, self._end_of_child, closes=self.has_seccomp)
 
     def kill(self) -> None:
         """End it and with it a run that is still going on."""

@@ -138,7 +138,7 @@ def test_pairs_are_read_only_a_little_ahead() -> None:
 # --- the same everywhere
 
 UNSTEADY = """
-import random, datetime, uuid
+import random, datetime, uuid, os, secrets, tempfile, logging, threading
 class A: pass
 def task_program():
     say(str(object()) + str(A()) + repr(task_program))
@@ -154,6 +154,10 @@ def task_program():
     random.shuffle(items)
     say(str(items))
     say(str(time.time()) + str(time.perf_counter()) + str(datetime.datetime.now()))
+    say(str(uuid.uuid4()) + str(uuid.uuid1()) + secrets.token_hex() + str(os.urandom(8)))
+    say(next(tempfile._get_candidate_names()) + str(random._inst.__class__().random()))
+    say(str(logging.LogRecord("", 0, "", 0, "", (), None).__dict__))
+    say(str(threading.get_native_id()) + str(threading.get_ident()) + str(os.getppid()))
     say("NUMBER")
 """
 
@@ -166,7 +170,7 @@ def test_outcome_depends_neither_on_workers_nor_on_the_start_nor_on_what_ran_bef
     before = [(saying("x" * number), WORLD) for number in range(5)]
     assert list(run([*before, *reversed(pairs)], workers=1, rules=AS_WRITTEN))[5:] == first[::-1]
     assert len({tuple(said(outcome)[:-1]) for outcome in first}) == 1
-    assert len(said(first[0])) == 10
+    assert len(said(first[0])) == 14
 
 
 # --- nothing is left

@@ -7,12 +7,12 @@ import os
 import sys
 from _socket import CMSG_SPACE, socket
 from marshal import loads
-from posix import getpid
+from posix import getpid, getppid
 
 from codebotler.simulator.sandbox.channel import CHANNEL, receive, send
 from codebotler.simulator.sandbox.execution import Run
 from codebotler.simulator.sandbox.surroundings import simulate_surroundings
-from codebotler.simulator.sandbox.walls import die_with_parent, enclose, usable_filter
+from codebotler.simulator.sandbox.walls import die_with_parent, enclose, give_up_rights, usable_filter
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ def serve(root: str, *, library: bool) -> None:
         root: the folder from which our own modules were imported; programs do not find it.
         library: whether programs are to find the standard library.
     """
-    die_with_parent()
-    seccomp = usable_filter()
     door = socket(fileno=DOOR)
     run = Run()
     simulate_surroundings(run)
@@ -46,6 +44,8 @@ def serve(root: str, *, library: bool) -> None:
     for name in [name for name in sys.modules if name.partition(".")[0] == "codebotler"]:
         del sys.modules[name]
     sys.meta_path[:] = [NothingMore() if library else MoreInTheLibrary()]
+    give_up_rights()
+    seccomp = usable_filter()
     gc.collect()
     gc.freeze()
     report(0 if seccomp is None else 1)
@@ -115,7 +115,10 @@ def child(line: int, run: Run, seccomp: Filter | None, parent: int) -> NoReturn:
     """Be the child of one run: take the channel, close the walls, run the program, say how it ended."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
-    enclose(seccomp, parent)
+    die_with_parent()
+    if getppid() != parent:  # it died before that: no signal will come
+        os._exit(1)
+    enclose(seccomp)
     steady_heap()
     code, skills, limits = receive()
     if skills != run.skills:
@@ -130,10 +133,7 @@ def steady_heap() -> None:
 
 
 KEPT: list[object] = []
-SIZES, EACH = (
-    range(0, 512 - 33, 16),
-    3,
-)  # every size that Python's own allocator serves; a bytes object adds 33
+SIZES, EACH = range(0, 144, 16), 3
 
 
 def report(number: int) -> None:

@@ -64,6 +64,9 @@ def simulate_chance() -> None:
         def __new__(cls, *_: object, **__: object) -> Self:
             return super().__new__(cls, 0)  # type: ignore[call-arg]  # a seed
 
+        def __init__(self, *_: object, **__: object) -> None:
+            self.seed()
+
         def seed(self, a: Any = None, /) -> None:  # noqa: ANN401 - as in _random
             super().seed(0 if a is None else a)
 

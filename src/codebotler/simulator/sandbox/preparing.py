@@ -14,7 +14,7 @@ from marshal import dumps
 from codebotler.simulator.sandbox import IMPORTING, PLAIN, REFUSED
 from codebotler.simulator.sandbox.channel import CHANNEL, receive, send_bytes
 from codebotler.simulator.sandbox.ticks import prepared
-from codebotler.simulator.sandbox.walls import enclose, usable_filter
+from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
 
 DOOR = 4
 ALWAYS_THERE = frozenset({"sys", "time", "__future__"})
@@ -24,11 +24,12 @@ WITHOUT_REFERENCES = 2  # later versions of the format depend on what else this 
 
 def serve() -> None:
     """Prepare one program after the other until the engine closes its end."""
+    give_up_rights()
     seccomp = usable_filter()
     answer(REHEARSAL, lowercase=True)
     os.dup2(DOOR, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
-    enclose(seccomp, None)
+    enclose(seccomp)
     while True:
         source, lowercase = receive()
         send_bytes(answer(source, lowercase=lowercase))

@@ -6,7 +6,6 @@ import ctypes
 import os
 import resource
 import sys
-from posix import getppid
 
 from codebotler.simulator.sandbox.channel import CHANNEL
 
@@ -20,37 +19,33 @@ MEMORY = 512 * 1024 * 1024
 CPU_SECONDS = 5
 
 
-def enclose(seccomp: Filter | None, parent: int | None) -> None:
-    """Close everything but the channel and give up every right, in the only order that works.
-
-    Args:
-        seccomp: what may be asked of the kernel; None where it takes no such list.
-        parent: the process that must still be there; None for a process whose line tells it.
-    """
-    limit_resources()
-    give_up_identity()
-    die_with_parent()
-    if parent is not None and getppid() != parent:  # it died before that: no signal will come
-        os._exit(1)
-    prctl(PR_SET_DUMPABLE, 0)
-    prctl(PR_SET_NO_NEW_PRIVS, 1)
-    if seccomp is not None:
-        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
-
-
-def limit_resources() -> None:
-    """Set what this process may use; it can never ask for more again."""
+def give_up_rights() -> None:
+    """Give up for ever what neither this process needs nor any that it forks."""
     for kind in (
         resource.RLIMIT_CORE,
         resource.RLIMIT_FSIZE,
-        resource.RLIMIT_NPROC,
         resource.RLIMIT_MEMLOCK,
         resource.RLIMIT_MSGQUEUE,
     ):
         resource.setrlimit(kind, (0, 0))
-    resource.setrlimit(resource.RLIMIT_NOFILE, (CHANNEL + 1, CHANNEL + 1))
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    give_up_identity()
+    prctl(PR_SET_DUMPABLE, 0)
+    prctl(PR_SET_NO_NEW_PRIVS, 1)
+    die_with_parent()
+
+
+def enclose(seccomp: Filter | None) -> None:
+    """Close everything but the channel; after `give_up_rights`, here or in the process that forked this one.
+
+    Args:
+        seccomp: what may be asked of the kernel; None where it takes no such list.
+    """
+    resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (CHANNEL + 1, CHANNEL + 1))
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 1))
+    if seccomp is not None:
+        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
 
 
 def give_up_identity() -> None:
