@@ -197,7 +197,8 @@ class _Absence:
     def not_there(self, stay: list[int], place: str, moves: Stay) -> Explanation:
         span = self.window.span
         arrivals = [at for at in range(*span) if matches(moves.arrival, self.trace, at)]
-        outside = [at for at in arrivals if at not in set(stay)]
+        inside = set(stay)
+        outside = [at for at in arrivals if at not in inside]
         if isinstance(self.test, ActAtFirst):
             there = "there" if len(outside) == 1 else "during that stay"
             went = f"went to {room_name(self.trace[arrivals[0]].text)} at step {arrivals[0] + 1}"
