@@ -152,9 +152,9 @@ LUNCH = (
             'tr.ActAtFirst("kitchen", pick("mug")) or tr.Exists(pick("mug"))',
             None,
             (
-                "one of two things had to be so, but the robot never went to the kitchen, where it was to "
-                "pick up \"mug\": it only went to alice's office, bob's office and the lobby, and "
-                'the robot never picked up "mug"'
+                'one of two things had to be so, but the robot never picked up "mug", and it never went to '
+                'the kitchen, where it was to pick up "mug": '
+                "it only went to alice's office, bob's office and the lobby"
             ),
         ),
         (

@@ -187,7 +187,8 @@ def room_name(name: str) -> str:
     Args:
         name: as the robot was told.
     """
-    return f"the {name}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else _shortened(name) or '""'
+    short = shortened(name)
+    return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else short or '""'
 
 
 def quoted(text: str) -> str:
@@ -196,7 +197,17 @@ def quoted(text: str) -> str:
     Args:
         text: any text.
     """
-    return f'"{_shortened(text)}"'
+    return f'"{shortened(text)}"'
+
+
+def shortened(text: str) -> str:
+    """A text on one line, cut off where it is too long for a sentence.
+
+    Args:
+        text: any text.
+    """
+    line = " ".join(text.split())
+    return line if len(line) <= _SHOWN else line[: _SHOWN - 1].rstrip() + "…"
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
@@ -333,8 +344,3 @@ def _topic(text: Text, question: str) -> str:
             return f"about {listed(names, 'or')}"
         case _:
             return f"{question} {with_texts(text)}"
-
-
-def _shortened(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= _SHOWN else line[: _SHOWN - 1].rstrip() + "…"
