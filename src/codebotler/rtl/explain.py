@@ -7,7 +7,7 @@ from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or, Stay
-from codebotler.rtl.semantics import CannotJudge, at_place, first, first_stay, holds, matches
+from codebotler.rtl.semantics import CannotJudge, at_place, cut, first, first_stay, holds, matches
 from codebotler.rtl.window import Window
 from codebotler.rtl.wording import (
     did,
@@ -372,7 +372,7 @@ def _joined(facts: list[_Fact]) -> str:
     return listed([listed([fact.told for fact in group]) + where for where, group in groups], "and also")
 
 
-def _fact(formula: Formula, trace: Trace) -> _Fact:  # noqa: PLR0911 - one for each kind of formula
+def _fact(formula: Formula, trace: Trace) -> _Fact:
     match formula:
         case And(parts):
             facts = [_fact(part, trace) for part in parts]
@@ -393,7 +393,7 @@ def _fact(formula: Formula, trace: Trace) -> _Fact:  # noqa: PLR0911 - one for e
     assert_never(formula)
 
 
-def _fact_of_false(formula: Formula, trace: Trace) -> _Fact:
+def _fact_of_false(formula: Formula, trace: Trace) -> _Fact:  # noqa: PLR0911 - one for each kind of formula
     """What is so because a formula is not."""
     match formula:
         case Not(part):
@@ -406,10 +406,13 @@ def _fact_of_false(formula: Formula, trace: Trace) -> _Fact:
             return _fact(Exists(element, formula.cuts), trace)
         case Count() | AtLeast():
             return _counted(formula, trace)
-    reason = _why_false(formula, trace)
-    told = reason.told.removeprefix(_ROBOT)
-    how = "" if told != reason.told else "acted so that "
-    return _Fact(reason.event, f"{how}{told}{reason.detail}")
+        case ActAtFirst() | ActAtSome() if (
+            first(formula.stay.arrival, trace, cut(formula.cuts, trace)) is None
+        ):
+            return _fact_of_false(Exists(formula.stay.arrival, formula.cuts), trace)
+    absence = _why_false(formula, trace).told
+    told = absence.removeprefix(_ROBOT)
+    return _Fact(None, told if told != absence else f"acted so that {told}")
 
 
 def _deed_at_place(test: ActAtFirst | ActAtSome, trace: Trace) -> _Fact:

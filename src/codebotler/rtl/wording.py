@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from codebotler.rtl.formula import Element, Regex, Text, Without, Words
+from codebotler.rtl.formula import Element, Regex, Text, Without, Words, compile_regex
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -34,6 +34,7 @@ _PASTIMES = {
     "pick": "picked something up",
     "place": "put something down",
 }
+_END_OF_WORD = r"\b"
 _SHOWN = 70
 _MOST = 5
 
@@ -114,7 +115,7 @@ def lacking(deed: Deed, event: Event) -> str:
     named = len(absent) > 1 or not absent or not absent[0].startswith("does not match")
     reasons = [f"which {listed(absent) if named else 'does not match'}"] if absent else []
     if not event.options and deed[0].options is not None:
-        return ", and ".join([*reasons, "it had no options"])
+        return f"{reasons[0]}, and it had no options" if reasons else "which does not count without options"
     if len(deed) > 1:
         return ", and ".join([*reasons, f"none of its options ({_options(event)}) does better"])
     if not absent and deed[0].options is not None:
@@ -140,13 +141,13 @@ def lacks(text: Text, actual: str) -> list[str]:
         case Words(parts):
             absent = [lack for part in parts for lack in lacks(part, actual)]
             return _merged(absent, "lacks ")
-        case _ if text.matches(actual):
-            return []
-        case Without(pattern):
-            return [f"has {_word(pattern)}"]
+        case Without():
+            return [f"has the word {quoted(found[0])}"] if (found := text.compiled.search(actual)) else []
         case Regex(pattern):
-            if start := _forbidden_start(pattern):
-                return [f'starts with "{start}"']
+            if text.matches(actual):
+                return []
+            if (start := _forbidden_start(pattern)) and (found := compile_regex(start).match(actual)):
+                return [f"starts with {quoted(found[0])}"]
             return [f"lacks {named}" if (named := _named(pattern)) else f"does not match /{pattern}/"]
 
 
@@ -267,7 +268,7 @@ def _qualities(text: Text) -> list[str]:
             if is_any(text):
                 return []
             if start := _forbidden_start(pattern):
-                return [f'not starting with "{start}"']
+                return [f'not starting with "{listed(literals(start.removesuffix(_END_OF_WORD)), "or")}"']
             return [f"with {named}" if (named := _named(pattern)) else f"matching /{pattern}/"]
 
 
@@ -284,8 +285,9 @@ def _word(pattern: str) -> str:
 
 
 def _forbidden_start(pattern: str) -> str:
-    inner = re.fullmatch(r"\^\(\?!(.*)\\b\)", pattern)
-    return listed(literals(inner[1]), "or") if inner else ""
+    """What a text must not start with, as a regex, where a pattern says nothing else."""
+    inner = re.fullmatch(r"\^\(\?!((.*)\\b)\)", pattern)
+    return inner[1] if inner and literals(inner[2]) else ""
 
 
 def _merged(parts: list[str], head: str) -> list[str]:
