@@ -162,7 +162,7 @@ LUNCH = (
             1,
             (
                 'the robot never mentioned "tea" in a question or its options: it asked "do you want '
-                'lunch?" at step 2, which lacks "tea", and none of its options ("yes" and "no") does better'
+                'lunch?" at step 2, which lacks "tea", and none of its options ("yes" and "no") will do'
             ),
         ),
         (

@@ -280,7 +280,8 @@ class _Absence:
     def went(self, here: Sequence[int]) -> str:
         rooms = dict.fromkeys(self.trace[at].text for at in here if self.trace[at].kind == "goto")
         if not rooms:
-            return "" if any(event.kind == "goto" for event in self.trace) else ": it went nowhere"
+            told = is_any(self.deed[0].text) or any(event.kind == "goto" for event in self.trace)
+            return "" if told else ": it went nowhere"
         names = [room_name(name) for name in rooms]
         shown = names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST} more rooms"]
         return f": it only went to {listed(shown)}"
@@ -301,7 +302,7 @@ class _Absence:
 
     def likeness(self, at: int) -> tuple[int, int]:
         event = self.trace[at]
-        return -min(missing(element.text, event.text) for element in self.deed), -at
+        return -max(missing(element.text, event.text) for element in self.deed), -at
 
     def because(self, told: str, event: int | None = None, detail: str = "") -> _Reason:
         return _Reason(self.test, event, told, detail)

@@ -117,7 +117,7 @@ def lacking(deed: Deed, event: Event) -> str:
     if not event.options and deed[0].options is not None:
         return f"{reasons[0]}, and it had no options" if reasons else "which does not count without options"
     if len(deed) > 1:
-        return ", and ".join([*reasons, f"none of its options ({_options(event)}) does better"])
+        return ", and ".join([*reasons, f"none of its options ({_options(event)}) will do"])
     if not absent and deed[0].options is not None:
         wanted = with_texts(deed[0].options)
         is_one = f"has {wanted.removeprefix('with ')}" if wanted.startswith("with ") else f"is one {wanted}"
