@@ -57,6 +57,25 @@ CHAT: Trace = (
     Event("wave", "bob"),
     Event("say", "no cake"),
 )
+NUMBERS: Trace = (
+    Event("ask", "which?", tuple(Option(str(number)) for number in range(5))),
+    Event("ask", "whose?", (Option("1" * 71, is_text=False),)),
+    *[Event("say", "go")] * 1010,
+)
+DONE: Trace = (
+    Event("wave", "bob"),
+    Event("check", "cat"),
+    Event("pick", "mug"),
+    Event("place", "mug"),
+    Event("goto", "an attic"),
+    Event("wave", "tom"),
+    Event("check", "dog"),
+    Event("ask", "ok?", YES_NO),
+    Event("pick", "cup"),
+    Event("place", "cup"),
+    Event("goto", "alice's room"),
+    Event("goto", "Hall"),
+)
 TRACES = {
     "LUNCH": LUNCH,
     "TWICE": TWICE,
@@ -65,6 +84,8 @@ TRACES = {
     "OFTEN": OFTEN,
     "LONG": LONG,
     "CHAT": CHAT,
+    "NUMBERS": NUMBERS,
+    "DONE": DONE,
 }
 
 # Of each explanation: the trace and the step that is to blame, the formula, the sentence.

@@ -283,7 +283,7 @@ class _Absence:
             told = is_any(self.deed[0].text) or any(event.kind == "goto" for event in self.trace)
             return "" if told else ": it went nowhere"
         names = [room_name(name) for name in rooms]
-        shown = names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST} more rooms"]
+        shown = names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST:,} more"]
         return f": it only went to {listed(shown)}"
 
     def placed(self, done: list[int]) -> str:

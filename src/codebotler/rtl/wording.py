@@ -127,7 +127,7 @@ def lacking(deed: Deed, event: Event) -> str:
 
 def _options(event: Event) -> str:
     names = [quoted(option.text) for option in event.options]
-    return listed(names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST} more"])
+    return listed(names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST:,} more"])
 
 
 def lacks(text: Text, actual: str) -> list[str]:
@@ -229,7 +229,7 @@ def times(number: int) -> str:
     Args:
         number: 0 or more.
     """
-    return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number} times")
+    return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number:,} times")
 
 
 def is_any(text: Text) -> bool:
