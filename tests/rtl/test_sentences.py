@@ -76,6 +76,7 @@ DONE: Trace = (
     Event("goto", "alice's room"),
     Event("goto", "Hall"),
 )
+SPACES: Trace = (Event("say", "a" + " " * 80 + "b"),)
 TRACES = {
     "LUNCH": LUNCH,
     "TWICE": TWICE,
@@ -86,6 +87,7 @@ TRACES = {
     "CHAT": CHAT,
     "NUMBERS": NUMBERS,
     "DONE": DONE,
+    "SPACES": SPACES,
 }
 
 # Of each explanation: the trace and the step that is to blame, the formula, the sentence.
