@@ -298,9 +298,11 @@ def _merged(parts: list[str], head: str) -> list[str]:
 
 
 def _destination(text: Text, anywhere: str) -> str:
+    if is_any(text):
+        return anywhere
     match text:
         case Regex(pattern):
-            return anywhere if is_any(text) else f"to {room(pattern)}"
+            return f"to {room(pattern)}"
         case Without(pattern):
             return (
                 f"{anywhere} but to {room(pattern)}"
@@ -308,7 +310,7 @@ def _destination(text: Text, anywhere: str) -> str:
                 else f"elsewhere than to {room(pattern)}"
             )
         case Words():
-            return f"to a room {with_texts(text)}".rstrip()
+            return f"to a room {with_texts(text)}"
 
 
 def _thing(text: Text, thing: str) -> str:
