@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any, Literal, TypeAlias
 
 from rich import box
@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.badinput import BadInput
+from roboeval.evaluation import Scope
 from roboeval.metrics import Estimate, PromptScore, TaskScore, overall, score_by_prompt
 from roboeval.records import Completion, Key
 from roboeval.suite import Suite
@@ -51,14 +52,18 @@ class Summary:
         tasks: those that have completions, in the suite's order.
         overall: pass@k over all prompts with a 95 % interval, for each k.
         failures: by class.
-        missing: tasks of the suite that have no completion.
+        scope: what there is to judge.
+        missing: tasks of the suite that have no score.
+        ablated: whether common sense only was required.
     """
 
     k: tuple[int, ...]
     tasks: tuple[TaskScore, ...]
     overall: tuple[Estimate, ...]
     failures: tuple[Failures, ...]
-    missing: tuple[str, ...]
+    scope: Scope
+    missing: Missing
+    ablated: bool = False
 
     @property
     def prompts(self) -> list[PromptScore]:
@@ -66,34 +71,73 @@ class Summary:
         return [prompt for task in self.tasks for prompt in task.prompts]
 
 
-def summary(rows: Iterable[Row], suite: Suite, *, k: Sequence[int] = (1,)) -> Summary:
+@dataclass(frozen=True)
+class Missing:
+    """Tasks of a suite that have no score, by the reason.
+
+    Args:
+        no_completions: nobody wrote a program for them.
+        not_judged: there are completions, and none has been judged yet.
+        not_selected: they were not asked for.
+    """
+
+    no_completions: tuple[str, ...] = ()
+    not_judged: tuple[str, ...] = ()
+    not_selected: tuple[str, ...] = ()
+
+
+def summary(
+    rows: Iterable[Row],
+    suite: Suite,
+    *,
+    k: Sequence[int] = (1,),
+    scope: Scope | None = None,
+    ablated: bool = False,
+) -> Summary:
     """Count how the completions of an evaluation did.
 
     Args:
-        rows: of the evaluation; read once.
+        rows: of the evaluation; read once and not kept.
         suite: by which they were judged.
         k: how many tries pass@k allows.
+        scope: what there is to judge; what the rows judge by default.
+        ablated: whether common sense only was required; then tasks without an ablation are not missed.
 
     Raises:
         BadInput: there is no row, or pass@k cannot be estimated for some prompt.
     """
     failed: dict[str, Counter[str]] = defaultdict(Counter)
-    results: list[tuple[str, int, bool]] = []
-    for row in rows:
-        results.append((row["task"], row["prompt"], row["passed"]))
-        if (why := row["failure"]) is not None:
-            failed[why["class"]][why["kind"]] += 1
-    if not results:
-        raise BadInput("no completion has been judged, so there is nothing to count")
-    scored = {score.task: score for score in score_by_prompt(results)}
+    judged: Counter[str] = Counter()
+
+    def results() -> Iterator[tuple[str, int, bool]]:
+        for row in rows:
+            judged[row["task"]] += 1
+            if (why := row["failure"]) is not None:
+                failed[why["class"]][why["kind"]] += 1
+            yield row["task"], row["prompt"], row["passed"]
+
+    scored = {score.task: score for score in score_by_prompt(results())}
+    scope = scope or Scope(judged)
+    if not judged:
+        raise BadInput(f"0 of {scope.total:,} completions judged, so there is nothing to count")
     tasks = tuple(scored[name] for name in dict.fromkeys([*suite.tasks, *scored]) if name in scored)
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
         fewest = min(prompt.n for task in tasks for prompt in task.prompts)
         raise BadInput(f"{visible(str(error))}; choose k from 1 to {fewest}") from None
-    missing = tuple(name for name in suite.tasks if name not in scored)
-    return Summary(tuple(k), tasks, estimates, _failures(failed, len(results)), missing)
+    expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
+    missing = _missing([name for name in expected if name not in scored], scope)
+    return Summary(tuple(k), tasks, estimates, _failures(failed, judged.total()), scope, missing, ablated)
+
+
+def _missing(tasks: Sequence[str], scope: Scope) -> Missing:
+    selected = [task for task in tasks if scope.selects(task)]
+    return Missing(
+        no_completions=tuple(task for task in selected if not scope.completions.get(task)),
+        not_judged=tuple(task for task in selected if scope.completions.get(task)),
+        not_selected=tuple(task for task in tasks if not scope.selects(task)),
+    )
 
 
 def _failures(failed: Mapping[str, Counter[str]], n: int) -> tuple[Failures, ...]:
@@ -110,26 +154,44 @@ def _failures(failed: Mapping[str, Counter[str]], n: int) -> tuple[Failures, ...
 # --- for people
 
 
-def render(summary: Summary, *, title: str, ablated: bool = False) -> RenderableType:
+def render(summary: Summary, *, title: str) -> RenderableType:
     """The tables of an evaluation.
 
     Args:
         summary: what they show.
         title: what was judged.
-        ablated: whether common sense only was required.
     """
-    head = Text(visible(title), style="bold")
-    if ablated:
+    head = Text(visible(title) + by_hand(summary.scope.models), style="bold")
+    if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
-    parts: list[RenderableType] = [head, Text(), _task_table(summary), Text(), *_overall(summary)]
-    if summary.missing and not ablated:
-        parts.append(Text(f"no completions of {', '.join(map(visible, summary.missing))}", style="dim"))
     n, failed = _judged(summary.prompts), sum(each.count for each in summary.failures)
+    parts: list[RenderableType] = [head]
+    if n != summary.scope.total:
+        parts.append(Text(f"{n:,} of {summary.scope.total:,} completions judged", style="yellow"))
+    parts += [Text(), _task_table(summary), Text(), *_overall(summary), *_missed(summary.missing)]
     if failed:
         told = f"{failed:,} of {n:,} completions failed ({failed / n:.1%}); shares are of all completions:"
         tables = Columns([_failure_table(each) for each in summary.failures], padding=(1, 3))
         parts += [Text(), Text(told), Text(), tables]
     return Group(*parts)
+
+
+def by_hand(models: Collection[str | None]) -> str:
+    """What a title adds if recorded programs are among those of some models, which stand for no real one."""
+    recorded = [model for model in models if model is not None and model.startswith("recorded:")]
+    if not recorded:
+        return ""
+    return f" ({'' if len(recorded) == len(models) else 'some '}programs written by hand)"
+
+
+def _missed(missing: Missing) -> Iterator[Text]:
+    for reason, tasks in [
+        ("no completions of", missing.no_completions),
+        ("not judged yet:", missing.not_judged),
+        ("not selected:", missing.not_selected),
+    ]:
+        if tasks:
+            yield Text(f"{reason} {', '.join(map(visible, tasks))}", style="dim")
 
 
 def _judged(prompts: Iterable[PromptScore]) -> int:
@@ -181,6 +243,9 @@ def summary_data(summary: Summary) -> dict[str, Any]:
     """A summary as plain data."""
     estimates = zip(summary.k, summary.overall, strict=True)
     return {
+        "models": sorted(model for model in summary.scope.models if model is not None),
+        "judged": _judged(summary.prompts),
+        "to_judge": summary.scope.total,
         **_counts(summary.prompts),
         **{f"pass@{k}": {"mean": e.mean, "low": e.low, "high": e.high} for k, e in estimates},
         "tasks": [_task_score_data(task, summary.k) for task in summary.tasks],
@@ -188,7 +253,7 @@ def summary_data(summary: Summary) -> dict[str, Any]:
             {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}
             for each in summary.failures
         ],
-        "missing": list(summary.missing),
+        "missing": {name: list(tasks) for name, tasks in asdict(summary.missing).items()},
     }
 
 
@@ -312,10 +377,11 @@ def key_of(row: Row) -> Key:
 def prompt_head(prompt: int, rows: Sequence[Row], written: Mapping[Key, Completion]) -> dict[str, Any]:
     """What a prompt told the model, and how many of its completions passed."""
     passed = sum(row["passed"] for row in rows)
-    told = (written[key_of(row)].instruction for row in rows if key_of(row) in written)
+    those = [written[key_of(row)] for row in rows if key_of(row) in written]
     return {
         "prompt": prompt,
-        "instructions": list(dict.fromkeys(text for text in told if text is not None)),
+        "instructions": list(dict.fromkeys(c.instruction for c in those if c.instruction is not None)),
+        "models": list(dict.fromkeys(c.model for c in those if c.model is not None)),
         "completions": len(rows),
         "passed": passed,
         "pass@1": passed / len(rows),
@@ -355,7 +421,9 @@ def task_view(rows: Iterable[Row], completions: Iterable[Completion], suite: Sui
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
     """What `prompt_head` says, for a person."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
-    head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
+    head = Text.assemble(
+        (f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score, by_hand(prompt["models"])
+    )
     return [head, *(Text(visible(text), "italic") for text in prompt["instructions"] or [NOT_RECORDED])]
 
 

@@ -88,16 +88,18 @@ def test_a_line_that_is_no_object(tmp_path: Path) -> None:
 
 
 def test_an_unknown_task(tmp_path: Path) -> None:
-    (tmp_path / "a.jsonl").write_text(row(task="SayGoodNight"))
+    (tmp_path / "a.jsonl").write_text(row() + row(task="SayGoodNight"))
     sentence = refused("evaluate", "a.jsonl", cwd=tmp_path)
-    assert sentence.startswith('a.jsonl: the suite has no task "SayGoodNight"; its tasks are CountSavory,')
+    assert sentence.startswith(
+        'a.jsonl, line 2: the suite has no task "SayGoodNight"; its tasks are CountSavory,'
+    )
 
 
 @pytest.mark.parametrize("prompt", [5, 10**30])
 def test_a_prompt_out_of_range(tmp_path: Path, prompt: int) -> None:
     (tmp_path / "a.jsonl").write_text(row(prompt=prompt))
     assert refused("evaluate", "a.jsonl", cwd=tmp_path) == (
-        f"a.jsonl: SayGoodDay/{prompt}/0: the task has prompts 0 to 4"
+        f"a.jsonl, line 1: SayGoodDay/{prompt}/0: the task has prompts 0 to 4"
     )
 
 

@@ -38,7 +38,7 @@ def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[dict[str, Any]
 
 def careful_run(path: Path, suite: Suite) -> Run:
     run = Run(path)
-    run.keep(Source("recorded:careful", lambda: recorded_completions("recorded:careful", suite)), suite)
+    run.keep(Source(lambda: recorded_completions("recorded:careful", suite)))
     return run
 
 
@@ -206,8 +206,8 @@ def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, pape
     with run.completions.open("ab") as file:
         file.write(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": GREETS}))
     source = open_source(str(run.path), paper)
-    assert [c.task for c in source.checked(paper, frozenset({"LunchTime"}))] == ["LunchTime"]
-    assert [c.task for c in source.checked(paper)] == ["SayGoodDay", "LunchTime"]
+    assert [c.task for c in source.of(frozenset({"LunchTime"}))] == ["LunchTime"]
+    assert [c.task for c in source.of(None)] == ["SayGoodDay", "LunchTime"]
 
 
 def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> None:
@@ -275,6 +275,6 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     path = tmp_path / "rows.jsonl"
     path.write_bytes(to_line(row))
     run = Run(tmp_path / "run")
-    run.keep(open_source(str(path), paper), paper)
+    run.keep(open_source(str(path), paper))
     assert [c.model_dump(exclude_unset=True) for c in read_completions(run.completions)] == [row]
     assert Completion.model_validate(row).key == ("SayGoodDay", 0, 0)

@@ -61,7 +61,8 @@ def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False
 
 def test_a_summary_counts_tasks_prompts_and_failures() -> None:
     data = summary_data(summary(iter(ROWS), SUITE, k=(1, 2)))
-    assert (data["completions"], data["passed"], data["missing"]) == (4, 1, ["Wait"])
+    assert (data["completions"], data["passed"], data["judged"], data["to_judge"]) == (4, 1, 4, 4)
+    assert data["missing"] == {"no_completions": ["Wait"], "not_judged": [], "not_selected": []}
     assert data["pass@1"]["mean"] == 0.25
     assert data["pass@2"]["mean"] == 0.5
     (task,) = data["tasks"]
@@ -96,7 +97,7 @@ def test_tasks_stand_in_the_order_of_the_suite() -> None:
 
 
 def test_nothing_to_count_is_said() -> None:
-    with pytest.raises(BadInput, match=r"^no completion has been judged, so there is nothing to count$"):
+    with pytest.raises(BadInput, match=r"^0 of 0 completions judged, so there is nothing to count$"):
         summary([], SUITE)
 
 
@@ -127,7 +128,7 @@ def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:
 
 
 def test_an_ablation_is_named_and_misses_no_task() -> None:
-    text = printed(tables.render(summary(ROWS, SUITE), title="x", ablated=True))
+    text = printed(tables.render(summary(ROWS, SUITE, ablated=True), title="x"))
     assert "x (ablation: only common sense was required)" in text
     assert "Wait" not in text
 
@@ -141,6 +142,7 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
     assert data["prompts"][0] == {
         "prompt": 0,
         "instructions": ["Visit her."],
+        "models": [],
         "completions": 2,
         "passed": 1,
         "pass@1": 0.5,
