@@ -116,7 +116,7 @@ def write(frame: pl.DataFrame, path: Path, kind: str) -> None:
     if path.exists() and not path.is_file():  # such as /dev/stdout, which nothing may take the place of
         path.write_bytes(content.getbuffer())
     else:
-        write_whole(path.resolve(), content.getbuffer())
+        write_whole(path.resolve() if path.is_symlink() else path, content.getbuffer())
 
 
 def _harmless(frame: pl.DataFrame) -> pl.DataFrame:

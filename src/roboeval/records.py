@@ -375,7 +375,10 @@ class Appender:
     def close(self) -> None:
         """Bring everything to the disk."""
         with self._file:
-            os.fsync(self._file.fileno())
+            try:
+                os.fsync(self._file.fileno())
+            except OSError as error:
+                raise OSError(error.errno, error.strerror, str(self.path)) from None
 
 
 def whole_length(path: Path) -> int:

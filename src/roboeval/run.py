@@ -82,13 +82,13 @@ def open_source(text: str, suite: Suite) -> Source:
 
 def _spooled(path: Path) -> Path:
     """A file with what a pipe says, since that is read more than once; it is gone when this process ends."""
-    try:
-        with path.open("rb") as pipe, tempfile.TemporaryFile() as file:
+    with path.open("rb") as pipe, tempfile.TemporaryFile() as file:
+        try:
             shutil.copyfileobj(pipe, file)
             file.flush()
-            return Path(f"/proc/self/fd/{os.dup(file.fileno())}")
-    except OSError as error:
-        raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
+        return Path(f"/proc/self/fd/{os.dup(file.fileno())}")
 
 
 @dataclass(frozen=True)

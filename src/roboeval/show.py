@@ -252,7 +252,9 @@ def prompt_view(
     table = grid("right", "left")
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _told(program))
-    return Group(*prompt_lines(task, data), Text(), table)
+    lines = prompt_lines(task, data)
+    lines[0].append(by_hand(data["models"]))
+    return Group(*lines, Text(), table)
 
 
 def _told(program: Mapping[str, Any]) -> Text:

@@ -405,7 +405,8 @@ def _failure_kinds(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def task_view(rows: Iterable[Row], completions: Iterable[Completion], suite: Suite, task: str) -> Group:
     """What `task_data` says, for a person."""
     data = task_data(rows, completions, suite, task)
-    parts: list[RenderableType] = [Text(visible(task), style="bold")]
+    models = {model for prompt in data["prompts"] for model in prompt["models"]}
+    parts: list[RenderableType] = [Text(visible(task) + by_hand(models), style="bold")]
     if data["summary"]:
         parts.append(Text(visible(data["summary"])))
     for prompt in data["prompts"]:
@@ -421,9 +422,7 @@ def task_view(rows: Iterable[Row], completions: Iterable[Completion], suite: Sui
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
     """What `prompt_head` says, for a person."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
-    head = Text.assemble(
-        (f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score, by_hand(prompt["models"])
-    )
+    head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
     return [head, *(Text(visible(text), "italic") for text in prompt["instructions"] or [NOT_RECORDED])]
 
 
