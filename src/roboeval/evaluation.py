@@ -107,7 +107,9 @@ class Evaluation:
         if not self.stale:
             return None
         first, others = name_of(next(iter(self.stale))), len(self.stale) - 1
-        rows = f"{first} and {others:,} other rows judge" if others else f"{first} judges"
+        rows = f"{first} and {others:,} other {'rows' if others > 1 else 'row'} judge"
+        if not others:
+            rows = f"{first} judges"
         return f"{rows} another program than stands in {self.run.completions} now"
 
     def unfinished(self) -> str | None:

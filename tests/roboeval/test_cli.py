@@ -439,7 +439,7 @@ def test_a_program_that_was_changed_since_it_was_judged_is_noticed(tmp_path: Pat
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     (tmp_path / "run" / "completions.jsonl").write_text(row() + row(1, "say('other')") + row(2, "say('one')"))
     changed = (
-        "SayGoodDay/0/1 and 1 other rows judge another program than stands in run/completions.jsonl now; "
+        "SayGoodDay/0/1 and 1 other row judge another program than stands in run/completions.jsonl now; "
         "`roboeval evaluate run --redo` judges what stands there"
     )
     for what in ((), ("SayGoodDay",), ("SayGoodDay/0",), ("SayGoodDay/0/1",)):

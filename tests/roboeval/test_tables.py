@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import weakref
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from rich.console import Console, RenderableType
 from codebotler.badinput import BadInput
 from codebotler.simulator.rules import Rules
 from roboeval import tables
+from roboeval.evaluation import Scope
 from roboeval.records import Completion
 from roboeval.suite import Suite, Task
 from roboeval.tables import Selection, parse_selection, summary, summary_data, visible
@@ -119,6 +122,41 @@ def test_the_tables_fit_and_break_no_number(width: int) -> None:
     assert "no completions of Wait" in text
     assert re.search(r"\n  NameError +4,000  100\.0%", text)
     assert "ExhaustiveSearch" in text
+
+
+def test_tasks_without_a_score_are_told_apart() -> None:
+    suite = replace(SUITE, tasks={name: replace(TASK, name=name) for name in ("Visit", "A", "B", "C")})
+    scope = Scope({"Visit": 9, "B": 2, "C": 5}, frozenset({"Visit", "A", "B"}))
+    counted = summary(ROWS, suite, scope=scope)
+    data = summary_data(counted)
+    assert data["missing"] == {"no_completions": ["A"], "not_judged": ["B"], "not_selected": ["C"]}
+    assert (data["judged"], data["to_judge"]) == (4, 11)
+    text = printed(tables.render(counted, title="x"))
+    assert text.startswith("x\n4 of 11 completions judged\n")
+    assert "no completions of A\nnot judged yet: B\nnot selected: C\n" in text
+    with pytest.raises(BadInput, match=r"^0 of 11 completions judged, so there is nothing to count$"):
+        summary([], suite, scope=scope)
+
+
+def test_a_finished_evaluation_does_not_count_what_it_judged() -> None:
+    assert "completions judged" not in printed(tables.render(summary(ROWS, SUITE), title="x"))
+
+
+def test_rows_are_counted_and_not_kept() -> None:
+    alive: list[weakref.ref[object]] = []
+
+    class Kept(dict[str, Any]):
+        pass
+
+    def rows() -> Iterator[dict[str, Any]]:
+        for index in range(100):
+            each = Kept(row(0, index))
+            alive.append(weakref.ref(each))
+            yield each
+            del each
+            assert sum(ref() is not None for ref in alive) <= 2
+
+    assert summary(rows(), SUITE).prompts[0].n == 100
 
 
 def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:
