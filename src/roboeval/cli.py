@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Item = TypeVar("Item")
 
-QUIET_S = 2.0  # for so long may a command say nothing
+QUIET_S = 2.0  # for so long does a command say nothing at first; lines of a long one come more seldom
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -368,21 +368,22 @@ def print_json(data: object) -> None:
 
 
 def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:
-    """Pass things on, with a progress bar on a terminal and a line every two seconds elsewhere."""
+    """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     of_all = "" if total is None else f" of {total:,}"
-    next_line = monotonic() + QUIET_S
+    started = monotonic()
+    next_line = started + QUIET_S
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         job = progress.add_task(doing, total=total)
         for done, item in enumerate(items, 1):
             progress.update(job, completed=done)
             if not console.is_terminal and monotonic() >= next_line:
                 note(f"{doing}: {done:,}{of_all}")
-                next_line = monotonic() + QUIET_S
+                next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
             yield item
 
 
