@@ -84,12 +84,11 @@ def evaluate(
     run = None if out is None else Run(out)
     try:
         opened = open_source(source, judged_by)
+        run = run or opened.run
         scope = Scope.of(watched(opened.read(), "reading"), wanted)
         if scope.total == 0:
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
-        if run is None or (opened.run is not None and run.path.resolve() == opened.run.path.resolve()):
-            run = opened.run
-        else:
+        if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
             run.keep(opened)
         at_once = workers or cores()
         rows = (
@@ -309,7 +308,7 @@ class Tally:
         if not is_kept:
             return "stopped; nothing is kept (with --out RUN, what was judged would be)"
         if self.count == 0:
-            return "stopped before anything was judged; the same command starts again"
+            return "stopped before judging; give the same command again"
         return f"stopped; the same command {'without --redo ' * redo}goes on where it was"
 
 

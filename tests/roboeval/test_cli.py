@@ -307,17 +307,19 @@ SLOW = "def task_program():\n    for i in range(150000): pass\n# {}\n"
 
 
 @pytest.mark.parametrize(
-    ("options", "sentence"),
+    ("arguments", "sentence"),
     [
-        (["--out", "run"], "stopped; the same command goes on where it was"),
-        (["--out", "run", "--redo"], "stopped; the same command without --redo goes on where it was"),
-        ([], "stopped; nothing is kept (with --out RUN, what was judged would be)"),
+        (["a.jsonl", "--out", "run"], "stopped; the same command goes on where it was"),
+        (["kept"], "stopped; the same command goes on where it was"),
+        (["kept", "--redo"], "stopped; the same command without --redo goes on where it was"),
+        (["a.jsonl"], "stopped; nothing is kept (with --out RUN, what was judged would be)"),
     ],
 )
-def test_ctrl_c_ends_in_one_true_sentence(tmp_path: Path, options: list[str], sentence: str) -> None:
+def test_ctrl_c_ends_in_one_true_sentence(tmp_path: Path, arguments: list[str], sentence: str) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(i, SLOW.format(i)) for i in range(400)))
+    assert roboeval("import", "a.jsonl", "--out", "kept", cwd=tmp_path).status == 0
     process = subprocess.Popen(
-        [sys.executable, "-m", "roboeval.cli", "evaluate", "a.jsonl", "--workers", "1", *options],
+        [sys.executable, "-m", "roboeval.cli", "evaluate", "--workers", "1", *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -332,7 +334,8 @@ def test_ctrl_c_ends_in_one_true_sentence(tmp_path: Path, options: list[str], se
     assert (process.returncode, out) == (130, "")
     assert err.splitlines()[-1] == f"roboeval: {sentence}"
     assert "Traceback" not in err
-    assert [path.name for path in tmp_path.glob("run/evaluations/*.jsonl")] == ["paper.jsonl"] * bool(options)
+    kept = list(tmp_path.glob("*/evaluations/paper.jsonl"))
+    assert bool(kept) == ("nothing is kept" not in sentence)
 
 
 def test_a_run_that_was_not_judged(tmp_path: Path) -> None:
