@@ -325,7 +325,7 @@ def print_summary(
 ) -> None:
     """Print the tables of an evaluation."""
     from roboeval.records import name_of
-    from roboeval.tables import render, summary, summary_data
+    from roboeval.summary import render, summary, summary_data
 
     counted = summary(rows, suite, k=k, scope=scope, ablated=ablated)
     if as_json:
