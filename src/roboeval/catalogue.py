@@ -114,10 +114,10 @@ def new_task(folder: Path, name: str) -> Path:
     try:
         if not (folder / "suite.yaml").exists():
             suite = re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower()).lstrip("-0123456789") or "mine"
-            write_whole(folder / "suite.yaml", [f"name: {suite}\nversion: 1\nabout: my tasks\n".encode()])
+            write_whole(folder / "suite.yaml", f"name: {suite}\nversion: 1\nabout: my tasks\n".encode())
         if not [*folder.glob(f"recorded/*/{name}.yaml")]:
-            write_whole(folder / "recorded" / "mine" / f"{name}.yaml", [PROGRAMS.encode()])
-        write_whole(path, [TEMPLATE.replace("NAME", name).encode()])
+            write_whole(folder / "recorded" / "mine" / f"{name}.yaml", PROGRAMS.encode())
+        write_whole(path, TEMPLATE.replace("NAME", name).encode())
     except OSError as error:
         raise BadInput(f"cannot be written ({error.strerror})", file=error.filename) from None
     return path

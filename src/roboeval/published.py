@@ -14,7 +14,8 @@ from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
 from codebotler.badinput import BadInput, read_text, text_of
-from roboeval.records import MAX_ROW, Completion, Key, check_length, name_of
+from roboeval.records import MAX_ROW, Completion, Key, check_length, name_of, unknown
+from roboeval.suite import Suite
 
 MAX_ZIP = 100_000_000
 MAX_UNPACKED = 1_000_000_000
@@ -25,17 +26,24 @@ Read: TypeAlias = Callable[[], str]
 """Reads one file's text when it is called."""
 
 
-def published_completions(path: Path) -> Iterator[Completion]:
+def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Completion]:
     """Read a folder or zip of `TASK_PROMPT_INDEX.py`, one file at a time; other files are passed over.
 
     The files assign texts to `name`, `prompt` and `completion`; they are parsed and never imported.
 
+    Args:
+        path: the folder or zip.
+        suite: whose tasks and prompts they must be of; any by default.
+
     Raises:
-        BadInput: it holds no such file, one of them is wrong, or a zip is damaged, encrypted or too large.
+        BadInput: it holds no such file, one of them is wrong or unknown to the suite, or a zip is damaged,
+            encrypted or too large.
     """
     with ExitStack() as open_files:
         files = _zipped(path, open_files) if path.is_file() else _in_folder(path)
         for key, (name, read) in sorted(_by_key(files, path).items()):
+            if suite is not None and (problem := unknown(key, suite)):
+                raise BadInput(problem, file=name)
             values = _assigned(read(), name)
             completion = Completion(
                 task=key[0],

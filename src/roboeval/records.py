@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO, TypeAlias
 
@@ -48,12 +53,17 @@ class Completion(BaseModel):
         """What no other row of a run shares."""
         return self.task, self.prompt, self.index
 
+    @property
+    def program_sha256(self) -> str:
+        """The hash of the program, half surrogate pairs included, in 64 hexadecimal digits."""
+        return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
+
 
 # --- reading
 
 
 def read_rows(
-    path: Path, *, limit: int = MAX_ROW, growing: bool = False
+    path: Path, *, limit: int = MAX_ROW, growing: bool = False, name: Path | str | None = None
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Read a file of JSON lines: the line's number, counted from 1, and its object.
 
@@ -62,29 +72,31 @@ def read_rows(
         limit: the longest line in bytes.
         growing: whether it is one that we write: then a broken last line without an end was torn by a crash,
             and is passed over.
+        name: what sentences call the file; its path by default.
 
     Raises:
         BadInput: the file is missing, or a line is too long or no JSON object.
     """
+    name = name or path
     try:
         file = path.open("rb")
     except FileNotFoundError:
-        raise BadInput("there is no such file", file=path) from None
+        raise BadInput("there is no such file", file=name) from None
     except OSError as error:
-        raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+        raise BadInput(f"cannot be read ({error.strerror})", file=name) from None
     with file:
         for number in _count():
             line = file.readline(limit + 1)
             if not line:
                 return
             if len(line) > limit:
-                raise BadInput(f"this row is longer than {limit:,} bytes", file=path, line=number)
+                raise BadInput(f"this row is longer than {limit:,} bytes", file=name, line=number)
             if line.strip():
-                row = _parsed(line, path, number)
+                row = _parsed(line, name, number)
                 if row is None and growing and not line.endswith(b"\n"):
                     return
                 if row is None:
-                    raise BadInput("this line is no JSON", file=path, line=number)
+                    raise BadInput("this line is no JSON", file=name, line=number)
                 yield number, row
 
 
@@ -94,47 +106,54 @@ def _count() -> Iterator[int]:
         yield (number := number + 1)
 
 
-def _parsed(line: bytes, path: Path, number: int) -> dict[str, Any] | None:
+def _parsed(line: bytes, name: Path | str, number: int) -> dict[str, Any] | None:
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
         return None
     if not isinstance(row, dict):
-        raise BadInput("this line is no JSON object", file=path, line=number)
+        raise BadInput("this line is no JSON object", file=name, line=number)
     return row
 
 
-def read_completions(path: Path, *, growing: bool = False) -> Iterator[Completion]:
+def read_completions(
+    path: Path, suite: Suite | None = None, *, growing: bool = False, name: Path | str | None = None
+) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
 
     Args:
         path: the file.
+        suite: whose tasks and prompts they must be of; any by default.
         growing: whether it stands in a run, where a torn last line is passed over.
+        name: what sentences call the file; its path by default.
 
     Raises:
-        BadInput: the file is missing or empty, or a row is wrong or repeats another.
+        BadInput: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
     """
-    seen: dict[Key, int] = {}
-    for number, row in read_rows(path, growing=growing):
+    name = name or path
+    seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
+    for number, row in read_rows(path, growing=growing, name=name):
         try:
             completion = Completion.model_validate(row)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             what = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg'].lower()}"
             field = ".".join(map(str, first["loc"]))
-            raise BadInput(f'"{field}" {what}', file=path, line=number) from None
-        if completion.key in seen:
-            first_line = seen[completion.key]
+            raise BadInput(f'"{field}" {what}', file=name, line=number) from None
+        lines = seen[sys.intern(completion.task), completion.prompt]
+        first_line = lines.setdefault(completion.index, number)
+        if first_line != number:
             raise BadInput(
                 f"{name_of(completion.key)} stands here again; it stood in line {first_line} already",
-                file=path,
+                file=name,
                 line=number,
             )
-        seen[completion.key] = number
-        check_length(row, path, number)
+        check_length(row, name, number)
+        if suite is not None and (problem := unknown(completion.key, suite)):
+            raise BadInput(problem, file=name, line=number)
         yield completion
     if not seen:
-        raise BadInput("there is no completion in it", file=path)
+        raise BadInput("there is no completion in it", file=name)
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
@@ -155,30 +174,48 @@ def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
         BadInput: the file is missing, or a line is no row of an evaluation.
     """
     for number, row in read_rows(path, limit=MAX_EVALUATION, growing=True):
-        if not row.keys() >= {"task", "prompt", "index", "passed", "failure", "verdicts"}:
+        if not (row.keys() >= EVALUATED.keys() and all(isinstance(row[f], t) for f, t in EVALUATED.items())):
             raise BadInput("this line is no row of an evaluation; --redo starts over", file=path, line=number)
         yield number, row
 
 
-def check_known(completions: Iterable[Completion], suite: Suite, source: object) -> Iterator[Completion]:
-    """Pass completions on whose task and prompt the suite knows.
+EVALUATED = {
+    "task": str,
+    "prompt": int,
+    "index": int,
+    "passed": bool,
+    "failure": dict | None,
+    "verdicts": list,
+}
+HASH_LINE = 65  # bytes: 64 hexadecimal digits and a line end
+
+
+def read_judged(rows: Path, programs: Path) -> Iterator[tuple[int, dict[str, Any], str | None]]:
+    """Read the rows of an evaluation with the numbers of their lines and the hashes of their programs.
+
+    Args:
+        rows: the file of the rows.
+        programs: the file that holds, for each row in order, the hash of the program that it judges.
 
     Raises:
-        BadInput: the suite has no such task, or the task no such prompt.
+        BadInput: the rows are missing, or a line is no row of an evaluation.
     """
-    for completion in completions:
-        task = suite.tasks.get(completion.task)
-        if task is None:
-            known = ", ".join(suite.tasks)
-            raise BadInput(
-                f'the suite has no task "{completion.task}"; its tasks are {known}', file=str(source)
-            )
-        if completion.prompt >= len(task.prompts):
-            raise BadInput(
-                f"{name_of(completion.key)}: the task has prompts 0 to {len(task.prompts) - 1}",
-                file=str(source),
-            )
-        yield completion
+    hashes = programs.open("rb") if programs.exists() else io.BytesIO()
+    with hashes:
+        for number, row in read_evaluations(rows):
+            line = hashes.read(HASH_LINE)
+            whole = len(line) == HASH_LINE
+            yield number, row, line.decode(errors="replace").rstrip("\n") if whole else None
+
+
+def unknown(key: Key, suite: Suite) -> str | None:
+    """What is wrong with a completion's task or prompt; None if the suite knows both."""
+    task = suite.tasks.get(key[0])
+    if task is None:
+        return f'the suite has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
+    if key[1] >= len(task.prompts):
+        return f"{name_of(key)}: the task has prompts 0 to {len(task.prompts) - 1}"
+    return None
 
 
 def name_of(key: Key) -> str:
@@ -246,14 +283,22 @@ class Appender:
         try:
             while view:
                 view = view[self._file.write(view) :]
-        except OSError:
+        except OSError as error:
             self._file.truncate(start)
-            raise
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+
+    def cut(self, length: int) -> None:
+        """Drop what stands after so many bytes."""
+        if self.path.stat().st_size > length:
+            self._file.truncate(length)
 
     def close(self) -> None:
         """Bring everything to the disk."""
-        os.fsync(self._file.fileno())
-        self._file.close()
+        with self._file:
+            try:
+                os.fsync(self._file.fileno())
+            except OSError as error:
+                raise OSError(error.errno, error.strerror, str(self.path)) from None
 
 
 def whole_length(path: Path) -> int:
@@ -268,3 +313,9 @@ def whole_length(path: Path) -> int:
                 return start + end + 1
             position = start
     return 0
+
+
+def length_before(path: Path, line: int) -> int:
+    """How many bytes of a file stand before a line, counted from 1."""
+    with path.open("rb") as file:
+        return sum(map(len, islice(file, line - 1)))

@@ -62,7 +62,7 @@ def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
     row = ROW | {"program": program}
     path.write_text(json.dumps(row, ensure_ascii=False).replace("\ud800", "\\ud800"))
     run = Run(tmp_path / "run")
-    run.keep(open_source(str(path), paper), paper)
+    run.keep(open_source(str(path), paper))
     assert [c.program for c in read_completions(run.completions)] == [program]
 
 
@@ -75,5 +75,5 @@ def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
     sentence = f"{path}, line 1: as a row this is longer than 5,000,000 bytes; shorten the program"
     assert sentence_about(path, line) == sentence
     with pytest.raises(BadInput, match="as a row this is longer"):
-        Run(tmp_path / "run").keep(open_source(str(path), paper), paper)
+        Run(tmp_path / "run").keep(open_source(str(path), paper))
     assert not (tmp_path / "run").exists()

@@ -180,7 +180,7 @@ def test_what_was_not_recorded_is_said_and_not_taken_from_the_suite(written: Com
     text = printed(completion_view(row(completion(), FINE), written, SUITE))
     assert "instruction not recorded" in text
     assert "Visit Amy." not in text
-    assert ("program not recorded" in text) == (written is None)
+    assert ("the program that was judged no longer stands in this run" in text) == (written is None)
 
 
 def test_a_completion_as_data_holds_every_step() -> None:
