@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
+import pickle
+import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
@@ -18,7 +21,7 @@ from codebotler.skills import SKILLS, SkillTable
 from codebotler.trace import Outcome
 from codebotler.world import World
 
-__all__ = ["EngineError", "Lanes", "run"]
+__all__ = ["EngineError", "Lanes", "digest", "run"]
 
 LOG = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
@@ -55,7 +58,22 @@ def run(
             source, world = pair
             return lanes.here().run(source, lambda: SimulatedRobot(world, rules, skills, behaviours))
 
-        yield from lanes.map_distinct(run_pair, pairs)
+        worlds: dict[World, int] = {}
+
+        def name(pair: tuple[str, World]) -> bytes:
+            source, world = pair
+            return digest(source, str(worlds.setdefault(world, len(worlds))))
+
+        yield from lanes.map_distinct(run_pair, pairs, name=name)
+
+
+def digest(*texts: str) -> bytes:
+    """A short name for texts, which no other texts have."""
+    hashed = hashlib.sha256()
+    for text in texts:
+        data = text.encode(errors="surrogatepass")
+        hashed.update(len(data).to_bytes(8, "big") + data)
+    return hashed.digest()
 
 
 class Lanes:
@@ -109,16 +127,58 @@ class Lanes:
             self._local.lane = lane
         return lane
 
-    def map_distinct(self, function: Callable[[Key], Value], keys: Iterable[Key]) -> Iterator[Value]:
-        """Like `map`, in threads, calling the function once for equal keys and reading ahead a little."""
-        done: dict[Hashable, Future[Value]] = {}
-        waiting: deque[Future[Value]] = deque()
+    def map_distinct(
+        self, function: Callable[[Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]
+    ) -> Iterator[Value]:
+        """Like `map`, in threads, calling the function once for equal keys and reading ahead a little.
+
+        Args:
+            function: what to do; its results are pickled.
+            keys: what to do it to.
+            name: a short name of a key, which no other key has.
+        """
+        waiting: deque[tuple[bytes, Future[Value] | None]] = deque()
+        running: dict[bytes, Future[Value]] = {}
         remaining = iter(keys)
-        while True:
-            for key in islice(remaining, max(0, 8 * self.workers - len(waiting))):
-                if key not in done:
-                    done[key] = self._pool.submit(function, key)
-                waiting.append(done[key])
-            if not waiting:
-                return
-            yield waiting.popleft().result()
+        with Done() as done:
+            while True:
+                for key in islice(remaining, max(0, 8 * self.workers - len(waiting))):
+                    named = name(key)
+                    if named not in done and named not in running:
+                        running[named] = self._pool.submit(function, key)
+                    waiting.append((named, running.get(named)))
+                if not waiting:
+                    return
+                named, future = waiting.popleft()
+                if future is None:
+                    yield done[named]
+                    continue
+                value = future.result()
+                if running.pop(named, None) is not None:
+                    done[named] = value
+                yield value
+
+
+class Done:
+    """Results by name, in a file that nobody else sees, so that a million of them need little memory."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by __exit__
+        self._places: dict[bytes, int] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def __contains__(self, name: bytes) -> bool:
+        return name in self._places
+
+    def __setitem__(self, name: bytes, value: object) -> None:
+        self._places[name] = self._file.seek(0, os.SEEK_END)
+        pickle.dump(value, self._file)
+
+    def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - whatever was put there
+        self._file.seek(self._places[name])
+        return pickle.load(self._file)  # noqa: S301 - we wrote it
