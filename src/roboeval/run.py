@@ -8,6 +8,7 @@ import json
 import os
 import shutil
 import tempfile
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -136,13 +137,9 @@ class Run:
             descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise BadInput(f"cannot be written ({error.strerror})", file=self.path) from None
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        if not _locked(descriptor):
             os.close(descriptor)
-            raise BadInput(
-                "another process is writing this run; wait until it has ended", file=self.path
-            ) from None
+            raise BadInput("another process is writing this run; wait until it has ended", file=self.path)
         try:
             yield
         except BaseException:
@@ -188,6 +185,22 @@ class Run:
             same = all(file.read(len(line)) == line for line in map(_line, source.read()))
             if not same or file.read(1):
                 raise BadInput("this run holds other completions; name another folder", file=self.path)
+
+
+PATIENCE = 20  # times that a lock is tried
+PAUSE = 0.05  # seconds between two
+
+
+def _locked(descriptor: int) -> bool:
+    """Lock a file; what a killed process was just starting may hold it for a moment longer."""
+    for _ in range(PATIENCE):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            time.sleep(PAUSE)
+        else:
+            return True
+    return False
 
 
 def _line(completion: Completion) -> bytes:
