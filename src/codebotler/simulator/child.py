@@ -18,7 +18,7 @@ from codebotler.simulator.sandbox.walls import CPU_SECONDS
 from codebotler.trace import RunError, Status
 
 SENDING = 30.0  # seconds for a long program on a busy machine; a child that does not listen is ended
-LONGEST = 120.0  # seconds; nothing that computes takes so long, so a child that does only waits
+LONGEST = 120.0  # seconds of waiting for a child in all; nothing that computes takes so long
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
 
@@ -36,7 +36,7 @@ class Child:
         self.pid, self._channel, self._wait = pid, channel, wait
         self._closes = closes
         self._buffer = bytearray()
-        self._deadline = time.monotonic() + LONGEST
+        self._patience = LONGEST
 
     def send(self, message: object) -> None:
         """Send a frame; a child that is gone is noticed when it is listened to.
@@ -84,17 +84,19 @@ class Child:
                     frame = bytes(self._buffer[HEADER:end])
                     del self._buffer[:end]
                     return frame
+            began = time.monotonic()
             try:
                 piece = self._channel.recv(1 << 16)
             except TimeoutError:
                 stuck.check()
-                continue
             except OSError:
                 return None
-            if not piece:
-                return None
-            self._buffer += piece
-            if time.monotonic() > self._deadline:
+            else:
+                if not piece:
+                    return None
+                self._buffer += piece
+            self._patience -= time.monotonic() - began
+            if self._patience < 0:
                 raise TimeoutError
 
     def kill(self) -> None:
@@ -111,8 +113,8 @@ class Child:
             self._channel.close()
 
     def rest(self) -> None:
-        """Start to wait anew: what it was asked has been answered."""
-        self._deadline = time.monotonic() + LONGEST
+        """Wait anew: what it was asked has been answered."""
+        self._patience = LONGEST
 
     def was_closed(self) -> bool:
         """Whether its walls were closed, as far as can be seen; also told of the dead, until the next run."""

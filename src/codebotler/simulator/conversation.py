@@ -2,20 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
-from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
+from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import ACTS, LOOKS, TELLS
-from codebotler.skills import Skill
-from codebotler.trace import Option, Outcome, RunError, Status
+from codebotler.skills import Skill, SkillTable
+from codebotler.trace import Option, Outcome, RunError, Status, Trace
 
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 LAST_LINE = 1_000_000
 WAITS = "it waits for something that can never come"
 Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
+
+
+class Robot(Protocol):
+    """Who executes the skills that a program asks for; executing one may take as long as it likes."""
+
+    rules: Rules
+    skills: SkillTable
+    now: float
+    """What the program's clock shows, in seconds since the start."""
+    never_fails: frozenset[str]
+    """Skills that return nothing and cannot fail, so that a program need not wait for them."""
+    only_looks: frozenset[str]
+    """Skills that change nothing, and whose result stays the same until another skill is executed."""
+
+    @property
+    def trace(self) -> Trace:
+        """What it has done so far."""
+
+    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Execute one skill.
+
+        Raises:
+            RobotError: it cannot.
+        """
 
 
 class Conversation:
@@ -27,7 +53,7 @@ class Conversation:
         robot: who executes its skills.
     """
 
-    def __init__(self, child: Child, code: bytes, robot: SimulatedRobot) -> None:
+    def __init__(self, child: Child, code: bytes, robot: Robot) -> None:
         self.child, self.robot, self.limits = child, robot, robot.rules.limits
         self.ledger = Ledger()
         self.errors: list[RobotError] = []
@@ -153,7 +179,7 @@ class Conversation:
         return Outcome(status, self.robot.trace, RunError(kind, message), where)
 
 
-def described(robot: SimulatedRobot) -> Description:
+def described(robot: Robot) -> Description:
     """The skills of a robot as a child needs to know them: name, parameters and way of calling of each."""
     return tuple(
         (

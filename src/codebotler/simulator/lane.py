@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import zlib
 from collections.abc import Callable
 
 from codebotler.simulator.child import LostChildError
@@ -11,6 +13,9 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, ZYGOTE
 from codebotler.simulator.zygote import Zygote
 from codebotler.trace import Outcome
+
+EVENTS = logging.getLogger("codebotler.engine.events")
+"""What happens to each run: started, how it ended and why; at level DEBUG, so that it is off by default."""
 
 
 class Lane:
@@ -42,13 +47,19 @@ class Lane:
         Raises:
             EngineError: a process was lost twice, or the lane was stopped.
         """
+        name = zlib.crc32(source.encode(errors="surrogatepass"))
+        EVENTS.debug("program %08x: started", name)
         try:
-            return self._try(source, new_robot)
-        except LostChildError:
+            outcome = self._try(source, new_robot)
+        except LostChildError as first:
+            EVENTS.debug("program %08x: a process was lost, and it is run again: %s", name, first)
             try:
-                return self._try(source, new_robot)
+                outcome = self._try(source, new_robot)
             except LostChildError as error:
                 raise EngineError(f"an isolated process was lost twice: {error}") from None
+        why = "" if outcome.error is None else f" ({outcome.error.kind}: {outcome.error.message})"
+        EVENTS.debug("program %08x: %s%s", name, outcome.status.value, why)
+        return outcome
 
     def stop(self) -> None:
         """End all processes and with them a run that is still going on; its thread notices."""

@@ -357,3 +357,21 @@ def test_program_of_enormous_length_is_refused_without_being_read() -> None:
 
 def test_isolation_can_be_required() -> None:
     assert len(list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))) == 1
+
+
+def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureFixture) -> None:
+    programs = [saying("a"), "def task_program(): go_to('x')", "import os\nos._exit(3)"]
+    pairs = [(program, WORLD) for program in programs]
+    list(run(pairs, workers=1))
+    assert not caplog.records
+    with caplog.at_level("DEBUG", logger="codebotler.engine.events"):
+        list(run(pairs, workers=1))
+    told = [record.getMessage().partition(": ")[2] for record in caplog.records]
+    assert told == [
+        "started",
+        "finished",
+        "started",
+        'robot-error (GoToInvalidLocation: there is no room "x")',
+        "started",
+        "killed (Crash: the process ended by itself (exit status 3))",
+    ]
