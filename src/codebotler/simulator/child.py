@@ -17,7 +17,6 @@ from codebotler.simulator.sandbox.channel import HEADER, MAX_FRAME
 from codebotler.simulator.sandbox.walls import CPU_SECONDS
 from codebotler.trace import RunError, Status
 
-SENDING = 30.0  # seconds for a long program on a busy machine; a child that does not listen is ended
 LONGEST = 120.0  # seconds of waiting for a child in all; nothing that computes takes so long
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
@@ -42,16 +41,21 @@ class Child:
         """Send a frame; a child that is gone is noticed when it is listened to.
 
         Raises:
-            TimeoutError: the child does not listen.
+            TimeoutError: the child waits for something else than to listen.
         """
         data = marshal.dumps(message)  # type: ignore[arg-type]  # made of texts, numbers and the like
-        self._channel.settimeout(SENDING)
-        try:
-            self._channel.sendall(len(data).to_bytes(HEADER, "big") + data)
-        except TimeoutError:
-            raise
-        except OSError:
-            return
+        rest = memoryview(len(data).to_bytes(HEADER, "big") + data)
+        stuck = Stuck(self.pid)
+        self._channel.settimeout(SILENCE)
+        while rest:
+            began = time.monotonic()
+            try:
+                rest = rest[self._channel.send(rest) :]
+            except TimeoutError:
+                stuck.check()
+            except OSError:
+                return
+            self._be_patient(began)
 
     def receive(self) -> object:
         """The child's next message, which is JSON; None when it has hung up.
@@ -95,9 +99,12 @@ class Child:
                 if not piece:
                     return None
                 self._buffer += piece
-            self._patience -= time.monotonic() - began
-            if self._patience < 0:
-                raise TimeoutError
+            self._be_patient(began)
+
+    def _be_patient(self, since: float) -> None:
+        self._patience -= time.monotonic() - since
+        if self._patience < 0:
+            raise TimeoutError
 
     def kill(self) -> None:
         """End it, if it has not ended."""

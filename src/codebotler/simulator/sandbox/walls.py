@@ -21,18 +21,13 @@ CPU_SECONDS = 5
 
 def give_up_rights() -> None:
     """Give up for ever what neither this process needs nor any that it forks."""
-    for kind in (
-        resource.RLIMIT_CORE,
-        resource.RLIMIT_FSIZE,
-        resource.RLIMIT_MEMLOCK,
-        resource.RLIMIT_MSGQUEUE,
-    ):
-        resource.setrlimit(kind, (0, 0))
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    give_up_identity()
-    prctl(PR_SET_DUMPABLE, 0)
-    prctl(PR_SET_NO_NEW_PRIVS, 1)
+    for name in ("CORE", "FSIZE", "MEMLOCK", "MSGQUEUE"):
+        set_limit(name, 0)
+    set_limit("AS", MEMORY)
+    become_nobody()
     die_with_parent()
+    hide_memory()
+    refuse_new_rights()
 
 
 def enclose(seccomp: Filter | None) -> None:
@@ -41,15 +36,20 @@ def enclose(seccomp: Filter | None) -> None:
     Args:
         seccomp: what may be asked of the kernel; None where it takes no such list.
     """
-    resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))
-    resource.setrlimit(resource.RLIMIT_NOFILE, (CHANNEL + 1, CHANNEL + 1))
+    set_limit("NPROC", 0)
+    set_limit("NOFILE", CHANNEL + 1)
     resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 1))
     if seccomp is not None:
-        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
+        install(seccomp)
 
 
-def give_up_identity() -> None:
-    """Become nobody, if this is root: RLIMIT_NPROC does not bind root."""
+def set_limit(name: str, value: int) -> None:
+    """Set one limit of this process for ever."""
+    resource.setrlimit(getattr(resource, "RLIMIT_" + name), (value, value))
+
+
+def become_nobody() -> None:
+    """Give up being root, whom RLIMIT_NPROC does not bind; whoever is not root stays who they are."""
     if os.geteuid() == 0:
         os.setgroups([])
         os.setresgid(NOBODY, NOBODY, NOBODY)
@@ -57,8 +57,23 @@ def give_up_identity() -> None:
 
 
 def die_with_parent() -> None:
-    """End when the thread ends that has started this process."""
+    """Be killed when the thread ends that has started this process; a change of user would undo this."""
     prctl(PR_SET_PDEATHSIG, SIGKILL)
+
+
+def hide_memory() -> None:
+    """Keep other processes of the same user from tracing this one and from reading its memory."""
+    prctl(PR_SET_DUMPABLE, 0)
+
+
+def refuse_new_rights() -> None:
+    """Never get rights from a program that carries them, such as a setuid one."""
+    prctl(PR_SET_NO_NEW_PRIVS, 1)
+
+
+def install(seccomp: Filter) -> None:
+    """Ask nothing more of the kernel than the list allows."""
+    prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
 
 
 NOBODY = 65534
@@ -151,8 +166,8 @@ def can_install(seccomp: Filter) -> bool:
     pid = os.fork()
     if pid == 0:
         try:
-            prctl(PR_SET_NO_NEW_PRIVS, 1)
-            prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
+            refuse_new_rights()
+            install(seccomp)
         except OSError:
             os._exit(1)
         os._exit(0)
