@@ -11,6 +11,7 @@ import typer
 
 from codebotler import __version__
 
+ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
 USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -37,6 +38,9 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
         app: its commands.
         name: how a user calls it.
     """
+    if sys.platform == "win32":
+        print(f"{name}: {ON_WINDOWS}", file=sys.stderr)
+        raise SystemExit(1)
     try:
         status = app(standalone_mode=False, prog_name=name)
         sys.stdout.flush()

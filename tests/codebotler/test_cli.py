@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from codebotler.cli import app, obey
+
 
 def codebotler(*arguments: str) -> tuple[int, str, str]:
     ended = subprocess.run(
@@ -30,3 +32,15 @@ def test_what_is_no_command_is_one_sentence() -> None:
     assert (status, out) == (2, "")
     assert err.startswith("codebotler: got unexpected extra argument")
     assert err.count("\n") == 1
+
+
+def test_windows_is_told_of_wsl_with_the_platform_patched(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(SystemExit) as end:
+        obey(app, "codebotler")
+    assert end.value.code == 1
+    assert (
+        capsys.readouterr().err == "codebotler: this runs on Linux and macOS; on Windows, use it inside WSL\n"
+    )

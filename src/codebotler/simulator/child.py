@@ -13,8 +13,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from codebotler.simulator.sandbox.channel import HEADER, MAX_FRAME
-from codebotler.simulator.sandbox.walls import CPU_SECONDS
+from codebotler.simulator.sandbox import CPU_SECONDS, HEADER, MAX_FRAME
 from codebotler.trace import RunError, Status
 
 LONGEST = 120.0  # seconds of waiting for a child in all; nothing that computes takes so long

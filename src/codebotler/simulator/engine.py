@@ -6,6 +6,7 @@ import hashlib
 import logging
 import os
 import pickle
+import sys
 import tempfile
 import threading
 from collections import deque
@@ -25,6 +26,8 @@ __all__ = ["EngineError", "Lanes", "digest", "run"]
 
 LOG = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
+NOT_LINUX = "programs are less isolated here: only Linux has a list of allowed system calls (seccomp)"
+ON_WINDOWS = "programs are run on Linux and macOS only; on Windows, use this inside WSL"
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -88,15 +91,18 @@ class Lanes:
     """
 
     def __init__(self, workers: int, *, require_isolation: bool = False) -> None:
+        if sys.platform == "win32":
+            raise EngineError(ON_WINDOWS)
         self.workers = workers
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="lane")
         self._local = threading.local()
         first = Lane()
         if not first.has_seccomp:
+            missing = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
             if require_isolation:
                 first.close()
-                raise EngineError(NO_SECCOMP)
-            LOG.warning(NO_SECCOMP)
+                raise EngineError(missing)
+            LOG.warning(missing)
         self._lanes = [first]
         self._idle = [first]
         self._stopping = False

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.simulator.engine import EngineError, run
+from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.trace import Outcome, Status
@@ -375,3 +376,22 @@ def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureF
         "started",
         "killed (Crash: the process ended by itself (exit status 3))",
     ]
+
+
+def test_windows_is_refused_with_the_platform_patched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(EngineError, match="inside WSL"):
+        list(run([(saying("a"), WORLD)], workers=1))
+
+
+def test_macos_is_less_isolated_and_says_so_with_the_platform_patched(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(Lane, "has_seccomp", property(lambda _: False, lambda *_: None), raising=False)
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert said(next(run([(saying("a"), WORLD)], workers=1))) == ["a"]
+    assert [record.getMessage() for record in caplog.records] == [
+        "programs are less isolated here: only Linux has a list of allowed system calls (seccomp)"
+    ]
+    with pytest.raises(EngineError, match="only Linux"):
+        list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))

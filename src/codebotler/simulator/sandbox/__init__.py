@@ -12,6 +12,17 @@ START = __file__.rpartition("/")[0] + "/start.py"
 FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
 """The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings."""
 
+CHANNEL = 3
+"""The descriptor by which a closed process and the engine talk: HEADER bytes of length, then content."""
+
+HEADER, MAX_FRAME = 4, 1_000_000
+
+MEMORY = 512 * 1024 * 1024
+"""Bytes of address space of an isolated process."""
+
+CPU_SECONDS = 5
+"""Seconds of processor time of a closed process, against what ticks cannot see, such as one long call."""
+
 PREPARER, ZYGOTE, LIBRARY_ZYGOTE = "preparer", "zygote", "library-zygote"
 """The roles: who compiles programs, who forks runs, and who forks runs that import something."""
 

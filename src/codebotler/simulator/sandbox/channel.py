@@ -10,15 +10,14 @@ import builtins
 from marshal import loads
 from posix import _exit, read, write
 
+from codebotler.simulator.sandbox import CHANNEL, HEADER, MAX_FRAME
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # functions below look here for `len`, not where a program can write
 
-CHANNEL = 3
-HEADER = 4
-MAX_FRAME = 1_000_000
 TOO_LONG = '["too-long",[],0.0,1]'
 
 

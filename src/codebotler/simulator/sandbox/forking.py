@@ -9,7 +9,8 @@ from _socket import CMSG_SPACE, socket
 from marshal import loads
 from posix import getpid, getppid
 
-from codebotler.simulator.sandbox.channel import CHANNEL, receive, send
+from codebotler.simulator.sandbox import CHANNEL
+from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.execution import Run
 from codebotler.simulator.sandbox.surroundings import simulate_surroundings
 from codebotler.simulator.sandbox.walls import die_with_parent, enclose, give_up_rights, usable_filter

@@ -11,8 +11,8 @@ import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: nothing can 
 from _json import encode_basestring_ascii as quoted
 from marshal import dumps
 
-from codebotler.simulator.sandbox import IMPORTING, PLAIN, REFUSED
-from codebotler.simulator.sandbox.channel import CHANNEL, receive, send_bytes
+from codebotler.simulator.sandbox import CHANNEL, IMPORTING, PLAIN, REFUSED
+from codebotler.simulator.sandbox.channel import receive, send_bytes
 from codebotler.simulator.sandbox.ticks import prepared
 from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
 

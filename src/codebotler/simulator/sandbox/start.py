@@ -49,7 +49,8 @@ def start_again(descriptors: list[int]) -> NoReturn:
     for number, copy in enumerate(copies, FIRST):
         os.dup2(copy, number, inheritable=True)
     os.closerange(end, 65536)
-    ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
+    if sys.platform == "linux":
+        ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
     os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - the same program again
 
 

@@ -7,16 +7,13 @@ import os
 import resource
 import sys
 
-from codebotler.simulator.sandbox.channel import CHANNEL
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, MEMORY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import TypeAlias
 
     Filter: TypeAlias = ctypes.Array[ctypes.c_char]
-
-MEMORY = 512 * 1024 * 1024
-CPU_SECONDS = 5
 
 
 def give_up_rights() -> None:
@@ -44,8 +41,10 @@ def enclose(seccomp: Filter | None) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Set one limit of this process for ever."""
-    resource.setrlimit(getattr(resource, "RLIMIT_" + name), (value, value))
+    """Set one limit of this process for ever; some systems have fewer of them."""
+    kind = getattr(resource, "RLIMIT_" + name, None)
+    if kind is not None:
+        resource.setrlimit(kind, (value, value))
 
 
 def become_nobody() -> None:
@@ -85,7 +84,9 @@ LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 def prctl(option: int, *values: int) -> None:
-    """Ask the kernel to change what this process may do."""
+    """Ask the kernel to change what this process may do; only Linux can be asked."""
+    if sys.platform != "linux":
+        return
     arguments = [ctypes.c_ulong(value) for value in (*values, 0, 0, 0, 0)[:4]]
     if LIBC.prctl(ctypes.c_int(option), *arguments) != 0:
         raise OSError(ctypes.get_errno(), f"prctl({option}) failed")
@@ -117,7 +118,7 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
 
     Reading and writing go to the channel only, memory is never executable; all else is refused with EPERM.
     """
-    if machine not in SYSCALLS or not sys.platform.startswith("linux"):
+    if machine not in SYSCALLS or sys.platform != "linux":
         return None
     architecture, numbers = SYSCALLS[machine]
     guarded = {
