@@ -16,12 +16,11 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 
-from in_process import compiled, run_bare
-
 from codebotler.simulator.engine import Lanes, simulate
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Status
 from codebotler.world import World
+from in_process import compiled, run_bare
 from roboeval.records import recorded_completions
 from roboeval.suite import load_suite
 

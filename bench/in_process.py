@@ -1,4 +1,4 @@
-"""The same programs without isolation: in this process, to be timed, or in an ordinary process, to be compared.
+"""The same programs without isolation: in this process, to be timed, or in an ordinary one, to be compared.
 
 Run as a script, this is the ordinary process: it takes programs from its input and forks for each, so that
 they cannot see one another, but closes no walls and calls the simulated robot as a function.
@@ -132,8 +132,8 @@ class Unwalled(Bare):
             self.errors.append(error)
         finally:
             sys.setrecursionlimit(limit)
-        error = self.errors[-1]
-        failure = type(error.kind, (execution.RobotError,), {"__module__": "robot"})(str(error))
+        last = self.errors[-1]
+        failure = type(last.kind, (execution.RobotError,), {"__module__": "robot"})(str(last))
         failure.number = len(self.errors) - 1
         raise failure
 
@@ -210,8 +210,8 @@ class OrdinaryProcess:
         return outcome
 
 
-# The functions below call one another as those of the zygote do: how deep a program may call itself depends on
-# how deep it stands.
+# The functions below call one another as those of the zygote do: how deep a program may call itself depends
+# on how deep it stands.
 
 
 def main() -> None:

@@ -13,8 +13,6 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
-from in_process import OrdinaryProcess
-from random_programs import broken_programs, programs
 
 from codebotler.program import Problem, Program
 from codebotler.simulator.engine import Lanes, run, simulate
@@ -22,6 +20,8 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.trace import Outcome, Status
 from codebotler.world import Person, Room, World
+from in_process import OrdinaryProcess
+from random_programs import broken_programs, programs
 
 NIGHTLY = "FUZZ_EXAMPLES" in os.environ
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "200"))
@@ -37,12 +37,30 @@ RULES = Rules(limits=Limits(ticks=2_000, calls=60))
 
 AMY = Person("amy", ("yes", "no", "hello|kitchen", ".*"))
 BOB = Person(".*", ("no", "yes"))
+NEVER = Person("x")
 WORLDS = (
-    World((Room("start_loc", ("mug",), (BOB,)), Room("kitchen", ("apple", "mug"), (AMY,)),
-           Room("conference room", ("stapler",)), Room("amy's lab", (), (Person("amy", ("Yes",)),))), "start_loc"),
-    World((Room("start_loc"), Room("amy's lab", ("apple", "apple"), (AMY, BOB)), Room("lab", ("stapler",))), "start_loc"),
-    World((Room("kitchen", ("apple", "red"), (AMY,)), Room("start_loc"), Room("conference room", (), (Person("x"),))), "kitchen"),
-)  # fmt: skip
+    World(
+        (
+            Room("start_loc", ("mug",), (BOB,)),
+            Room("kitchen", ("apple", "mug"), (AMY,)),
+            Room("conference room", ("stapler",)),
+            Room("amy's lab", (), (Person("amy", ("Yes",)),)),
+        ),
+        "start_loc",
+    ),
+    World(
+        (Room("start_loc"), Room("amy's lab", ("apple", "apple"), (AMY, BOB)), Room("lab", ("stapler",))),
+        "start_loc",
+    ),
+    World(
+        (
+            Room("kitchen", ("apple", "red"), (AMY,)),
+            Room("start_loc"),
+            Room("conference room", (), (NEVER,)),
+        ),
+        "kitchen",
+    ),
+)
 
 
 @pytest.fixture(scope="module")
