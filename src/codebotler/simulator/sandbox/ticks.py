@@ -16,7 +16,8 @@ def prepared(source: str, *, lowercase: bool) -> types.CodeType:
         SyntaxError: it does not parse (and what else the compiler raises).
     """
     if "\0" in source:
-        raise SyntaxError("source code cannot contain null characters", (PROGRAM, 1, 1, None))
+        line = source.count("\n", 0, source.index("\0")) + 1
+        raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
     tree = ast.parse(source, PROGRAM)
     nodes = list(ast.walk(tree))
     if lowercase:
