@@ -60,11 +60,20 @@ WEIGHED: dict[str, Rules] = {
 STATEMENTS = WEIGHED.pop("STATEMENT")
 STATEMENTS_WITHOUT_BLOCKS = tuple(rule for rule in STATEMENTS if "BLOCK" not in rule[1])
 
-MODULES = "collections contextlib dataclasses enum functools itertools json math random re"
+MODULES = "collections contextlib copy dataclasses enum functools itertools json math random re"
 VARIABLES = {"T": "TEXT", "N": "NUMBER", "L": "LIST", "D": "DICT"}
 PARAMETERS = {"a": "TEXT", "b": "NUMBER", "c": "LIST"}
 COUNT = 3  # variables of each kind at module level; functions write only the first
 START = {"T": "'kitchen'", "N": "2", "L": "['yes', 'no']", "D": "{'a': 1}"}
+UNUSUAL_ENDS = (
+    "del task_program",
+    "task_program = None",
+    "task_program = lambda: say('hello')",
+    "task_program = say",
+    "async def task_program():\n    say('never')",
+    "def task_program():\n    yield say('never')",
+    "def task_program(a):\n    say(a)",
+)
 
 
 @dataclass
@@ -119,6 +128,8 @@ class Writer(ast.NodeTransformer):
                 tree.body += ast.parse("if __name__ == '__main__':\n    task_program()").body
             case 2:
                 tree.body += [*ast.parse("task_program()").body, *self.statements(1)]
+            case 3 if self.number(3) == 0:
+                tree.body += ast.parse(UNUSUAL_ENDS[self.number(len(UNUSUAL_ENDS))]).body
         return ast.unparse(ast.fix_missing_locations(tree))
 
     # --- drawing
