@@ -54,6 +54,7 @@ def read_grammar(text: str) -> dict[str, list[Rule]]:
 
 GRAMMAR = read_grammar(Path(__file__).with_name("grammar.txt").read_text(encoding="utf-8"))
 DEFINITIONS = GRAMMAR.pop("DEFINITION")
+DEEP_DEFINITIONS = GRAMMAR.pop("DEEP DEFINITION")
 WEIGHED: dict[str, Rules] = {
     kind: tuple((rule.weight, rule.text) for rule in rules) for kind, rules in GRAMMAR.items()
 }
@@ -99,9 +100,11 @@ class Writer(ast.NodeTransformer):
 
     Args:
         draw: draws from a strategy.
+        definitions_drawn: the rules for functions and classes.
     """
 
     draw: Any
+    definitions_drawn: Sequence[Rule]
     scopes: list[Scope] = field(default_factory=list)
     expressions: int = 0
     blocks: int = 0
@@ -154,7 +157,8 @@ class Writer(ast.NodeTransformer):
 
     def used(self, kind: str) -> list[tuple[int, str]]:
         """The rules for what was defined."""
-        return [(8, use) for scope in self.scopes for use in scope.uses.get(kind, ())]
+        weight = sum(weight for weight, _ in STATEMENTS) // 12 if kind == "STATEMENT" else 8
+        return [(weight, use) for scope in self.scopes for use in scope.uses.get(kind, ())]
 
     def expression(self, kind: str) -> ast.expr:
         """A random expression."""
@@ -206,7 +210,7 @@ class Writer(ast.NodeTransformer):
 
     def definition(self) -> list[ast.stmt]:
         """A function or class, which can be used from then on."""
-        definition = DEFINITIONS[self.number(len(DEFINITIONS))]
+        definition = self.definitions_drawn[self.number(len(self.definitions_drawn))]
         self.defined += 1
         name = f"f{self.defined}"
         blocks, self.blocks = self.blocks, max(self.blocks, 1)
@@ -364,9 +368,14 @@ def parameters(given: ast.arguments) -> dict[str, list[str]]:
 
 
 @st.composite
-def programs(draw: st.DrawFn) -> str:
-    """Programs that parse, mostly do something and often finish."""
-    return Writer(draw).program()
+def programs(draw: st.DrawFn, *, deep: bool = True) -> str:
+    """Programs that parse, mostly do something and often finish.
+
+    Args:
+        deep: whether to draw also such as end differently under different versions of Python, because they
+            call themselves through C until the stack is full.
+    """
+    return Writer(draw, DEFINITIONS + DEEP_DEFINITIONS * deep).program()
 
 
 TOKENS = re.compile(r"\w+|\s+|[^\w\s]")
