@@ -372,6 +372,7 @@ def programs(draw: st.DrawFn, *, deep: bool = True) -> str:
     """Programs that parse, mostly do something and often finish.
 
     Args:
+        draw: given by Hypothesis.
         deep: whether to draw also such as end differently under different versions of Python, because they
             call themselves through C until the stack is full.
     """
