@@ -20,7 +20,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.trace import Outcome, Status
 from codebotler.world import Person, Room, World
-from in_process import OrdinaryProcess
+from in_process import OrdinaryProcess, without_addresses
 from random_programs import broken_programs, programs
 
 NIGHTLY = "FUZZ_EXAMPLES" in os.environ
@@ -88,10 +88,6 @@ def outcome_of(lanes: Lanes, source: str, world: World) -> Outcome:
 def all_of(outcome: Outcome) -> str:
     """Everything in an outcome, with the places and times that its comparison leaves out."""
     return repr(outcome)
-
-
-def without_addresses(outcome: Outcome) -> str:
-    return re.sub(r"0x[0-9a-fA-F]+", "0x", all_of(outcome))
 
 
 def names_bound(source: str) -> set[str]:
