@@ -91,13 +91,13 @@ def all_of(outcome: Outcome) -> str:
 
 
 def names_bound(source: str) -> set[str]:
-    """The names that a program gives a meaning anywhere."""
+    """The names that a program gives a meaning anywhere, or declares global, which is taken for it."""
     with warnings.catch_warnings(action="ignore"):
         nodes = list(ast.walk(ast.parse(source)))
     names = {node.id for node in nodes if isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load)}
     for attribute in ("name", "arg", "asname", "rest"):
         names |= {str(getattr(node, attribute, None)).split(".")[0] for node in nodes}
-    return names
+    return names.union(*(node.names for node in nodes if isinstance(node, ast.Global)))
 
 
 def check_problems(source: str, problems: tuple[Problem, ...], outcome: Outcome) -> None:
