@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import HealthCheck, given, note, settings
+from hypothesis import HealthCheck, example, given, note, settings
 from hypothesis import strategies as st
 
 from codebotler.program import Problem, Program
@@ -109,9 +109,10 @@ def check_problems(source: str, problems: tuple[Problem, ...], outcome: Outcome)
     if outcome.error is None:
         assert not any(problem.line is None for problem in problems)
         return
-    if outcome.error.kind == "NameError" and not any(problem.kind == "NameError" for problem in problems):
-        named = re.fullmatch(r"(?:cannot access free variable|name) '(\w+)' .*", outcome.error.message)
-        assert named is None or named[1] in names_bound(source)
+    said = re.fullmatch(r"(?:cannot access free variable|name) '(\w+)' .*", outcome.error.message)
+    if outcome.error.kind == "NameError" and said and outcome.line:
+        told = Problem(outcome.line, "NameError", f"the name {said[1]} is not defined")
+        assert told in problems or said[1] in names_bound(source)
 
 
 def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
@@ -121,6 +122,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
 
     @FUZZ
     @given(programs(), st.sampled_from(WORLDS))
+    @example("def task_program():\n    say(undefined_name)\n", WORLDS[0])
     def check(source: str, world: World) -> None:
         note(source)
         outcome = seen[source, world] = outcome_of(lanes, source, world)
@@ -141,6 +143,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
 def test_broken_texts_end_alike_in_every_run_and_break_nothing(lanes: Lanes, other_lanes: Lanes) -> None:
     @FUZZ
     @given(broken_programs(), st.sampled_from(WORLDS))
+    @example("def task_program():\n    \0\n", WORLDS[0])
     def check(source: str, world: World) -> None:
         note(source)
         outcome = outcome_of(lanes, source, world)
