@@ -1,8 +1,10 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
-# installed (this folder, or a wheel), VENV where.
+# installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
+# FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
+FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
 DOTS = while read -r; do printf .; done; echo
@@ -10,7 +12,7 @@ SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraint
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@$(BIN)/roboeval evaluate recorded:careful
@@ -21,6 +23,12 @@ demo: $(VENV)/installed
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(TESTS)
+
+fuzz: $(VENV)/tested
+	@seed=$${FUZZ_SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')}; \
+	echo "random programs; to repeat: make fuzz FUZZ_SEED=$$seed FUZZ_EXAMPLES=$(FUZZ_EXAMPLES)"; \
+	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest --hypothesis-seed=$$seed \
+		tests/codebotler/simulator/test_fuzz.py
 
 lint: $(VENV)/linted
 	$(BIN)/ruff check .

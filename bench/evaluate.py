@@ -5,27 +5,22 @@ else of the recorded models. Nothing is deduplicated. The three ways take turns 
 that the ratios hold on a machine whose speed drifts. Pairs that reach a limit are timed and printed apart.
 """
 
-import builtins
 import json
 import multiprocessing
 import os
 import subprocess
 import sys
 import time
-import types
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import PAPER
-from codebotler.simulator.sandbox.execution import BudgetSpentError, Run
-from codebotler.simulator.sandbox.ticks import ENTER, ENTRY, TICK, prepared
-from codebotler.trace import Option, Status
+from codebotler.trace import Status
 from codebotler.world import World
+from in_process import compiled, run_bare
 from roboeval.records import recorded_completions
 from roboeval.suite import load_suite
 
@@ -62,61 +57,9 @@ def isolated(lanes: Lanes, part: Sequence[Pair]) -> list[Status]:
 
     def one(index: int) -> Status:
         source, world = part[index]
-        return simulate(lanes.here(), source, lambda: SimulatedRobot(world)).status
+        return lanes.here().run(source, lambda: SimulatedRobot(world)).status
 
-    return list(lanes.map_distinct(one, range(len(part))))
-
-
-class Bare(Run):
-    """A program that runs in this process and calls the simulated robot as a function."""
-
-    def __init__(self, robot: SimulatedRobot) -> None:
-        skills = [[s.name, [[p.name, p.type.__name__] for p in s.parameters]] for s in robot.skills.values()]
-        super().__init__({"skills": skills, "ticks": PAPER.limits.ticks, "seconds": PAPER.limits.seconds})
-        self.robot, self.calls = robot, 0
-
-    def request(self, message: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
-        """Do what the engine would."""
-        name, values = message
-        self.calls += name != "sleep"
-        self.spent = name == "sleep" or self.calls > PAPER.limits.calls
-        if self.spent:
-            raise BudgetSpentError
-        arguments = [
-            tuple(Option(text, is_text) for text, is_text in value) if isinstance(value, list) else value
-            for value in values
-        ]
-        return self.robot.perform(name, arguments)
-
-
-@lru_cache(maxsize=100_000)
-def compiled(source: str) -> types.CodeType | BaseException:
-    """A program's code, or why there is none."""
-    try:
-        return prepared(source, lowercase=True)[0]
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        return error
-
-
-def run_bare(pair: Pair) -> None:
-    """Run a pair in this process."""
-    source, world = pair
-    code = compiled(source)
-    if isinstance(code, BaseException):
-        return
-    run = Bare(SimulatedRobot(world))
-    namespace = {"__name__": "__main__", **run.names()}
-    tick = run.ticker()
-    setattr(builtins, TICK, tick)
-    setattr(builtins, ENTRY, tick)
-    setattr(builtins, ENTER, run.enter)
-    time.sleep = run.sleep
-    try:
-        exec(code, namespace)
-        if not run.entered:
-            exec("task_program()", namespace)
-    except BaseException:  # noqa: BLE001 - however a program ends, its time was measured
-        return
+    return list(lanes.map_distinct(one, range(len(part)), name=lambda index: index.to_bytes(8, "big")))
 
 
 def in_process(pool: ProcessPoolExecutor, part: Sequence[Pair]) -> None:

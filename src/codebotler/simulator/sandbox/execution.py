@@ -109,14 +109,18 @@ class Run:
 
     def ticker(self) -> Callable[[], None]:
         """The function that counts ticks and, once they are spent, raises each time it is called."""
-        count = itertools.count(1).__next__
+        self.count_anew()
 
         def tick() -> None:
-            if count() > self.ticks or self.spent:
+            if self.count() > self.ticks or self.spent:
                 self.spent = True
                 raise BudgetSpentError
 
         return tick
+
+    def count_anew(self) -> None:
+        """Count ticks from the start."""
+        self.count = itertools.count(1).__next__
 
     def skill(self, name: str, parameters: tuple[tuple[str, str], ...], way: int) -> object:
         """A function with a skill's name and parameters that asks the engine."""
@@ -141,24 +145,25 @@ class Run:
     def perform(
         self, name: str, parameters: list[tuple[str, type]], way: int, values: tuple[Any, ...]
     ) -> Any:  # noqa: ANN401
-        """Ask the engine for a skill; texts must be `str` and options a `list`, exactly."""
-        options: list[Any] = []
-        arguments = []
+        """Carry out a skill; texts must be `str` and options a `list`, exactly."""
         for (parameter, kind), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
                 wanted = "a list" if kind is list else "text"
                 raise TypeError(f"{name}: {parameter} must be {wanted}, not {NAME_OF(given)}")
-            if kind is list:
-                options = list(value)
-                arguments.append(f"[{','.join([option_text(option) for option in options])}]")
-            else:
-                arguments.append(quoted(value))
         if self.spent:
             raise BudgetSpentError
-        request = f"{quoted(name)},[{','.join(arguments)}]"
-        result = self.ask(request, way)
-        return options[result] if options and type(result) is int else result
+        arguments = [value.copy() if type(value) is list else value for value in values]
+        result = self.carry_out(name, arguments, way)
+        for options in arguments:
+            if type(options) is list and options and type(result) is int:
+                return options[result]  # the very object that the program gave
+        return result
+
+    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401 - what a skill returns
+        """Ask the engine for a skill."""
+        given = [options_text(value) if type(value) is list else quoted(value) for value in arguments]
+        return self.ask(f"{quoted(name)},[{','.join(given)}]", way)
 
     def ask(self, request: str, way: int) -> Any:  # noqa: ANN401 - what a skill returns
         """Ask for a skill, and wait for the answer only where it is not known before."""
@@ -210,9 +215,11 @@ class Run:
         raise BudgetSpentError
 
 
-def option_text(option: object) -> str:
-    """An option as it crosses the line: its text, and whether it was one."""
-    return f"[{quoted(str(option))},{'true' if issubclass(type(option), str) else 'false'}]"
+def options_text(options: list[Any]) -> str:
+    """Options as they cross the line: the text of each, and whether it was one."""
+    texts = [(str(option), issubclass(type(option), str)) for option in options]
+    parts = [f"[{quoted(text)},{'true' if is_text else 'false'}]" for text, is_text in texts]
+    return f"[{','.join(parts)}]"
 
 
 def last_line(error: BaseException) -> int | None:

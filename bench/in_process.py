@@ -1,0 +1,284 @@
+"""The same programs without isolation: in this process, to be timed, or in an ordinary one, to compare."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import re
+import resource
+import subprocess
+import sys
+import time
+import types
+from functools import lru_cache
+from pathlib import Path
+from typing import IO, Any, Protocol, Self
+
+from codebotler.simulator.conversation import described
+from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
+from codebotler.simulator.rules import PAPER, Rules
+from codebotler.simulator.sandbox import REFUSED, execution
+from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, BudgetSpentError, Run
+from codebotler.simulator.sandbox.preparing import answer
+from codebotler.simulator.sandbox.ticks import prepared
+from codebotler.trace import Option, Outcome, RunError, Status
+from codebotler.world import World
+
+CPU_SECONDS = 30
+MEMORY = 2 * 1024**3
+DEEPER = 500  # a robot that is called as a function takes more of the stack than one that is asked by socket
+OPTION_OVERHEAD = 10  # characters that an option counts more than it has
+ORDINARY = Path(__file__).with_name("ordinary_process.py")
+
+
+class Bare(Run):
+    """A program that runs in this process and calls the simulated robot as a function.
+
+    Args:
+        robot: who executes its skills.
+    """
+
+    def __init__(self, robot: SimulatedRobot) -> None:
+        super().__init__()
+        self.robot, self.limits = robot, robot.rules.limits
+        self.provide(described(robot))
+        self.ticks, self.seconds, self.calls = self.limits.ticks, self.limits.seconds, self.limits.calls
+
+    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in Run
+        """Do what the engine would."""
+        self.calls -= 1
+        if self.calls < 0:
+            self.request(name)
+        return self.robot.perform(name, for_robot(arguments))
+
+    def request(self, request: str) -> Any:  # noqa: ANN401, ARG002 - as in Run
+        """End the run: a limit is reached."""
+        self.spent = True
+        raise BudgetSpentError
+
+
+def for_robot(arguments: list[Any]) -> list[Argument]:
+    """What a program gives to a skill, as the robot takes it."""
+    return [
+        tuple(Option(str(o), isinstance(o, str)) for o in value) if isinstance(value, list) else value
+        for value in arguments
+    ]
+
+
+# --- to be timed
+
+
+@lru_cache(maxsize=100_000)
+def compiled(source: str) -> types.CodeType | BaseException:
+    """A program's code, or why there is none."""
+    try:
+        return prepared(source, lowercase=True)[0]
+    except (SyntaxError, ValueError, MemoryError) as error:
+        return error
+
+
+class Reused(Bare):
+    """Runs one program after the other, with all made before the first that can be, as the zygote does.
+
+    Args:
+        world: any.
+    """
+
+    def __init__(self, world: World) -> None:
+        super().__init__(SimulatedRobot(world))
+        time.sleep = self.sleep
+        self.provided = dict(vars(self.namespace))
+
+    def run(self, pair: tuple[str, World]) -> None:
+        """Run a program in a world."""
+        source, world = pair
+        code = compiled(source)
+        if isinstance(code, BaseException):
+            return
+        self.robot, self.now, self.spent, self.entered = SimulatedRobot(world), 0.0, False, False
+        self.calls = self.limits.calls
+        self.count_anew()
+        namespace = self.provided.copy()
+        try:
+            exec(code, namespace)
+            if not self.entered:
+                exec("task_program()", namespace)
+        except BaseException:  # noqa: BLE001 - however a program ends, its time was measured
+            return
+
+
+# --- to be compared
+
+
+class Unwalled(Bare):
+    """A program that runs in this process and is told and judged all that the engine tells and judges.
+
+    Args:
+        robot: who executes its skills.
+    """
+
+    def __init__(self, robot: SimulatedRobot) -> None:
+        super().__init__(robot)
+        self.text = self.asked = 0
+        self.limit: str | None = None
+        self.errors: list[RobotError] = []
+
+    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in Run
+        """Do what the engine would, and find the limits that it would."""
+        given = for_robot(arguments)
+        self.limit = self.limit or self.reached(given)
+        if self.limit:
+            super().request(name)
+        self.robot.now = float(self.now)
+        limit = sys.getrecursionlimit()
+        sys.setrecursionlimit(RECURSION_LIMIT + DEEPER)
+        try:
+            return self.robot.perform(name, given)
+        except RobotError as error:
+            self.errors.append(error)
+        finally:
+            sys.setrecursionlimit(limit)
+        last = self.errors[-1]
+        raise execution.robot_error(len(self.errors) - 1, last.kind, str(last))
+
+    def request(self, request: str) -> Any:  # noqa: ANN401 - as in Run
+        """End the run: its time is over, or it waits for ever."""
+        self.limit = self.limit or self.too_late() or "it waits for something that can never come"
+        return super().request(request)
+
+    def too_late(self) -> str | None:
+        """The limit of time, if it is reached."""
+        if self.now <= self.limits.seconds:
+            return None
+        self.robot.now = self.limits.seconds
+        return f"{self.limits.seconds:,.0f} seconds of simulated time"
+
+    def reached(self, arguments: list[Argument]) -> str | None:
+        """The limit that a skill call goes beyond, in words."""
+        texts = [t for a in arguments for t in ([a] if isinstance(a, str) else [o.text for o in a])]
+        if late := self.too_late():
+            return late
+        self.asked += 1
+        self.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - len(arguments))
+        if self.asked > self.limits.calls:
+            return f"{self.limits.calls:,} skill calls"
+        if any(len(text) > self.limits.text for text in texts):
+            return f"a text of more than {self.limits.text:,} characters"
+        if self.text > self.limits.trace:
+            return f"texts of more than {self.limits.trace:,} characters in all"
+        return None
+
+    def outcome(self, source: str) -> Outcome:
+        """Run a program and say how it ended."""
+        told = answer(source, lowercase=self.robot.rules.literals == "lowercase")
+        if told[:1] == REFUSED:
+            kind, message, line = json.loads(told[1:])
+            return Outcome(Status.PYTHON_ERROR, (), RunError(kind, message), line)
+        limits = self.limits
+        bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
+        start = self.robot.rules.clock_starts.timestamp()
+        return self.ended(json.loads(self.execute(told[1:], (*bounds, start))))
+
+    def ended(self, final: dict[str, Any]) -> Outcome:
+        """The outcome of a run that ended like this."""
+        status = Status.TIMEOUT if self.limit else Status(final["end"])
+        if status is Status.FINISHED:
+            return Outcome(status, self.robot.trace)
+        if status is Status.TIMEOUT:
+            error = RunError("TimeoutError", self.limit or f"{self.limits.ticks:,} turns of loops")
+        elif status is Status.ROBOT_ERROR:
+            failure = self.errors[final["number"]]
+            error = RunError(failure.kind, str(failure))
+        else:
+            kind = final["kind"] if final["kind"].isidentifier() else "Exception"
+            error = RunError(kind, final["message"])
+        return Outcome(status, self.robot.trace, error, final.get("line"))
+
+
+class OrdinaryProcess:
+    """A process without walls that runs programs; use as a context manager.
+
+    Hashing is fixed as it is in the engine, so that sets have the same order. Addresses are not;
+    compare outcomes `without_addresses`.
+
+    Args:
+        rules: how the worlds are simulated.
+    """
+
+    def __init__(self, rules: Rules = PAPER) -> None:
+        self.rules = rules
+        surroundings = {"PYTHONHASHSEED": "0", "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"}
+        self._process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", str(ORDINARY)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, **surroundings},
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.communicate()
+
+    def outcome(self, source: str, world: World) -> Outcome:
+        """Run one program in one world.
+
+        Raises:
+            EOFError: the program took the process down with it.
+        """
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        pickle.dump((source, world, self.rules), self._process.stdin)
+        self._process.stdin.flush()
+        outcome = pickle.load(self._process.stdout)
+        assert isinstance(outcome, Outcome)
+        return outcome
+
+
+def without_addresses(outcome: Outcome) -> str:
+    """Everything in an outcome, with the places and times that its comparison leaves out, but no address."""
+    return re.sub(r"0x[0-9a-fA-F]+", "0x", repr(outcome))
+
+
+class StandIn(Protocol):
+    """What clocks and locks follow: the run that goes on, which is not there yet when they are made."""
+
+    run: Run
+
+
+# The functions below call one another as those of the zygote do: how deep a program may call itself depends
+# on how deep it stands.
+
+
+def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
+    """Run one program after the other, until there is none any more."""
+    while one_run(stand_in, input_, output):
+        pass
+
+
+def one_run(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> bool:
+    """Fork for one program and wait for it; what it writes to the output is its outcome."""
+    try:
+        source, world, rules = pickle.load(input_)
+    except EOFError:
+        return False
+    pid = os.fork()
+    if pid == 0:
+        try:
+            child(stand_in, source, SimulatedRobot(world, rules), output)
+        finally:
+            os._exit(1)
+    return os.waitpid(pid, 0)[1] == 0
+
+
+def child(stand_in: StandIn, source: str, robot: SimulatedRobot, output: IO[bytes]) -> None:
+    """Run the program and say how it ended."""
+    resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    sys.setrecursionlimit(RECURSION_LIMIT)
+    run = stand_in.run = Unwalled(robot)
+    output.write(pickle.dumps(run.outcome(source)))
+    output.flush()
+    os._exit(0)

@@ -1,0 +1,56 @@
+"""The ordinary process of `in_process`: forks for each program, closes no walls, asks the robot directly.
+
+Clocks, chance and locks are replaced first, as in the zygote, before the modules that take them for their own
+are imported.
+"""
+
+import sys
+from typing import cast
+
+from codebotler.simulator.sandbox.execution import Run
+from codebotler.simulator.sandbox.library import load_library
+from codebotler.simulator.sandbox.surroundings import simulate_surroundings
+
+
+class Current:
+    """The run that goes on; clocks and locks are made before it is."""
+
+    def __init__(self) -> None:
+        self.run = Run()
+
+    def sleep(self, seconds: object, /) -> None:
+        """Let time pass in it."""
+        self.run.sleep(seconds)
+
+    def wait_for_ever(self) -> None:
+        """Wait in it."""
+        self.run.wait_for_ever()
+
+    @property
+    def now(self) -> float:
+        """What its clock shows."""
+        return self.run.now
+
+    @property
+    def start(self) -> float:
+        """When it began."""
+        return self.run.start
+
+
+def main() -> None:
+    """Be the ordinary process."""
+    input_, output = sys.stdin.buffer, sys.stdout.buffer
+    current = Current()
+    run = cast("Run", current)
+    limit = sys.getrecursionlimit()
+    simulate_surroundings(run)
+    load_library(run)
+    sys.setrecursionlimit(limit)
+
+    import in_process  # noqa: PLC0415 - only now
+
+    in_process.serve(current, input_, output)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,411 @@
+"""Random robot programs, written by the rules of grammar.txt, and texts that once were such programs."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from hypothesis import strategies as st
+
+DEEPEST_EXPRESSION, DEEPEST_BLOCK, DEEPEST_DEFINITION = 3, 3, 2
+
+Rules = tuple[tuple[int, str], ...]
+
+
+@dataclass
+class Rule:
+    """A rule of the grammar.
+
+    Args:
+        weight: how often it is drawn, compared with its neighbours.
+        text: its Python.
+        uses: for a definition, further rules, with what they are for.
+    """
+
+    weight: int
+    text: str
+    uses: list[tuple[str, str]] = field(default_factory=list)
+
+
+def read_grammar(text: str) -> dict[str, list[Rule]]:
+    """The rules of a grammar, by what they are for."""
+    grammar: dict[str, list[Rule]] = {}
+    rules: list[Rule] = []
+    for line in text.splitlines():
+        if line.startswith("== "):
+            rules = grammar[line[3:]] = []
+        elif found := re.fullmatch(r" *(\d+) \| (.*)", line):
+            rules.append(Rule(int(found[1]), found[2]))
+        elif found := re.fullmatch(r" *> (\w+) (.*)", line):
+            rules[-1].uses.append((found[1], found[2]))
+        elif (found := re.fullmatch(r" *\| ?(.*)", line)) and rules[-1].uses:
+            kind, use = rules[-1].uses[-1]
+            rules[-1].uses[-1] = (kind, f"{use}\n{found[1]}")
+        elif found:
+            rules[-1].text += "\n" + found[1]
+    return grammar
+
+
+GRAMMAR = read_grammar(Path(__file__).with_name("grammar.txt").read_text(encoding="utf-8"))
+DEFINITIONS = GRAMMAR.pop("DEFINITION")
+DEEP_DEFINITIONS = GRAMMAR.pop("DEEP DEFINITION")
+WEIGHED: dict[str, Rules] = {
+    kind: tuple((rule.weight, rule.text) for rule in rules) for kind, rules in GRAMMAR.items()
+}
+STATEMENTS = WEIGHED.pop("STATEMENT")
+STATEMENTS_WITHOUT_BLOCKS = tuple(rule for rule in STATEMENTS if "BLOCK" not in rule[1])
+
+MODULES = "collections contextlib copy dataclasses enum functools itertools json math random re"
+VARIABLES = {"T": "TEXT", "N": "NUMBER", "L": "LIST", "D": "DICT"}
+PARAMETERS = {"a": "TEXT", "b": "NUMBER", "c": "LIST"}
+COUNT = 3  # variables of each kind at module level; functions write only the first
+START = {"T": "'kitchen'", "N": "2", "L": "['yes', 'no']", "D": "{'a': 1}"}
+UNUSUAL_ENDS = (
+    "del task_program",
+    "task_program = None",
+    "task_program = lambda: say('hello')",
+    "task_program = say",
+    "async def task_program():\n    say('never')",
+    "def task_program():\n    yield say('never')",
+    "def task_program(a):\n    say(a)",
+)
+
+
+@dataclass
+class Scope:
+    """What a function, a class or the module knows while its text is written.
+
+    Args:
+        kind: `module`, `global`, `local` or `nonlocal`: what the variables that it assigns are.
+        readable: names that hold a text and so on.
+        uses: rules for what was defined.
+        loops: how many loops its statement stands in.
+    """
+
+    kind: str
+    readable: dict[str, list[str]]
+    uses: dict[str, list[str]]
+    loops: int = 0
+
+
+@dataclass
+class Writer(ast.NodeTransformer):
+    """Writes one program: replaces the capitals in rules by what is drawn.
+
+    Args:
+        draw: draws from a strategy.
+        definitions_drawn: the rules for functions and classes.
+    """
+
+    draw: Any
+    definitions_drawn: Sequence[Rule]
+    scopes: list[Scope] = field(default_factory=list)
+    expressions: int = 0
+    blocks: int = 0
+    items: int = 0
+    defined: int = 0
+    plain: bool = False
+    walrus: bool = True
+    chosen: dict[str, str] = field(default_factory=dict)
+
+    def program(self) -> str:
+        """The text of a program."""
+        names = {kind: [f"{name.lower()}{i}" for i in range(COUNT)] for name, kind in VARIABLES.items()}
+        self.scopes = [Scope("module", names, {})]
+        tree = ast.parse(f"import {', '.join(MODULES.split())}")
+        forgotten = self.number(80)
+        starts = [f"{name.lower()}{i} = {START[name]}" for name in VARIABLES for i in range(COUNT)]
+        tree.body += ast.parse("\n".join(s for i, s in enumerate(starts) if i != forgotten - 1)).body
+        tree.body += self.definitions()
+        tree.body += self.statements(self.number(2))
+        tree.body += ast.parse("def task_program(): pass").body
+        tree.body[-1].body = self.function_body(lambda: self.statements(2 + self.number(6)))  # type: ignore[attr-defined]
+        match self.number(12):
+            case 1:
+                tree.body += ast.parse("if __name__ == '__main__':\n    task_program()").body
+            case 2:
+                tree.body += [*ast.parse("task_program()").body, *self.statements(1)]
+            case 3 if self.number(3) == 0:
+                tree.body += ast.parse(UNUSUAL_ENDS[self.number(len(UNUSUAL_ENDS))]).body
+        return ast.unparse(ast.fix_missing_locations(tree))
+
+    # --- drawing
+
+    def number(self, below: int) -> int:
+        """A number from 0 and below another; 0 is the simplest."""
+        return int(self.draw(numbers(below)))
+
+    def pick(self, choices: Sequence[tuple[int, str]]) -> str:
+        """One of the choices, by weight."""
+        at = self.number(sum(weight for weight, _ in choices))
+        for weight, rule in choices:
+            at -= weight
+            if at < 0:
+                return rule
+        raise AssertionError
+
+    @property
+    def here(self) -> Scope:
+        """The scope that is being written."""
+        return self.scopes[-1]
+
+    def used(self, kind: str) -> list[tuple[int, str]]:
+        """The rules for what was defined."""
+        weight = sum(weight for weight, _ in STATEMENTS) // 12 if kind == "STATEMENT" else 8
+        return [(weight, use) for scope in self.scopes for use in scope.uses.get(kind, ())]
+
+    def expression(self, kind: str) -> ast.expr:
+        """A random expression."""
+        names = [(3, name) for name in self.here.readable.get(kind, ())]
+        given = WEIGHED[kind]
+        if self.plain and names:
+            return ast.Name(self.pick(names), ast.Load())
+        if self.plain or self.expressions >= DEEPEST_EXPRESSION:
+            choices = [*(r for r in given if is_leaf(r[1])), *names]
+        else:
+            choices = [*given, *names, *self.used(kind)]
+        if not self.walrus:
+            choices = [r for r in choices if ":=" not in r[1]]
+        self.expressions += 1
+        node = self.filled(ast.parse(self.pick(choices), mode="eval").body)
+        self.expressions -= 1
+        return node  # type: ignore[no-any-return]
+
+    def statements(self, count: int) -> list[ast.stmt]:
+        """Random statements."""
+        return [node for _ in range(count) for node in self.statement()]
+
+    def statement(self) -> list[ast.stmt]:
+        """A random statement, or several that belong together."""
+        given = STATEMENTS_WITHOUT_BLOCKS if self.blocks >= DEEPEST_BLOCK else STATEMENTS
+        uses = self.used("STATEMENT")
+        if self.blocks >= DEEPEST_BLOCK:
+            uses = [use for use in uses if "BLOCK" not in use[1]]
+        rule = self.pick([*given, *uses])
+        if rule == "JUMP":
+            return [self.jump()]
+        self.blocks += 1
+        nodes = self.filled_statements(rule)
+        self.blocks -= 1
+        return nodes
+
+    def jump(self) -> ast.stmt:
+        """What leaves a block, as far as it may stand here."""
+        choices = [(2, "pass")]
+        if self.here.loops:
+            choices += [(6, "break"), (3, "continue")]
+        if self.here.kind != "module":
+            choices += [(1, "return"), (1, "return TEXT")]
+        return self.filled_statements(self.pick(choices))[0]
+
+    def definitions(self) -> list[ast.stmt]:
+        """Functions and classes for the head of a scope."""
+        return [node for _ in range(self.number(4 - len(self.scopes))) for node in self.definition()]
+
+    def definition(self) -> list[ast.stmt]:
+        """A function or class, which can be used from then on."""
+        definition = self.definitions_drawn[self.number(len(self.definitions_drawn))]
+        self.defined += 1
+        name = f"f{self.defined}"
+        blocks, self.blocks = self.blocks, max(self.blocks, 1)
+        nodes = self.filled_statements(re.sub(r"\bF\b", name, definition.text))
+        self.blocks = blocks
+        for kind, use in definition.uses:
+            self.here.uses.setdefault(kind, []).append(re.sub(r"\bF\b", name, use))
+        return nodes
+
+    # --- filling rules
+
+    def filled(self, node: ast.AST) -> Any:  # noqa: ANN401 - a node of the same kind
+        """A rule with its capitals replaced; each use of `T` in it is the same variable."""
+        chosen, self.chosen = self.chosen, {}
+        node = self.visit(node)
+        self.chosen = chosen
+        return node
+
+    def filled_statements(self, rule: str) -> list[ast.stmt]:
+        """Statements, with their capitals replaced."""
+        module: ast.Module = self.filled(ast.parse(rule))
+        return module.body
+
+    def visit(self, node: ast.AST) -> Any:  # noqa: ANN401 - what takes its place
+        """Replace what a node stands for."""
+        match node:
+            case ast.Name():
+                return self.name(node)
+            case ast.Expr(ast.Name("BLOCK")):
+                return self.statements(1 + self.number(2))
+            case ast.Expr(ast.Name("JUMP")):
+                return [self.jump()]
+            case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
+                self.comprehended(node)
+            case ast.For() | ast.While():
+                self.looped(node)
+            case ast.FunctionDef() | ast.Lambda():
+                self.function(node)
+            case ast.JoinedStr():  # only names: before Python 3.12, it may not hold quotes of its own
+                plain, self.plain = self.plain, True
+                self.generic_visit(node)
+                self.plain = plain
+            case _:
+                return self.generic_visit(node)
+        return node
+
+    def name(self, node: ast.Name) -> ast.expr:
+        """What a name in capitals stands for."""
+        if node.id in WEIGHED:
+            return self.expression(node.id)
+        if node.id in VARIABLES or node.id == "T2":
+            if node.id not in self.chosen:
+                count = COUNT if self.here.kind == "module" else 1
+                self.chosen[node.id] = f"{node.id[0].lower()}{self.number(count)}"
+            return ast.Name(self.chosen[node.id], node.ctx)
+        return ast.Name(f"i{self.items}", node.ctx) if node.id == "ITEM" else node
+
+    def comprehended(self, node: ast.ListComp | ast.SetComp | ast.DictComp | ast.GeneratorExp) -> None:
+        """A comprehension; its first iterable knows nothing of its variables."""
+        walrus, self.walrus = self.walrus, False
+        first = node.generators[0]
+        first.iter = self.visit(first.iter)
+        self.items += 1
+        with self.known({"TEXT": [f"i{self.items}"]}):
+            for generator in node.generators:
+                self.walrus = False
+                generator.target = self.visit(generator.target)
+                if generator is not first:
+                    generator.iter = self.visit(generator.iter)
+                self.walrus = walrus
+                generator.ifs = [self.visit(test) for test in generator.ifs]
+            for part in ("elt", "key", "value"):
+                if hasattr(node, part):
+                    setattr(node, part, self.visit(getattr(node, part)))
+        self.items -= 1
+
+    @contextmanager
+    def known(self, names: dict[str, list[str]]) -> Iterator[None]:
+        """Let some more names be read for a while."""
+        before = self.here.readable
+        self.here.readable = {kind: before[kind] + names.get(kind, []) for kind in before}
+        yield
+        self.here.readable = before
+
+    def looped(self, node: ast.For | ast.While) -> None:
+        """A loop; its `else` is no part of it."""
+        for part in ("target", "iter", "test"):
+            if hasattr(node, part):
+                setattr(node, part, self.visit(getattr(node, part)))
+        self.here.loops += 1
+        node.body = self.visited(node.body)
+        self.here.loops -= 1
+        node.orelse = self.visited(node.orelse)
+
+    def visited(self, body: list[ast.stmt]) -> list[ast.stmt]:
+        """Statements, with what each of them becomes."""
+        module: ast.Module = self.generic_visit(ast.Module(body, []))  # type: ignore[assignment]
+        return module.body
+
+    def function(self, node: ast.FunctionDef | ast.Lambda) -> None:
+        """A function, whose body knows its parameters."""
+        if isinstance(node, ast.FunctionDef):
+            node.decorator_list = [self.visit(one) for one in node.decorator_list]
+        node.args = self.visit(node.args)
+        with self.known(parameters(node.args)):
+            if isinstance(node, ast.FunctionDef):
+                given = node.body
+                node.body = self.function_body(lambda: self.visited(given))
+            else:
+                walrus, self.walrus = self.walrus, False
+                node.body = self.visit(node.body)
+                self.walrus = walrus
+
+    def function_body(self, write: Callable[[], list[ast.stmt]]) -> list[ast.stmt]:
+        """The body of a function: what its variables are, perhaps functions of its own, then the rest."""
+        outer = self.here.kind
+        kinds = ["local", "global", *(["nonlocal"] if outer in ("local", "nonlocal") else [])]
+        kind = kinds[self.number(len(kinds))]
+        first = [name.lower() + "0" for name in VARIABLES]
+        if kind == "local":
+            head = "; ".join(f"{name.lower()}0 = {START[name]}" for name in VARIABLES)
+        else:
+            head = f"{kind} {', '.join(first)}"
+        self.scopes.append(Scope(kind, self.here.readable, {}))
+        before = self.walrus, self.chosen
+        self.walrus, self.chosen = True, {}
+        body = ast.parse(head).body
+        if len(self.scopes) <= DEEPEST_DEFINITION:
+            body += self.definitions()
+        body += write()
+        self.walrus, self.chosen = before
+        self.scopes.pop()
+        return body
+
+
+@cache
+def numbers(below: int) -> st.SearchStrategy[int]:
+    """Numbers from 0."""
+    return st.integers(0, max(0, below - 1))
+
+
+@cache
+def is_leaf(rule: str) -> bool:
+    """Whether nothing is left to draw in a rule."""
+    return not re.search(r"\b(?:[A-Z]{3,}|[TNLD])\b", rule)
+
+
+def parameters(given: ast.arguments) -> dict[str, list[str]]:
+    """The names of parameters, by what they hold."""
+    found: dict[str, list[str]] = {}
+    for one in (*given.posonlyargs, *given.args, *given.kwonlyargs):
+        if one.arg in PARAMETERS:
+            found.setdefault(PARAMETERS[one.arg], []).append(one.arg)
+    return found
+
+
+@st.composite
+def programs(draw: st.DrawFn, *, deep: bool = True) -> str:
+    """Programs that parse, mostly do something and often finish.
+
+    Args:
+        draw: given by Hypothesis.
+        deep: whether to draw also such as end differently under different versions of Python, because they
+            call themselves through C until the stack is full.
+    """
+    return Writer(draw, DEFINITIONS + DEEP_DEFINITIONS * deep).program()
+
+
+TOKENS = re.compile(r"\w+|\s+|[^\w\s]")
+FOREIGN = (
+    *("\t", "\f", "\r", "\n", "\\", "'", '"""', "(", "]", "{", ":", "=", "*", "#", "@", "$", "f'{"),
+    *("lambda", "async ", "0x", "1_", "\ufeff", "\u2028", "\xa0", "ﬁ", "²", "\x00", "\ud800", "\U000e0100"),
+    "# -*- coding: utf-7 -*-",
+)
+
+
+@st.composite
+def broken_programs(draw: st.DrawFn) -> str:
+    """Programs with lines and tokens gone, twice there or swapped, and foreign characters among them."""
+    text = draw(programs())
+    for _ in range(draw(st.integers(1, 4))):
+        pieces = text.splitlines(keepends=True) if draw(st.booleans()) else TOKENS.findall(text)
+        at = draw(st.integers(0, max(0, len(pieces) - 2)))
+        match draw(st.sampled_from(("delete", "double", "swap", "foreign", "any", "cut"))):
+            case "delete":
+                del pieces[at : at + 1]
+            case "double":
+                pieces[at:at] = pieces[at : at + 1]
+            case "swap":
+                pieces[at : at + 2] = pieces[at : at + 2][::-1]
+            case "foreign":
+                pieces.insert(at, draw(st.sampled_from(FOREIGN)))
+            case "any":
+                pieces.insert(at, draw(st.text(max_size=5)))
+            case _:
+                del pieces[at:]
+        text = "".join(pieces)
+    return text

@@ -1,0 +1,103 @@
+"""Do random programs end alike under several versions of Python?
+
+    python bench/versions.py 1000 7 ../venv-3.12/bin/python ../venv-3.13/bin/python
+
+This runs 1,000 programs, drawn with seed 7, under this Python and the others, which need what this one has.
+It compares status, kind of error, line and trace, and prints the programs that differ; what the message of an
+error says is Python's own. Best run under the oldest: programs are in the syntax of the one that draws.
+"""
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from codebotler.simulator.engine import run
+from codebotler.simulator.rules import Limits, Rules
+from codebotler.trace import Outcome
+from codebotler.world import Person, Room, World
+
+PYTHONS_OWN = re.compile("0x[0-9a-f]+|(?<=maximum recursion depth exceeded)[a-z ]+", re.IGNORECASE)
+RULES = Rules(limits=Limits(ticks=2_000, calls=60))
+AMY = Person("amy", ("yes", "no", "hello|kitchen", ".*"))
+WORLD = World(
+    (
+        Room("start_loc", ("mug",), (Person(".*", ("no", "yes")),)),
+        Room("kitchen", ("apple", "mug"), (AMY,)),
+        Room("conference room", ("stapler",)),
+    ),
+    "start_loc",
+)
+
+
+def drawn(count: int, seed: int) -> list[str]:
+    """Distinct random programs."""
+    import hypothesis  # noqa: PLC0415 - the other versions need not have it
+
+    from random_programs import programs  # noqa: PLC0415 - the same
+
+    found: dict[str, None] = {}
+
+    @hypothesis.seed(seed)
+    @hypothesis.settings(
+        max_examples=count, database=None, deadline=None, suppress_health_check=list(hypothesis.HealthCheck)
+    )
+    @hypothesis.given(programs(deep=False))
+    def draw(source: str) -> None:
+        found[source] = None
+
+    draw()
+    return list(found)
+
+
+def compared(outcome: Outcome) -> list[object]:
+    """What must be the same."""
+    trace = [PYTHONS_OWN.sub("", repr(event)) for event in outcome.trace]
+    return [outcome.status, outcome.error and outcome.error.kind, outcome.line, trace]
+
+
+def outcomes(sources: list[str]) -> list[list[object]]:
+    """What comes of programs under this version."""
+    return [compared(outcome) for outcome in run([(s, WORLD) for s in sources], workers=1, rules=RULES)]
+
+
+def compare(sources: list[str], pythons: list[str]) -> int:
+    """Run programs under several versions, print those that differ, and count them."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "programs.json")
+        file.write_text(json.dumps(sources), encoding="utf-8")
+        by_version = {
+            python: json.loads(subprocess.check_output([python, __file__, "--outcomes", str(file)]))
+            for python in pythons
+        }
+    different = 0
+    for number, source in enumerate(sources):
+        came = {python: by_version[python][number] for python in pythons}
+        if any(outcome != came[pythons[0]] for outcome in came.values()):
+            different += 1
+            print(f"--- program {number}\n{source}\n")
+            for python, outcome in came.items():
+                print(f"{python}: {outcome}")
+    return different
+
+
+def main() -> int:
+    """Compare, or be one of those that are compared."""
+    match sys.argv[1:]:
+        case ["--outcomes", file]:
+            print(json.dumps(outcomes(json.loads(Path(file).read_text(encoding="utf-8")))))
+            return 0
+        case [count, seed, *pythons]:
+            sources = drawn(int(count), int(seed))
+            different = compare(sources, [sys.executable, *pythons])
+            print(f"{different} of {len(sources)} programs differ")
+            return int(different > 0)
+        case _:
+            print(__doc__, file=sys.stderr)
+            return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())
