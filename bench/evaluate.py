@@ -1,26 +1,30 @@
 """How fast is the engine, compared with no isolation at all and with one fresh interpreter a run?
 
 The list is fixed: every distinct (program, world) pair of the corpus, where CODEBOTLER_CORPUS names it, or
-else of the recorded models. Nothing is deduplicated. The three ways take turns over parts of the list, so
-that the ratios hold on a machine whose speed drifts. Pairs that reach a limit are timed and printed apart.
+else of the recorded models. Nothing is deduplicated; ours and the in-process way both compile each program
+once, while the clock runs. The three ways take turns over parts of the list, so that the ratios hold on a
+machine whose speed drifts. Pairs that reach a limit, loops and programs that hang are printed apart.
 """
 
 import json
 import multiprocessing
 import os
+import statistics
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from functools import partial
+from functools import cache, partial
+from itertools import groupby
 from pathlib import Path
 
 from codebotler.simulator.engine import Lanes
+from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Status
-from codebotler.world import World
-from in_process import compiled, run_bare
+from codebotler.world import Room, World
+from in_process import Reused
 from roboeval.records import recorded_completions
 from roboeval.suite import load_suite
 
@@ -31,7 +35,7 @@ Pair = tuple[str, World]
 
 
 def pairs() -> list[Pair]:
-    """The fixed list."""
+    """The fixed list; the worlds of a program follow one another."""
     suite = load_suite()
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
@@ -54,17 +58,38 @@ def pairs() -> list[Pair]:
 
 def isolated(lanes: Lanes, part: Sequence[Pair]) -> list[Status]:
     """Ours: a closed child for each pair."""
+    programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
-    def one(index: int) -> Status:
-        source, world = part[index]
-        return lanes.here().run(source, lambda: SimulatedRobot(world)).status
+    def run_all(number: int) -> list[Status]:
+        return [
+            lanes.here().run(source, partial(SimulatedRobot, world)).status
+            for source, world in programs[number]
+        ]
 
-    return list(lanes.map_distinct(one, range(len(part)), name=lambda index: index.to_bytes(8, "big")))
+    name = partial(int.to_bytes, length=8, byteorder="big")
+    statuses = lanes.map_distinct(run_all, range(len(programs)), name=name)
+    return [status for of_program in statuses for status in of_program]
+
+
+@cache
+def reused(world: World) -> Reused:
+    """What runs programs in this process."""
+    return Reused(world)
+
+
+def run_bare(part: Sequence[Pair]) -> None:
+    """Run pairs in this process."""
+    for pair in part:
+        reused(NOWHERE).run(pair)
+
+
+NOWHERE = World((Room("nowhere"),), "nowhere")
 
 
 def in_process(pool: ProcessPoolExecutor, part: Sequence[Pair]) -> None:
-    """No isolation: the same programs in as many processes, each compiled once."""
-    list(pool.map(run_bare, part, chunksize=max(1, len(part) // (4 * WORKERS))))
+    """No isolation: the same programs in as many processes."""
+    share = -(-len(part) // (8 * WORKERS))
+    list(pool.map(run_bare, [part[at : at + share] for at in range(0, len(part), share)]))
 
 
 def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
@@ -83,23 +108,19 @@ def seconds(way: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> fl
     return time.perf_counter() - start
 
 
-def parts(whole: Sequence[Pair]) -> Iterator[Sequence[Pair]]:
-    """The list in as many parts as there are rounds; each part holds pairs from all over the list."""
+def parts(whole: Sequence[Pair]) -> Iterator[list[Pair]]:
+    """The list in as many parts as there are rounds; each holds programs from all over the list."""
+    programs = [list(same) for _, same in groupby(whole, key=lambda pair: pair[0])]
     for start in range(ROUNDS):
-        yield whole[start::ROUNDS]
+        yield [pair for program in programs[start::ROUNDS] for pair in program]
 
 
 def main() -> None:
-    """Print runs per second of the three ways, and the two ratios."""
+    """Print runs per second of the three ways, the two ratios, and what is apart."""
     whole = pairs()
-    for source, _ in whole:
-        compiled(source)  # here, so that no worker has to: they are forked from this process
-    with (
-        ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork")) as pool,
-        Lanes(WORKERS) as lanes,
-        ThreadPoolExecutor(WORKERS) as threads,
-    ):
-        list(pool.map(abs, range(100 * WORKERS)))
+    pool = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork"))
+    list(pool.map(run_bare, [whole[:1]] * 4 * WORKERS))
+    with pool, Lanes(WORKERS) as lanes, ThreadPoolExecutor(WORKERS) as threads:
         ours = partial(isolated, lanes)
         statuses = ours(whole)
         honest = [pair for pair, status in zip(whole, statuses, strict=True) if status is not Status.TIMEOUT]
@@ -113,10 +134,12 @@ def main() -> None:
         for part in parts(honest):
             for name, way in ways.items():
                 times.setdefault(name, []).append(seconds(way, part))
-        at_limit = seconds(ours, limited) if limited else 0.0
-    report(len(honest), times)
-    if limited:
-        print(f"{len(limited)} pairs that reach a limit, ours: {1000 * at_limit / len(limited):.1f} ms a run")
+        report(len(honest), times)
+        if limited:
+            at_limit = seconds(ours, limited) / len(limited)
+            print(f"{len(limited)} pairs that reach a limit, ours: {1000 * at_limit:.1f} ms a run")
+        report_hanging(ours, honest[: len(honest) // ROUNDS])
+    report_loops(honest)
 
 
 def report(count: int, times: dict[str, list[float]]) -> None:
@@ -134,6 +157,48 @@ def ratios(times: dict[str, list[float]], other: int) -> str:
     """The ratio in each round."""
     rounds = list(times.values())
     return ", ".join(f"{b / a:.3f}" for a, b in zip(rounds[0], rounds[other], strict=True))
+
+
+# --- what is apart
+
+HANGS = "def task_program():\n    sum(range(10**12))\n"
+LOOPS = {
+    "200,000 turns of a loop": "def task_program():\n    for i in range(199_998): pass\n",
+    "1,000 looks for the same": "def task_program():\n    for i in range(1000): is_in_room('mug')\n",
+    "1,000 looks for others": "def task_program():\n    for i in range(1000): is_in_room(f'mug {i}')\n",
+    "1,000 says": "def task_program():\n    for i in range(1000): say('hello')\n",
+}
+
+
+def report_hanging(ours: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> None:
+    """Print what a program that hangs, a run of five seconds of processor time, costs the honest ones."""
+    alone = seconds(ours, part)
+    beside = seconds(ours, [(HANGS, NOWHERE), *part])
+    print(
+        f"{len(part)} honest runs: {alone:.1f} s; with one that hangs among them {beside:.1f} s "
+        f"(its share of {WORKERS} workers: {5 / WORKERS:.1f} s)"
+    )
+
+
+def report_loops(honest: Sequence[Pair]) -> None:
+    """Print what loops cost, as multiples of the median honest run and of the same loop in-process."""
+    lane = Lane()
+
+    def one_by_one(part: Sequence[Pair]) -> None:
+        for source, world in part:
+            lane.run(source, partial(SimulatedRobot, world))
+
+    median = statistics.median(seconds(one_by_one, [pair]) for pair in honest[:: max(1, len(honest) // 200)])
+    print(f"median honest run, one lane: {1000 * median:.2f} ms")
+    for name, source in LOOPS.items():
+        pair = (source, NOWHERE)
+        ours = statistics.median(seconds(one_by_one, [pair]) for _ in range(7))
+        bare = statistics.median(seconds(run_bare, [pair]) for _ in range(7))
+        print(
+            f"{name:26}{1000 * ours:8.1f} ms: {ours / median:5.1f} median runs, "
+            f"{ours / bare:5.2f} times in-process, {(ours - median) / bare:5.2f} less a median run"
+        )
+    lane.close()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,107 @@
+"""How fast is an evaluation from end to end, and how does its memory grow?
+
+The first part judges the two models whose published completions the corpus holds (where CODEBOTLER_CORPUS
+names it; else the recorded models): rows, runs and executed pairs of program and world in a second, from the
+start of the command to its end and without the start of the interpreter. The paper's own code needs 0.354 s
+for a run, one after the other. The second part judges made-up completions of which nine in ten repeat another:
+time, and the largest memory that any of its processes held.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from roboeval.evaluate import evaluate
+from roboeval.records import read_completions, recorded_completions, to_line
+from roboeval.suite import Suite, load_suite
+
+ORIGINAL = 0.354  # seconds a run
+ROWS = tuple(int(n) for n in os.environ.get("ROWS", "1000,10000,100000").split(","))
+DISTINCT = 10  # one row in so many is a program of its own
+WORKERS = os.environ.get("WORKERS", "2")
+TASK = "SayGoodDay"
+PROGRAM = "def task_program():\n    say('this is {number}')\n    go_to('lobby')\n"
+
+
+def evaluated(file: Path) -> tuple[float, float]:
+    """Judge a file of completions: seconds, and megabytes of the largest process."""
+    command = [sys.executable, "-m", "roboeval.cli", "evaluate", str(file), "--workers", WORKERS, "--json"]
+    measure = (
+        "import resource, subprocess, sys\n"
+        "subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)\n"
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+    )
+    start = time.perf_counter()
+    told = subprocess.run(
+        [sys.executable, "-c", measure, *command], check=True, capture_output=True, text=True
+    )
+    return time.perf_counter() - start, int(told.stdout) / 1024
+
+
+def real(folder: Path) -> None:
+    """Print the figures of real models."""
+    suite = load_suite()
+    for name, file in models(folder).items():
+        rows = [(c.task, c.program) for c in read_completions(file)]
+        worlds = {task: len(suite.tasks[task].scenarios) for task, _ in rows}
+        runs, executed = (sum(worlds[task] for task, _ in some) for some in (rows, set(rows)))
+        print(f"{name}: {len(rows)} rows, {runs} runs, {executed} executed")
+        for what, spent in (("the command", evaluated(file)[0]), ("its evaluation", judged(file, suite))):
+            print(
+                f"    {what} in {spent:.2f} s: {len(rows) / spent:.0f} rows/s, {runs / spent:.0f} runs/s, "
+                f"{executed / spent:.0f} executed/s, "
+                f"{ORIGINAL * executed / spent:.0f} times the paper's own code"
+            )
+
+
+def judged(file: Path, suite: Suite) -> float:
+    """Judge a file of completions in this process: seconds."""
+    start = time.perf_counter()
+    for _ in evaluate(read_completions(file), suite, workers=int(WORKERS)):
+        pass
+    return time.perf_counter() - start
+
+
+def models(folder: Path) -> dict[str, Path]:
+    """Files of completions by the name of who wrote them."""
+    corpus = os.environ.get("CODEBOTLER_CORPUS")
+    if corpus:
+        return {file.stem: file for file in sorted(Path(corpus, "corpus", "completions").glob("*.jsonl"))}
+    files = {}
+    for name in ("recorded:careful", "recorded:hasty"):
+        files[name] = folder / f"{name.partition(':')[2]}.jsonl"
+        rows = recorded_completions(name, load_suite())
+        files[name].write_bytes(b"".join(to_line(row.model_dump(exclude_unset=True)) for row in rows))
+    return files
+
+
+def growth(folder: Path) -> None:
+    """Print time and memory for more and more rows."""
+    for count in ROWS:
+        file = folder / f"{count}.jsonl"
+        with file.open("w") as rows:
+            for number in range(count):
+                program = PROGRAM.format(number=number % (count // DISTINCT))
+                row = {"task": TASK, "prompt": number % 5, "index": number // 5, "program": program}
+                rows.write(json.dumps(row) + "\n")
+        spent, largest = evaluated(file)
+        pairs = count // DISTINCT * len(load_suite().tasks[TASK].scenarios)
+        print(
+            f"{count:7} rows, {pairs:6} distinct pairs: {spent:6.1f} s, "
+            f"{1000 * spent / pairs:.2f} ms a pair, {largest:.0f} MB"
+        )
+
+
+def main() -> None:
+    """Print both parts."""
+    with tempfile.TemporaryDirectory() as name:
+        real(Path(name))
+        growth(Path(name))
+
+
+if __name__ == "__main__":
+    main()
