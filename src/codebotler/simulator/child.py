@@ -15,7 +15,6 @@ from pathlib import Path
 
 from codebotler.simulator.sandbox.channel import HEADER, MAX_FRAME
 
-SENDING = 30.0  # seconds for a long program on a busy machine; a child that does not listen is ended
 LONGEST = 120.0  # seconds; nothing that computes takes so long, so a child that does only waits
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
@@ -38,16 +37,19 @@ class Child:
         """Send a frame; a child that is gone is noticed when it is listened to.
 
         Raises:
-            TimeoutError: the child does not listen.
+            TimeoutError: the child waits for something else than to listen.
         """
         data = json.dumps(message).encode()
-        self._channel.settimeout(SENDING)
-        try:
-            self._channel.sendall(struct.pack(">I", len(data)) + data)
-        except TimeoutError:
-            raise
-        except OSError:
-            return
+        rest = memoryview(struct.pack(">I", len(data)) + data)
+        stuck = Stuck(self.pid)
+        self._channel.settimeout(SILENCE)
+        while rest:
+            try:
+                rest = rest[self._channel.send(rest) :]
+            except TimeoutError:
+                stuck.check()
+            except OSError:
+                return
 
     def receive(self) -> object:
         """The child's next message; None when it has hung up.

@@ -15,22 +15,60 @@ from codebotler.simulator.sandbox.channel import CHANNEL
 
 def enclose(job: dict[str, Any], seccomp: ctypes.Array[ctypes.c_char] | None, parent: int) -> None:
     """Close everything but the channel and give up every right, in the only order that works."""
-    for name in ("CORE", "FSIZE", "NPROC", "MEMLOCK", "MSGQUEUE"):
-        resource.setrlimit(getattr(resource, "RLIMIT_" + name), (0, 0))
-    resource.setrlimit(resource.RLIMIT_NOFILE, (4, 4))
-    resource.setrlimit(resource.RLIMIT_AS, (job["memory"], job["memory"]))
-    resource.setrlimit(resource.RLIMIT_CPU, (job["cpu"], job["cpu"] + 1))
+    for name, value in limits(job["memory"], job["cpu"]).items():
+        set_limit(name, value)
+    become_nobody()
+    die_with(parent)
+    hide_memory()
+    refuse_new_rights()
+    if seccomp is not None:
+        install(seccomp)
+
+
+def limits(memory: int, cpu: int) -> dict[str, tuple[int, int]]:
+    """The limits of a child by name, each with the one to which a process may raise it.
+
+    Args:
+        memory: bytes of address space.
+        cpu: seconds of processor time.
+    """
+    none = dict.fromkeys(("CORE", "FSIZE", "NPROC", "MEMLOCK", "MSGQUEUE"), (0, 0))
+    return {**none, "NOFILE": (4, 4), "AS": (memory, memory), "CPU": (cpu, cpu + 1)}
+
+
+def set_limit(name: str, value: tuple[int, int]) -> None:
+    """Set one limit of this process."""
+    resource.setrlimit(getattr(resource, "RLIMIT_" + name), value)
+
+
+def become_nobody() -> None:
+    """Give up being root; whoever is not stays who they are."""
     if os.geteuid() == 0:
         os.setgroups([])
         os.setresgid(NOBODY, NOBODY, NOBODY)
         os.setresuid(NOBODY, NOBODY, NOBODY)
+
+
+def die_with(parent: int) -> None:
+    """Be killed when the parent ends; a change of user would undo this."""
     prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:  # it died before that: no signal will come
         os._exit(1)
+
+
+def hide_memory() -> None:
+    """Keep other processes of the same user from tracing this one and from reading its memory."""
     prctl(PR_SET_DUMPABLE, 0)
+
+
+def refuse_new_rights() -> None:
+    """Never get rights from a program that carries them, such as a setuid one."""
     prctl(PR_SET_NO_NEW_PRIVS, 1)
-    if seccomp is not None:
-        prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
+
+
+def install(seccomp: ctypes.Array[ctypes.c_char]) -> None:
+    """Ask nothing more of the kernel than the list allows."""
+    prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
 
 
 NOBODY = 65534
@@ -105,8 +143,8 @@ def can_install(seccomp: ctypes.Array[ctypes.c_char]) -> bool:
     pid = os.fork()
     if pid == 0:
         try:
-            prctl(PR_SET_NO_NEW_PRIVS, 1)
-            prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
+            refuse_new_rights()
+            install(seccomp)
         except OSError:
             os._exit(1)
         os._exit(0)
