@@ -1,8 +1,9 @@
 """Programs that try to break out, to do harm or to cheat; each file of tests/hostile is one, and fails.
 
-A program's first line says what it tries. Comments below say how its run must end (`# ends: STATUS KIND`), what
-its robot must have done by then (`# does: KIND TEXT`, one line an event; nothing by default) and whether that is
-what was asked of it (`# earns: yes`; no by default). `@NAME@` stands for something real that it could reach.
+A program's first line says what it tries. Comments below say how its run must end (`# ends: STATUS KIND`),
+what its robot must have done by then (`# does: KIND TEXT`, one line an event; nothing by default) and whether
+that is what was asked of it (`# earns: yes`; no by default). `@NAME@` stands for something real that it could
+reach if a wall were missing.
 """
 
 import _ctypes
@@ -18,11 +19,13 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -47,17 +50,9 @@ PHRASE = "open sesame"
 WORLD = World(
     (Room("start"), Room("vault", (SECRET,), (Person(".*", ("yes", SECRET)),))), "start", about=SECRET
 )
-ASKED = Scenario(
-    WORLD,
-    (
-        Requirement(
-            "says it there",
-            "says it there",
-            parse(f'tr.ActAtFirst("vault", say("{PHRASE}"))'),
-            "SayAtLocation",
-        ),
-    ),
-)
+SAYS_IT_THERE = parse(f'tr.ActAtFirst("vault", say("{PHRASE}"))')
+ASKED = Scenario(WORLD, (Requirement("says it there", "says it there", SAYS_IT_THERE, "SayAtLocation"),))
+LONGEST = 25.0  # seconds; the watchdog's five, on a busy machine
 HONEST = """
 import builtins, collections, fractions, json, os, random, statistics, string, sys, textwrap, timeit
 
@@ -116,9 +111,8 @@ def processes() -> dict[int, tuple[int, str]]:
     found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
-            fields = (
-                (folder / "stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
-            )
+            stat = (folder / "stat").read_text(encoding="ascii", errors="replace")
+            fields = stat.rpartition(")")[2].split()
             found[int(folder.name)] = (int(fields[1]), fields[0])
     return found
 
@@ -178,6 +172,12 @@ class Reach:
     listeners: dict[str, socket.socket]
     signals: list[int] = field(default_factory=list)
 
+    @property
+    def told(self) -> IO[bytes]:
+        """Where the bystander tells of signals."""
+        assert self.bystander.stdout is not None
+        return self.bystander.stdout
+
     def facts(self) -> dict[str, str]:
         """What stands for each `@NAME@`."""
         return {
@@ -213,10 +213,12 @@ class Reach:
 
     def state(self) -> dict[str, object]:
         """All that must be the same after a run."""
-        heard = [self.bystander.stdout, *self.listeners.values()]
+        spoken_to = {name: listener.fileno() for name, listener in self.listeners.items()}
+        spoken_to["bystander"] = self.told.fileno()
+        ready = select.select(spoken_to.values(), [], [], 0)[0]
         return {
             "files": self.files(),
-            "who was spoken to": select.select(heard, [], [], 0)[0],
+            "who was spoken to": {name for name, number in spoken_to.items() if number in ready},
             "signals": list(self.signals),
             "living processes": living_below(os.getpid()),
             "processes with the marker": carry_the_marker(),
@@ -315,11 +317,13 @@ def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome)
     source = reach.filled(path.read_text(encoding="utf-8"))
     wanted = declared(source)
     before = reach.state()
+    start = time.monotonic()
     outcome = reach.run(source)
+    assert time.monotonic() - start < LONGEST
     after = reach.state()
     for name, value in before.items():
         assert after[name] == value, name
-    assert before["who was spoken to"] == []
+    assert before["who was spoken to"] == set()
 
     kind = "" if outcome.error is None else f" {outcome.error.kind}"
     assert f"{outcome.status}{kind}" in wanted.ends, outcome
@@ -360,10 +364,10 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
 
 
 @pytest.fixture
-def changed(reach: Reach) -> Iterator[Callable[[], set[str]]]:
+def changed(reach: Reach) -> Callable[[], set[str]]:
     """Names what has changed since the test began."""
     before = reach.state()
-    yield lambda: {name for name, value in reach.state().items() if value != before[name]}
+    return lambda: {name for name, value in reach.state().items() if value != before[name]}
 
 
 def test_a_written_file_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
@@ -393,10 +397,9 @@ def test_a_connection_would_be_seen(reach: Reach, changed: Callable[[], set[str]
 def test_a_signal_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
     os.kill(os.getpid(), signal.SIGUSR1)
     os.kill(reach.bystander.pid, signal.SIGTERM)
-    assert reach.bystander.stdout is not None
-    select.select([reach.bystander.stdout], [], [], 10)
+    select.select([reach.told], [], [], 10)
     assert changed() == {"signals", "who was spoken to"}
-    assert os.read(reach.bystander.stdout.fileno(), 10) == b"15 "
+    assert os.read(reach.told.fileno(), 10) == b"15 "
     reach.signals.clear()
     assert changed() == set()
 
