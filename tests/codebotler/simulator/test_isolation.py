@@ -12,8 +12,6 @@ from pathlib import Path
 
 import pytest
 
-import codebotler
-
 NOBODY = 65534
 ROOT = os.geteuid() == 0
 
@@ -68,8 +66,7 @@ def folder() -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def open_to_all(folder: Path) -> list[str]:
     """A command that starts Python with this project for every user: as it is installed, else as a copy."""
-    source = Path(codebotler.__file__).parents[1]
-    here = ["env", f"PYTHONPATH={source}", sys.executable, "-B"]
+    here = [sys.executable, "-B"]
     if not ROOT or as_user(NOBODY, [*here, "-c", CHECK, "[]"], check=False).returncode == 0:
         return here
     python = copied_python(folder / "python")
@@ -100,8 +97,7 @@ def needed() -> list[Path]:
         "for name, module in list(sys.modules.items()):\n"
         "    if '.' not in name and getattr(module, '__file__', None): print(module.__file__)"
     )
-    env = {**os.environ, "PYTHONPATH": str(Path(codebotler.__file__).parents[1])}
-    output = subprocess.check_output([sys.executable, "-c", listing], text=True, env=env)
+    output = subprocess.check_output([sys.executable, "-c", listing], text=True)
     standard = Path(sysconfig.get_path("stdlib"))
     files = [Path(line) for line in output.splitlines()]
     return [
@@ -183,7 +179,6 @@ def evaluated(*options: str, before: str = "import sys") -> subprocess.Completed
         text=True,
         check=False,
         timeout=60,
-        env={**os.environ, "PYTHONPATH": str(Path(codebotler.__file__).parents[1])},
     )
 
 
@@ -204,16 +199,6 @@ def test_isolation_that_is_required_is_refused_where_the_kernel_refuses_a_filter
 def test_other_walls_hold_where_the_kernel_refuses_a_filter(folder: Path) -> None:
     attacks = {f"open('{folder}/secret')": "OSError", "os.fork()": "BlockingIOError", "say('a')": None}
     check = BELOW_A_FILTER + CHECK.replace("require_isolation=True", "require_isolation=False")
-    process = as_user(
-        os.geteuid(),
-        [
-            "env",
-            f"PYTHONPATH={Path(codebotler.__file__).parents[1]}",
-            sys.executable,
-            "-c",
-            check,
-            json.dumps(list(attacks)),
-        ],
-    )
+    process = as_user(os.geteuid(), [sys.executable, "-c", check, json.dumps(list(attacks))])
     outcomes = json.loads(process.stdout.partition(" ")[2])
     assert [(outcome["error"] or {}).get("kind") for outcome in outcomes] == list(attacks.values())

@@ -63,7 +63,6 @@ def result(wall: str, deed: str, before: str, folder: str = "/") -> str:
         capture_output=True,
         text=True,
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(Path(walls.__file__).parents[3])},
         check=False,
         timeout=60,
     )
@@ -204,6 +203,13 @@ ROOTS_DEEDS = {
     "another user reads": Deed(NOBODY, "open('secret')", "EACCES"),
     "another user kills": Deed(NOBODY, "os.kill(os.getppid(), 0)", "EPERM"),
     "another user comes back": Deed(NOBODY, "os.setresuid(0, 0, 0)", "EPERM"),
+    "another user keeps a group": Deed(
+        NOBODY,
+        "if 7 in os.getgroups(): tell('a member, ')",
+        "done",
+        "os.setgroups([7])",
+        bare="a member, done",
+    ),
     "another user joins a group": Deed(NOBODY, "os.setgroups([0])", "EPERM"),
     "another group comes back": Deed(NOBODY, "os.setresgid(0, 0, 0)", "EPERM"),
     "no new rights": Deed(
