@@ -66,7 +66,7 @@ def folder() -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def open_to_all(folder: Path) -> list[str]:
     """A command that starts Python with this project for every user: as it is installed, else as a copy."""
-    here = [sys.executable, "-B"]
+    here = ["env", sys.executable, "-B"]  # env ends in words where it cannot start the interpreter
     if not ROOT or as_user(NOBODY, [*here, "-c", CHECK, "[]"], check=False).returncode == 0:
         return here
     python = copied_python(folder / "python")
