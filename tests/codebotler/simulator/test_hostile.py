@@ -21,7 +21,7 @@ import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -88,19 +88,25 @@ def declared(source: str) -> Declared:
 
 def rendered(event: Event) -> str:
     """An event as comments write it: `*` marks an option that was no text."""
-    text = event.text if len(event.text) < 100 else event.text[:3] + "..."
-    options = ", ".join(option.text + "*" * (not option.is_text) for option in event.options)
+    offered = [shortened(option.text) + "*" * (not option.is_text) for option in event.options]
+    options = ", ".join(counted(offered))
     asked = f": {options}" if event.kind == "ask" else ""
     answered = "" if event.answer is None else f" -> {event.answer}"
-    return f"{event.kind} {text.encode('unicode_escape').decode()}{asked}{answered}"
+    return f"{event.kind} {shortened(event.text)}{asked}{answered}"
+
+
+def shortened(text: str) -> str:
+    return (text if len(text) < 100 else text[:3] + "...").encode("unicode_escape").decode()
+
+
+def counted(texts: Iterable[str]) -> tuple[str, ...]:
+    """Texts, but those that follow each other and are equal only once."""
+    groups = [(text, len(list(group))) for text, group in groupby(texts)]
+    return tuple(text if count == 1 else f"{count} times {text}" for text, count in groups)
 
 
 def done(outcome: Outcome) -> tuple[str, ...]:
-    found = []
-    for text, group in groupby(map(rendered, outcome.trace)):
-        count = len(list(group))
-        found.append(text if count == 1 else f"{count} times {text}")
-    return tuple(found)
+    return counted(map(rendered, outcome.trace))
 
 
 # --- what a program could reach if a wall were missing
