@@ -44,6 +44,7 @@ class Child:
         stuck = Stuck(self.pid)
         self._channel.settimeout(SILENCE)
         while rest:
+            self._check_time()
             try:
                 rest = rest[self._channel.send(rest) :]
             except TimeoutError:
@@ -68,6 +69,7 @@ class Child:
                 if len(self._buffer) >= end:
                     frame, self._buffer = self._buffer[HEADER:end], self._buffer[end:]
                     return _parsed(frame)
+            self._check_time()
             try:
                 piece = self._channel.recv(1 << 16)
             except TimeoutError:
@@ -78,8 +80,10 @@ class Child:
             if not piece:
                 return None
             self._buffer += piece
-            if time.monotonic() > self._deadline:
-                raise TimeoutError
+
+    def _check_time(self) -> None:
+        if time.monotonic() > self._deadline:
+            raise TimeoutError
 
     def end(self) -> int:
         """End it, if it has not ended, and return its exit status, or minus the signal."""

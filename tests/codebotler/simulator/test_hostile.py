@@ -12,6 +12,7 @@ import ctypes
 import json
 import math
 import os
+import platform
 import select
 import shutil
 import signal
@@ -366,6 +367,30 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
         first = path.read_text(encoding="utf-8").splitlines()[0]
         assert first.startswith('"""Tries '), path.name
         assert first.endswith('."""'), path.name
+
+
+DAWDLING = """
+def task_program():
+    frame = sys._getframe()
+    while "ctypes" not in frame.f_globals:
+        frame = frame.f_back
+    ctypes = frame.f_globals["ctypes"]
+    futex, word = ctypes.CDLL(None).syscall, (ctypes.c_int * 1)()
+    a_while = (ctypes.c_long * 2)(0, 300_000_000)
+    while True:
+        futex(FUTEX, word, 0, 0, a_while)
+        sum(range(10**6))
+"""
+
+
+def test_program_that_works_a_little_and_waits_a_lot_is_ended(
+    reach: Reach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 3.0)
+    start = time.monotonic()
+    outcome = reach.run(DAWDLING.replace("FUTEX", "202" if platform.machine() == "x86_64" else "98"))
+    assert 3.0 < time.monotonic() - start < LONGEST
+    assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
 
 
 # --- that the checks see what they are for
