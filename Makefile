@@ -4,14 +4,20 @@ PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
 BIN = $(VENV)/bin
-PIP = $(BIN)/python -m pip --disable-pip-version-check --quiet
+PIP = $(BIN)/python -m pip --disable-pip-version-check
+DOTS = while read -r; do printf .; done; echo
 SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
+SHELL = bash
+.SHELLFLAGS = -o pipefail -c
 
 .PHONY: demo test lint bench clean
 
 demo: $(VENV)/installed
 	@$(BIN)/roboeval evaluate recorded:careful
+	@echo
 	@$(BIN)/roboeval evaluate recorded:hasty
+	@echo
+	@echo "To see why a program fails, keep the verdicts: $(BIN)/roboeval evaluate recorded:hasty --out runs/hasty"
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(TESTS)
@@ -26,21 +32,24 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/evaluate.py
 
 $(VENV)/made:
+	@echo "making an environment in $(VENV), which takes some seconds"
 	@$(PYTHON) -m venv --clear $(VENV)
-	@$(PIP) install --upgrade "pip>=25.1"
+	@$(PIP) install --quiet --upgrade "pip>=25.1"
 	@touch $@
 
 $(VENV)/installed: $(SOURCES) | $(VENV)/made
-	@echo "installing into $(VENV)"
-	@$(PIP) install --constraint constraints.txt --upgrade $(PACKAGE)
+	@printf "installing into $(VENV) "
+	@$(PIP) install --constraint constraints.txt --upgrade $(PACKAGE) | { $(DOTS); }
 	@touch $@
 
 $(VENV)/tested: $(VENV)/installed
-	@$(PIP) install --constraint constraints.txt --group test
+	@printf "installing what tests need "
+	@$(PIP) install --constraint constraints.txt --group test | { $(DOTS); }
 	@touch $@
 
 $(VENV)/linted: $(VENV)/tested
-	@$(PIP) install --constraint constraints.txt --group lint
+	@printf "installing what linters need "
+	@$(PIP) install --constraint constraints.txt --group lint | { $(DOTS); }
 	@touch $@
 
 clean:

@@ -19,7 +19,7 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from codebotler.simulator.engine import Lanes, simulate
+from codebotler.simulator.engine import Lanes
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
 from codebotler.simulator.sandbox.execution import BudgetSpentError, Run
@@ -93,7 +93,7 @@ class Bare(Run):
 def compiled(source: str) -> types.CodeType | BaseException:
     """A program's code, or why there is none."""
     try:
-        return prepared(source, lowercase=True)
+        return prepared(source, lowercase=True)[0]
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         return error
 

@@ -1,15 +1,18 @@
 """One more skill is one row of the table and one behaviour; everything else follows from them."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from codebotler.badinput import BadInput
 from codebotler.program import Problem, Program
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
-from codebotler.skills import SKILLS, Parameter, Recording, RosAction, Skill
-from codebotler.trace import Event, Outcome, RunError, Status
+from codebotler.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
+from codebotler.trace import Event, Option, Outcome, RunError, Status
+from codebotler.tracefile import outcome_yaml, read_outcome
 from codebotler.world import Person, Room, World
 
 TABLE = SKILLS.with_skill(
@@ -97,6 +100,35 @@ def test_formula_judges_it(outcomes: dict[str, Outcome]) -> None:
     assert holds(parse('tr.Exists(wave("alice"))', skills=TABLE), trace)
     assert holds(parse('tr.ActAtFirst("lab", wave("bob"))', skills=TABLE), trace)
     assert not holds(parse('tr.Exists(wave("carol"))', skills=TABLE), trace)
+
+
+def test_its_events_are_read_from_files(outcomes: dict[str, Outcome], tmp_path: Path) -> None:
+    path = tmp_path / "outcome.yaml"
+    path.write_text(outcome_yaml(outcomes["waves"], TABLE))
+    assert read_outcome(path, TABLE) == outcomes["waves"]
+    with pytest.raises(BadInput, match='"wave" is no kind of event'):
+        read_outcome(path)
+
+
+def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others(tmp_path: Path) -> None:
+    asks = Skill(
+        "vote",
+        (Parameter("about"), Parameter("options", list, "list[str]")),
+        "str",
+        "Let all in the room vote.",
+        Recording("vote", "about", "options"),
+    )
+    smells = Skill("smells", (Parameter("what"),), "bool", "Smell.", Recording("smell", "what"))
+    table = SkillTable((*SKILLS.rows, asks, smells))
+    trace = (
+        Event("vote", "tea?"),
+        Event("vote", "tea?", (Option("a"),), "a"),
+        Event("smell", "tea", found=True),
+    )
+    outcome = Outcome(Status.FINISHED, trace)
+    path = tmp_path / "outcome.yaml"
+    path.write_text(outcome_yaml(outcome, table))
+    assert read_outcome(path, table) == outcome
 
 
 def test_static_check_knows_it() -> None:

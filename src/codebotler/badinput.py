@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
@@ -19,47 +20,95 @@ Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 MAX_BYTES = 5_000_000
 MAX_DEPTH = 50
 MAX_PLACES = 100_000
+MAX_NUMBER = 2**63
+MAX_DIGITS = 1_000  # of what Python may refuse to read as a number at all
+MAX_SENTENCE = 600
 MENDS = {
     "mapping values are not allowed in this context": 'put quotes around a text that holds ": "',
     "found character that cannot start any token": "put quotes around a text, and indent with spaces",
 }
+TAGS = {
+    "map": "a mapping",
+    "seq": "a list",
+    "str": "a text",
+    "int": "a whole number",
+    "float": "a number",
+    "bool": "true or false",
+    "null": "nothing",
+    "timestamp": "a date",
+}
+TAG = "tag:yaml.org,2002:"
+UNPRINTABLE = re.compile(
+    r"[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
+)  # what YAML 1.1 keeps out of files
 
 
 class BadInput(ValueError):  # noqa: N818 - named for what it says to the user, not for where it is raised
     """Something a user gave cannot be used; its text is one sentence that says where and how to mend it.
 
     Args:
-        sentence: what is wrong and, where it helps, the mend.
+        sentence: what is wrong and, where it helps, the mend; put on one line, and a very long one shortened.
         file: the file it stands in.
         line: the line, counted from 1.
     """
 
     def __init__(self, sentence: str, *, file: Path | str | None = None, line: int | None = None) -> None:
-        self.sentence, self.file, self.line = sentence, file, line
+        self.sentence, self.file, self.line = _brief(" ".join(sentence.splitlines())), file, line
         where = "" if file is None else f"{file}: " if line is None else f"{file}, line {line}: "
-        super().__init__(where + sentence)
+        super().__init__(where + self.sentence)
+
+
+def _brief(text: str, most: int = MAX_SENTENCE) -> str:
+    half = most // 2
+    return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
 
 
 class _Bounded(Loader):  # type: ignore[misc]  # one of two classes, chosen above
-    """A loader that refuses what is nested so deeply that the C stack would not hold it."""
+    """A loader that knows the line of what is nested too deeply for the C stack, or cannot be read."""
 
     depth = 0
 
-    def descend_resolver(self, *where: object) -> None:
+    def descend_resolver(self, parent: yaml.Node | None, index: object) -> None:
         """Called where a node begins."""
         self.depth += 1
         if self.depth > MAX_DEPTH:
-            raise _TooMuchError
-        super().descend_resolver(*where)
+            raise _FaultError(TOO_DEEP, parent)
+        super().descend_resolver(parent, index)
 
     def ascend_resolver(self) -> None:
         """Called where a node ends."""
         self.depth -= 1
         super().ascend_resolver()
 
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - theirs
+        """Called for every node, within the call for what holds it."""
+        try:
+            value = super().construct_object(node, deep)
+        except (ValueError, ArithmeticError, LookupError, AttributeError):
+            if node.tag == TAG + "int" and len(node.value) >= MAX_DIGITS:
+                raise _FaultError(f"{_quoted(node)} {TOO_LARGE}", node) from None
+            what = TAGS[node.tag.removeprefix(TAG)]
+            fault = f"{_quoted(node)} is not {what}; correct it or put quotes around it"
+            raise _FaultError(fault, node) from None
+        if isinstance(value, int) and abs(value) >= MAX_NUMBER:
+            raise _FaultError(f"{_quoted(node)} {TOO_LARGE}", node)
+        return value
 
-class _TooMuchError(Exception):
-    """A file is nested too deeply, or its anchors repeat too much."""
+
+TOO_LARGE = "is too large a number; write a smaller one, or put quotes around a text"
+TOO_DEEP = f"this is nested more than {MAX_DEPTH} deep, or within itself; write it flatter"
+
+
+class _FaultError(Exception):
+    """A fault of a node."""
+
+    def __init__(self, sentence: str, node: yaml.Node | None) -> None:
+        super().__init__(sentence)
+        self.line = None if node is None else node.start_mark.line + 1
+
+
+def _quoted(node: yaml.Node) -> str:
+    return f'"{_brief(node.value, 40)}"' if isinstance(node, yaml.ScalarNode) else "this"
 
 
 class YamlFile:
@@ -75,7 +124,15 @@ class YamlFile:
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
+        self._last = max(1, len(text.splitlines()))
         self._lines: dict[Place, int] = {}
+        if found := UNPRINTABLE.search(text):
+            code = f"U+{ord(found[0]):04X}"
+            raise BadInput(
+                f"the character {code} may not stand in YAML; remove it",
+                file=name,
+                line=text.count("\n", 0, found.start()) + 1,
+            )
         try:
             loader = _Bounded(text)
             node = loader.get_single_node()
@@ -84,12 +141,8 @@ class YamlFile:
             self.data: object = None if node is None else loader.construct_document(node)
         except yaml.YAMLError as error:
             raise self._syntax(error) from None
-        except _TooMuchError:
-            raise BadInput("is nested too deeply, or its anchors repeat too much", file=name) from None
-        except ValueError as error:
-            if isinstance(error, BadInput):
-                raise
-            raise BadInput(f"holds a value that cannot be read ({error})", file=name) from None
+        except _FaultError as error:
+            raise BadInput(str(error), file=name, line=error.line) from None
 
     @classmethod
     def read(cls, path: Path) -> YamlFile:
@@ -146,34 +199,43 @@ class YamlFile:
         sentence = ", ".join(part for part in said if part).replace(", but", " but") or "unreadable"
         if problem in MENDS:
             sentence += "; " + MENDS[problem]
-        return BadInput(
-            f"this is no valid YAML: {sentence}", file=self.name, line=None if mark is None else mark.line + 1
-        )
+        line = None if mark is None else min(mark.line + 1, self._last)  # it may stand behind the end
+        return BadInput(f"this is no valid YAML: {sentence}", file=self.name, line=line)
 
     def _remember(self, node: yaml.Node, place: Place) -> None:
         self._lines[place] = node.start_mark.line + 1
-        if len(place) > MAX_DEPTH or len(self._lines) > MAX_PLACES:
-            raise _TooMuchError
+        if len(place) > MAX_DEPTH:
+            raise _FaultError(TOO_DEEP, node)
+        if len(self._lines) > MAX_PLACES:
+            raise _FaultError(
+                f"up to here there are {MAX_PLACES:,} entries, too many, or anchors repeat them", node
+            )
+        _check_tag(node)
         if isinstance(node, yaml.SequenceNode):
             for index, item in enumerate(node.value):
                 self._remember(item, (*place, index))
         elif isinstance(node, yaml.MappingNode):
             for key, value in node.value:
+                if not isinstance(key, yaml.ScalarNode):
+                    raise _FaultError("this key is no text; write one word or put quotes around it", key)
+                _check_tag(key)
                 inner = (*place, str(key.value))
-                if key.tag == "tag:yaml.org,2002:merge":
-                    raise BadInput(
-                        'merging with "<<" is not supported; write the keys out',
-                        file=self.name,
-                        line=key.start_mark.line + 1,
-                    )
                 if inner in self._lines:
-                    raise BadInput(
-                        f'the key "{key.value}" stands here a second time; keep one of them',
-                        file=self.name,
-                        line=key.start_mark.line + 1,
+                    raise _FaultError(
+                        f'the key "{key.value}" stands here a second time; keep one of them', key
                     )
                 self._remember(value, inner)
                 self._lines[inner] = key.start_mark.line + 1
+
+
+def _check_tag(node: yaml.Node) -> None:
+    tag = node.tag.removeprefix(TAG)
+    if tag == "merge":
+        raise _FaultError('merging with "<<" is not supported; write the keys out', node)
+    if tag == "value":
+        raise _FaultError('"=" alone is no text; put quotes around it', node)
+    if tag not in TAGS:
+        raise _FaultError(f'the tag "{tag}" is not supported; remove it', node)
 
 
 def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
@@ -195,13 +257,27 @@ def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
         raise BadInput("is a folder; name a file", file=path) from None
     except OSError as error:
         raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+    return text_of(data, path, limit=limit)
+
+
+def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
+    """The text that a file's bytes are, with the line ends of any system.
+
+    Args:
+        data: the bytes; of a larger file one more than the limit is enough.
+        name: what error sentences call the file.
+        limit: the largest size in bytes.
+
+    Raises:
+        BadInput: it is larger than the limit, or no UTF-8.
+    """
     if len(data) > limit:
-        raise BadInput(f"is larger than {limit:,} bytes", file=path)
+        raise BadInput(f"is larger than {limit:,} bytes", file=name)
     try:
         return io.StringIO(data.decode(), newline=None).read()
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise BadInput("is no UTF-8 text; save it as UTF-8", file=path, line=line) from None
+        raise BadInput("is no UTF-8 text; save it as UTF-8", file=name, line=line) from None
 
 
 EXPECTED = {
@@ -248,7 +324,7 @@ def _sentence(error: ErrorDetails, name: str) -> str:
     plain = plain[:1].lower() + plain[1:]
     if isinstance(value, Mapping | Sequence) and not isinstance(value, str):
         return f"{name} is not as it should be: {plain}"
-    return f"{name} is {value!r}, but {plain}"
+    return f"{name} is {value if isinstance(value, date) else repr(value)}, but {plain}"
 
 
 def _instead_of(expected: str, value: object) -> str:

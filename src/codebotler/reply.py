@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import keyword
 import re
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -209,28 +211,97 @@ def _choose(blocks: Sequence[_Block]) -> _Block | None:
 def _with_definitions(chosen: _Block, blocks: Sequence[_Block]) -> str:
     """The chosen block with the other blocks that define, at top level, what it lacks."""
     bound = [set() if block.defines_task else bound_names("\n".join(block.lines)) for block in blocks]
-    kept = {next(i for i, block in enumerate(blocks) if block is chosen)}
-    while True:
-        source = "\n\n\n".join(_text(blocks[i].lines).strip("\n") for i in sorted(kept)) + "\n"
-        missing = _missing(source)
-        before = len(kept)
-        for i, names in enumerate(bound):
-            if i not in kept and names & missing:
-                kept.add(i)
-                missing -= names
-        if len(kept) == before:
-            return source
+    definers: defaultdict[str, list[int]] = defaultdict(list)
+    for i, names in enumerate(bound):
+        for name in names:
+            definers[name].append(i)
+    kept: dict[int, str] = {}
+    uses = _Uses()
+    new = [next(i for i, block in enumerate(blocks) if block is chosen)]
+    while new:
+        for i in new:
+            kept[i] = _text(blocks[i].lines).strip("\n")
+            uses.add(i, kept[i], bound[i] or {*definers})
+        missing = uses.missing()
+        new = []
+        for i in sorted({i for name in missing for i in definers[name]}.difference(kept)):
+            if bound[i] & missing:
+                new.append(i)
+                missing -= bound[i]
+    return "\n\n\n".join(kept[i] for i in sorted(kept)) + "\n"
 
 
-def _missing(source: str) -> set[str]:
-    """The names that a program uses and nothing defines; none can be told of one that does not parse."""
+class _Uses:
+    """Which names the blocks of a program lack from each other; each block is read only when it is added."""
+
+    def __init__(self) -> None:
+        self.given: dict[str, int] = {}
+        """The first block that defines a name, or all names where it is `*`."""
+        self.lacking: defaultdict[str, list[tuple[int, bool, bool]]] = defaultdict(list)
+        """The blocks that lack a name, and whether even a definition in front or behind is no help."""
+        self.changed: set[str] = set()
+
+    def add(self, at: int, source: str, names: set[str]) -> None:
+        """Read one more block.
+
+        Args:
+            at: its place among all blocks.
+            source: its text.
+            names: what it may define.
+        """
+        everywhere = _declared_global(source)
+        asked = sorted(names | everywhere)
+        end = source.count("\n") + 1
+        found = _undefined("\n".join([source, *asked]))
+        alone = {name for line, name in found if line <= end}
+        for name in {*asked, *_starred(source)}.difference(name for line, name in found if line > end):
+            place = -1 if name in everywhere else at
+            self.given[name] = min(place, self.given.get(name, place))
+        if alone:
+            definitions = "".join(f"{name} = 0\n" for name in sorted(alone))
+            in_front = {name for _, name in _undefined(definitions + source)}
+            behind = {name for _, name in _undefined(f"{source}\n{definitions}")}
+            for name in alone:
+                self.lacking[name].append((at, name in in_front, name in behind))
+        self.changed |= names | alone
+
+    def missing(self) -> set[str]:
+        """What is lacking of the names that blocks added since the last time lack or define."""
+        changed, self.changed = self.changed, set()
+        return {name for name in changed if any(self.lacks(name, *one) for one in self.lacking[name])}
+
+    def lacks(self, name: str, at: int, in_front: bool, behind: bool) -> bool:  # noqa: FBT001 - a record
+        """Whether a block lacks a name among all blocks added so far."""
+        given = [self.given[one] for one in (name, "*") if one in self.given]
+        if not given:
+            return True
+        return in_front if min(given) < at else behind
+
+
+def _declared_global(source: str) -> set[str]:
+    """The names that functions share with the module, which are then taken to be defined everywhere."""
+    return {name for node in _nodes(source) if isinstance(node, ast.Global) for name in node.names}
+
+
+def _starred(source: str) -> set[str]:
+    """`*` for a source that imports all names of a module, whichever they are."""
+    return {"*" for node in _nodes(source) if isinstance(node, ast.ImportFrom) and node.names[0].name == "*"}
+
+
+def _nodes(source: str) -> Iterator[ast.AST]:
+    tree = parsed(source)
+    return iter(()) if isinstance(tree, Problem) else ast.walk(tree)
+
+
+def _undefined(source: str) -> list[tuple[int, str]]:
+    """Where a program uses names that nothing defines; none can be told of one that does not parse."""
     tree = parsed(source)
     if isinstance(tree, Problem):
-        return set()
+        return []
     try:
-        return {name for _, name, _ in undefined_names(tree, SKILLS)}
+        return [(line, name) for line, name, _ in undefined_names(tree, SKILLS)]
     except (RecursionError, MemoryError):
-        return set()
+        return []
 
 
 def _text(lines: Sequence[str]) -> str:

@@ -122,7 +122,7 @@ def laid_out(world: World) -> World:
 
 Text = Annotated[str, StringConstraints(strict=True)]
 Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
-Metres = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Metres = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
 Corner: TypeAlias = tuple[Metres, Metres]
 
 

@@ -95,7 +95,9 @@ def suite_data(suite: Suite) -> dict[str, Any]:
 
 
 def new_task(folder: Path, name: str) -> Path:
-    """Start a task in a suite's folder, and the suite if there is none; the file says what to fill in.
+    """Start a task in a suite's folder, and the suite if there is none; the files say what to fill in.
+
+    Programs for the linter come with it, unless some are recorded for a task of this name already.
 
     Args:
         folder: of the suite.
@@ -113,6 +115,8 @@ def new_task(folder: Path, name: str) -> Path:
         if not (folder / "suite.yaml").exists():
             suite = re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower()).lstrip("-0123456789") or "mine"
             write_whole(folder / "suite.yaml", f"name: {suite}\nversion: 1\nabout: my tasks\n".encode())
+        if not [*folder.glob(f"recorded/*/{name}.yaml")]:
+            write_whole(folder / "recorded" / "mine" / f"{name}.yaml", PROGRAMS.encode())
         write_whole(path, TEMPLATE.replace("NAME", name).encode())
     except OSError as error:
         raise BadInput(f"cannot be written ({error.strerror})", file=error.filename) from None
@@ -150,8 +154,7 @@ worlds:
     rooms: [kitchen, start_loc]
     people:
       kitchen: [{name: kim, answers: ["yes"]}]
-    require:
-      - visits("kitchen")
+    require:              # that the kitchen is visited follows from this, so it is not required once more
       - announces_tea
   - about: nobody is in the kitchen
     robot: start_loc
@@ -159,4 +162,29 @@ worlds:
     require:
       - visits("kitchen")
       - not announces_tea
+"""
+
+PROGRAMS = """\
+# Right and wrong programs for the linter: `roboeval tasks --lint` says which requirement no wrong one trips.
+- instruction: >-         # exactly the text of a prompt
+    Go to the kitchen. If somebody is there, say "tea is ready".
+  replies:
+    - about: looks first
+      fails: null         # a right one
+      program: |
+        def task_program():
+            go_to("kitchen")
+            if is_in_room("person"):
+                say("tea is ready")
+    - about: says it whether or not somebody is there
+      fails: SayAtLocation
+      program: |
+        def task_program():
+            go_to("kitchen")
+            say("tea is ready")
+    - about: only says it where it starts
+      fails: SayAtLocation
+      program: |
+        def task_program():
+            say("tea is ready")
 """

@@ -6,23 +6,28 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import typer
 
+from codebotler import __version__
+from codebotler.cli import STOPPED, obey
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from roboeval.records import Completion
+    from roboeval.evaluation import Evaluation, Scope
+    from roboeval.records import Key
     from roboeval.suite import Suite
 
 Item = TypeVar("Item")
 
+QUIET_S = 2.0  # for so long does a command say nothing at first; lines of a long one come more seldom
+
 app = typer.Typer(
-    help="How good are language models at writing programs for service robots?",
     rich_markup_mode=None,
     add_completion=False,
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
 
@@ -30,6 +35,19 @@ SuiteOption = Annotated[str, typer.Option(help="A suite that ships with the pack
 TasksOption = Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common sense only.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+@app.callback(invoke_without_command=True)
+def roboeval(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """How good are language models at writing programs for service robots?"""
+    if version:
+        print(f"roboeval {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 @app.command()
@@ -54,45 +72,53 @@ def evaluate(
 ) -> None:
     """Say of every completion whether it does what was asked."""
     from roboeval.evaluate import evaluate as judge_all
+    from roboeval.evaluation import Scope
     from roboeval.run import Run, evaluate_run, open_source, tasks_to_judge
 
-    refuse_what_comes_later(suite, worlds, engine)
+    refuse_what_comes_later(worlds, engine)
     judged_by = load(suite)
     wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
     if left:
         note(f"without ablation, and so not judged: {', '.join(left)}")
-    opened = open_source(source, judged_by)
-    total = sum(1 for _ in opened.checked(judged_by, wanted))
-    if total == 0:
-        fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
-    run = opened.run
-    if out is not None and (run is None or out.resolve() != run.path.resolve()):
-        run = Run(out)
-        with run.writing():
-            run.keep(opened, judged_by)
-    if run is None:
-        completions = opened.checked(judged_by, wanted)
-        rows: Iterator[dict[str, Any]] = judge_all(
-            completions,
-            judged_by,
-            ablated=ablation,
-            workers=workers or cores(),
-            require_isolation=require_isolation,
+    tally = Tally()
+    run = None if out is None else Run(out)
+    try:
+        opened = open_source(source, judged_by)
+        run = run or opened.run
+        scope = Scope.of(watched(opened.read(), "reading"), wanted)
+        if scope.total == 0:
+            fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
+        if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
+            run.keep(opened)
+        at_once = workers or cores()
+        rows = (
+            judge_all(
+                opened.of(wanted),
+                judged_by,
+                ablated=ablation,
+                workers=at_once,
+                require_isolation=require_isolation,
+            )
+            if run is None
+            else evaluate_run(
+                run,
+                judged_by,
+                ablated=ablation,
+                tasks=wanted,
+                redo=redo,
+                workers=at_once,
+                require_isolation=require_isolation,
+            )
         )
-    else:
-        rows = evaluate_run(
-            run,
-            judged_by,
-            ablated=ablation,
-            tasks=wanted,
-            redo=redo,
-            workers=workers or cores(),
-            require_isolation=require_isolation,
-        )
-    title = f"{source} (programs written by hand)" if source.startswith("recorded") else source
-    print_summary(watched(rows, total), judged_by, title=title, ablated=ablation, as_json=json)
+        counted = watched(tally.of(rows), "judging", scope.total)
+        print_summary(counted, judged_by, scope, title=source, ablated=ablation, as_json=json)
+    except KeyboardInterrupt:
+        note(f"roboeval: {tally.after_a_stop(is_kept=run is not None, redo=redo)}")
+        raise SystemExit(STOPPED) from None
     if run is not None:
-        note(f"verdicts are in {run.path}; `roboeval show {run.path} TASK/PROMPT/INDEX` says why one fails")
+        again = command("show", run.path, *tally.first_failed, suite=suite, ablated=ablation)
+        does = "says why that one fails" if tally.first_failed else "prints these tables again"
+        note(f"verdicts are in {run.path}; `{again}` {does}")
 
 
 @app.command()
@@ -110,14 +136,31 @@ def show(
 
     judged_by = load(suite)
     selection = parse_selection(what, judged_by)
-    rows, completions = read_evaluation(run, judged_by, ablated=ablation)
+    evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
-        print_summary(rows, judged_by, title=str(run), ablated=ablation, as_json=json, k=ks)
-    elif json:
-        print_json(view_data(selection, rows, completions, judged_by, ablated=ablation))
+        rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
+        print_summary(
+            rows,
+            judged_by,
+            evaluation.scope,
+            title=str(run),
+            ablated=ablation,
+            as_json=json,
+            k=ks,
+            stale=evaluation.stale,
+        )
     else:
-        print_rich(view(selection, rows, completions, judged_by, ablated=ablation))
+        selected = selection.rows(watched(evaluation.rows(), "reading", evaluation.scope.total))
+        if json:
+            print_json(view_data(selection, selected, evaluation.judged(), judged_by, ablated=ablation))
+        else:
+            print_rich(view(selection, selected, evaluation.judged(), judged_by, ablated=ablation))
+    again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite, ablated=ablation)
+    if (complaint := evaluation.complaint()) is not None:
+        note(f"{complaint}; `{again} --redo` judges what stands there")
+    if (unfinished := evaluation.unfinished()) is not None:
+        note(f"{unfinished}; `{again}` goes on")
 
 
 @app.command()
@@ -158,14 +201,20 @@ def export(
     ablation: AblationOption = False,
 ) -> None:
     """Write a run's verdicts as one flat table."""
+    from codebotler.badinput import BadInput
     from roboeval.export import table, write
     from roboeval.run import Run, evaluation_key
 
     judged_by = load(suite)
-    rows, completions = read_evaluation(run, judged_by, ablated=ablation)
-    key = evaluation_key(judged_by, ablated=ablation)
-    path = out or Run(run).rows(key).with_suffix(f".{format}")
-    write(table(rows, completions), path, format)
+    evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
+    frame = table(watched(evaluation.rows(), "reading", evaluation.scope.total), evaluation.judged())
+    again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite, ablated=ablation)
+    if (complaint := evaluation.complaint()) is not None:
+        raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
+    if (unfinished := evaluation.unfinished()) is not None:
+        note(f"{unfinished}, and only these are in the table; `{again}` goes on")
+    path = out or Run(run).rows(evaluation_key(judged_by, ablated=ablation)).with_suffix(f".{format}")
+    write(frame, path, format)
     note(f"the table is in {path}")
 
 
@@ -179,67 +228,110 @@ def import_(
     from roboeval.run import Run, open_source
 
     known = load(suite)
-    source = open_source(path, known)
-    run = Run(out)
-    with run.writing():
-        run.keep(source, known)
-    note(f"{sum(1 for _ in source.read()):,} completions are in {out}; `roboeval evaluate {out}` judges them")
+    count = Run(out).keep(open_source(path, known))
+    again = command("evaluate", out, suite=suite)
+    note(f"{count:,} completions are in {out}; `{again}` judges them")
 
 
-def refuse_what_comes_later(suite: str, worlds: int | None, engine: str) -> None:
-    """End with a sentence about options that are promised and not there yet."""
+def refuse_what_comes_later(worlds: int | None, engine: str) -> None:
+    """End with a sentence about options that are promised and not there yet, or never were."""
+    if engine not in {"local", "ray"}:
+        fail(f'there is no engine "{engine}"; there is local, and ray is not there yet')
     if worlds is not None or engine != "local":
         asked = f"--engine {engine}" if worlds is None else "--worlds"
         fail(f"{asked} is not there yet; leave it out to judge in the suite's own worlds, on this machine")
-    if suite == "plus" and not Path(suite).exists():
-        fail('the suite "plus" is not there yet; leave --suite out to judge by the suite of the paper')
 
 
 def load(suite: str) -> Suite:
     """Read a suite by name or folder."""
     from roboeval.suite import load_suite
 
+    if suite == "plus" and not Path(suite).exists():
+        fail('the suite "plus" is not there yet; leave --suite out to judge by the suite of the paper')
     return load_suite(suite)
 
 
-def read_evaluation(
-    run: Path, suite: Suite, *, ablated: bool
-) -> tuple[list[dict[str, Any]], list[Completion]]:
-    """A run's rows and the completions they judge."""
+def command(verb: str, *arguments: object, suite: str, ablated: bool = False) -> str:
+    """A command for the user to paste."""
+    import shlex
+
+    words = ["roboeval", verb, *map(str, arguments)]
+    words += [] if suite == "paper" else ["--suite", suite]
+    return shlex.join([*words, "--ablation"] if ablated else words)
+
+
+def options_of(evaluation: Evaluation, suite: Suite) -> list[str]:
+    """What else a command needs to go on with an evaluation."""
+    from roboeval.run import tasks_to_judge
+
+    tasks = evaluation.scope.tasks
+    if tasks in {None, tasks_to_judge(suite, None, ablated=bool(evaluation.head.get("ablation")))[0]}:
+        return []
+    return ["--tasks", ",".join(sorted(tasks or ()))]
+
+
+def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) -> Evaluation:
+    """An evaluation that a user names."""
     from codebotler.badinput import BadInput
-    from roboeval.records import read_completions, read_evaluations
-    from roboeval.run import Run, evaluation_key, load_head
+    from roboeval.evaluation import Evaluation
+    from roboeval.run import Run, evaluation_key
 
     folder, key = Run(run), evaluation_key(suite, ablated=ablated)
     if not folder.completions.is_file():
         raise BadInput("is no run: it holds no completions.jsonl", file=run)
     if not folder.rows(key).is_file():
-        flag = " --ablation" if ablated else ""
-        raise BadInput(f"has not been judged; `roboeval evaluate {run}{flag}` does it", file=run)
-    if load_head(folder.head(key)).get("digest") != suite.digest:
+        again = command("evaluate", run, suite=suite_name, ablated=ablated)
+        raise BadInput(f"has not been judged; `{again}` does it", file=run)
+    evaluation = Evaluation(folder, key)
+    if evaluation.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
-    return [row for _, row in read_evaluations(folder.rows(key))], list(
-        read_completions(folder.completions, growing=True)
-    )
+    return evaluation
+
+
+class Tally:
+    """Passes rows on, and remembers what there is to say at the end."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first_failed: tuple[str, ...] = ()
+
+    def of(self, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """Pass rows on."""
+        for row in rows:
+            self.count += 1
+            if not row["passed"] and not self.first_failed:
+                self.first_failed = (f"{row['task']}/{row['prompt']}/{row['index']}",)
+            yield row
+
+    def after_a_stop(self, *, is_kept: bool, redo: bool) -> str:
+        """What Ctrl-C left behind, and how to go on."""
+        if not is_kept:
+            return "stopped; nothing is kept (with --out RUN, what was judged would be)"
+        if self.count == 0:
+            return "stopped before judging; give the same command again"
+        return f"stopped; the same command {'without --redo ' * redo}goes on where it was"
 
 
 def print_summary(
     rows: Iterable[dict[str, Any]],
     suite: Suite,
+    scope: Scope,
     *,
     title: str,
     ablated: bool,
     as_json: bool,
     k: Sequence[int] = (1,),
+    stale: Iterable[Key] = (),
 ) -> None:
     """Print the tables of an evaluation."""
-    from roboeval.tables import render, summary, summary_data
+    from roboeval.records import name_of
+    from roboeval.summary import render, summary, summary_data
 
-    counted = summary(rows, suite, k=k)
+    counted = summary(rows, suite, k=k, scope=scope, ablated=ablated)
     if as_json:
-        print_json(summary_data(counted))
+        print_json({**summary_data(counted), "stale": list(map(name_of, stale))})
     else:
-        print_rich(render(counted, title=title, ablated=ablated))
+        print_rich(render(counted, title=title))
 
 
 def lint_tasks(suite: Suite, task: str | None) -> None:
@@ -248,7 +340,7 @@ def lint_tasks(suite: Suite, task: str | None) -> None:
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     linted = (lint(one, suite) for one in wanted)
-    findings = [found for several in watched(linted, len(wanted), "linting") for found in several]
+    findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
     print(render(findings))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)
@@ -274,20 +366,24 @@ def print_json(data: object) -> None:
     print(json.dumps(data, indent=2))
 
 
-def watched(rows: Iterable[Item], total: int, doing: str = "judging") -> Iterator[Item]:
+def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:
     """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    of_all = "" if total is None else f" of {total:,}"
+    started = monotonic()
+    next_line = started + QUIET_S
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         job = progress.add_task(doing, total=total)
-        for done, row in enumerate(rows, 1):
+        for done, item in enumerate(items, 1):
             progress.update(job, completed=done)
-            if not console.is_terminal and done % 1000 == 0:
-                note(f"{doing}: {done:,} of {total:,}")
-            yield row
+            if not console.is_terminal and monotonic() >= next_line:
+                note(f"{doing}: {done:,}{of_all}")
+                next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
+            yield item
 
 
 def cores() -> int:
@@ -307,22 +403,8 @@ def fail(sentence: str) -> NoReturn:
 
 
 def main() -> None:
-    """Run the command line; what a user can cause ends in one sentence and status 2."""
-    try:
-        app()
-    except KeyboardInterrupt:
-        note("roboeval: stopped; the same command goes on where it was")
-        raise SystemExit(130) from None
-    except Exception as error:
-        from codebotler.badinput import BadInput
-        from codebotler.simulator.engine import EngineError
-
-        if isinstance(error, BadInput):
-            fail(str(error))
-        if isinstance(error, EngineError):
-            note(f"roboeval: {error}")
-            raise SystemExit(1) from None
-        raise
+    """Run the command line."""
+    obey(app, "roboeval")
 
 
 if __name__ == "__main__":

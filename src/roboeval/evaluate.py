@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import platform
+from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 from codebotler import __version__
 from codebotler.rtl import CannotJudge, holds
-from codebotler.simulator.engine import Lanes, simulate
+from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
@@ -63,33 +64,35 @@ def evaluate(
         EngineError: no isolated process can be started.
     """
 
-    def run_all(work: tuple[str, str]) -> list[Verdict]:
+    def judged(work: tuple[str, str]) -> dict[str, Any]:
         task, program = work
         scenarios = suite.tasks[task].judged_in(ablated=ablated)
-        return [judge(run(program, scenario.world), scenario) for scenario in scenarios]
+        return judgement([judge(run(program, scenario.world), scenario) for scenario in scenarios])
 
     def run(program: str, world: World) -> Outcome:
-        return simulate(lanes.here(), program, lambda: SimulatedRobot(world, suite.rules))
+        return lanes.here().run(program, lambda: SimulatedRobot(world, suite.rules))
 
-    rows: list[Completion] = []
+    waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
         for completion in completions:
-            rows.append(completion)
+            waiting.append(completion)
             yield completion.task, completion.program
 
     with Lanes(workers, require_isolation=require_isolation) as lanes:
-        for verdicts in lanes.map_distinct(run_all, works()):
-            yield evaluation(rows.pop(0), verdicts)
+        for told in lanes.map_distinct(judged, works(), name=lambda work: digest(*work)):
+            yield evaluation(waiting.popleft(), told)
 
 
-def evaluation(completion: Completion, verdicts: list[Verdict]) -> dict[str, Any]:
-    """The row of an evaluation."""
+def evaluation(completion: Completion, told: dict[str, Any]) -> dict[str, Any]:
+    """The row of an evaluation: which completion, and what is said of its program."""
+    return {"task": completion.task, "prompt": completion.prompt, "index": completion.index, **told}
+
+
+def judgement(verdicts: list[Verdict]) -> dict[str, Any]:
+    """What the row of an evaluation says of a program."""
     why = failure(verdicts)
     return {
-        "task": completion.task,
-        "prompt": completion.prompt,
-        "index": completion.index,
         "passed": why is None,
         "failure": None if why is None else why.data(),
         "verdicts": [verdict_data(verdict) for verdict in verdicts],

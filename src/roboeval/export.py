@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
 from codebotler.badinput import BadInput
-from roboeval.records import Completion
+from roboeval.records import Completion, Key
+from roboeval.run import write_whole
 
 FORMATS = ("csv", "parquet")
+CHUNK = 10_000  # rows of the table that are held as Python objects at one time
 
 COLUMNS: Mapping[str, type[pl.DataType]] = {
     "task": pl.String,
@@ -46,16 +48,18 @@ def table(rows: Iterable[Mapping[str, Any]], completions: Iterable[Completion]) 
         rows: of the evaluation.
         completions: that were judged; model and program are empty for a row whose completion is not there.
     """
-    written = {completion.key: completion for completion in completions}
-    records = [
-        record
-        for row in rows
-        for record in _records(row, written.get((row["task"], row["prompt"], row["index"])))
-    ]
-    return pl.DataFrame(records, schema=dict(COLUMNS), orient="row")
+    written = {completion.key: (completion.model, completion.program_sha256) for completion in completions}
+    records = (record for row in rows for record in _records(row, written))
+    frame = pl.DataFrame(schema=dict(COLUMNS))
+    while chunk := list(islice(records, CHUNK)):
+        frame.vstack(pl.DataFrame(chunk, schema=dict(COLUMNS), orient="row"), in_place=True)
+    return frame.rechunk()
 
 
-def _records(row: Mapping[str, Any], completion: Completion | None) -> Iterator[tuple[Any, ...]]:
+def _records(
+    row: Mapping[str, Any], written: Mapping[Key, tuple[str | None, str]]
+) -> Iterator[tuple[Any, ...]]:
+    model, program = written.get((row["task"], row["prompt"], row["index"]), (None, None))
     failure = row["failure"] or {"class": None, "kind": None}
     for number, verdict in enumerate(row["verdicts"]):
         error = verdict["error"] or {"kind": None, "message": None}
@@ -63,8 +67,8 @@ def _records(row: Mapping[str, Any], completion: Completion | None) -> Iterator[
             _storable(row["task"]),
             row["prompt"],
             row["index"],
-            _storable(None if completion is None else completion.model),
-            None if completion is None else _sha256(completion.program),
+            _storable(model),
+            program,
             row["passed"],
             failure["class"],
             _storable(failure["kind"]),
@@ -85,10 +89,6 @@ def _storable(text: str | None) -> str | None:
     return None if text is None else text.encode(errors="backslashreplace").decode()
 
 
-def _sha256(program: str) -> str:
-    return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()
-
-
 def write(frame: pl.DataFrame, path: Path, kind: str) -> None:
     """Write a table to a file; the same table gives the same bytes.
 
@@ -97,23 +97,26 @@ def write(frame: pl.DataFrame, path: Path, kind: str) -> None:
 
     Args:
         frame: the table.
-        path: the file; replaced if it is there.
+        path: the file; replaced if it is there, once all is written.
         kind: csv or parquet.
 
     Raises:
-        BadInput: there is no such format, or the file cannot be written.
+        BadInput: there is no such format or folder.
+        OSError: the file cannot be written; then what stood there stays.
     """
     if kind not in FORMATS:
         raise BadInput(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
+    if not path.parent.is_dir():
+        raise BadInput("there is no such folder", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
         _harmless(frame).write_csv(content)
     else:
         frame.write_parquet(content)
-    try:
-        path.write_bytes(content.getvalue())
-    except OSError as error:
-        raise BadInput(f"cannot be written ({error.strerror})", file=path) from None
+    if path.exists() and not path.is_file():  # such as /dev/stdout, which nothing may take the place of
+        path.write_bytes(content.getbuffer())
+    else:
+        write_whole(path.resolve() if path.is_symlink() else path, content.getbuffer())
 
 
 def _harmless(frame: pl.DataFrame) -> pl.DataFrame:

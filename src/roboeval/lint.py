@@ -7,8 +7,6 @@ then with any. Only a text unlike all samples, or an option that is no text, cou
 
 from __future__ import annotations
 
-import ast
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,10 +21,11 @@ from codebotler.rtl.wording import listed
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import resolve_room
 from roboeval.evaluate import judge
+from roboeval.names import absent_names
 from roboeval.satisfiability import Reasoner, Undecided, elements
 from roboeval.suite import Requirement, Scenario, Suite, Task
 from roboeval.taxonomy import Verdict
-from roboeval.witnesses import alternatives, can_match, is_among, patterns, representative_texts, samples
+from roboeval.witnesses import can_match, representative_texts, samples
 
 Kind = Literal[
     "unsatisfiable",
@@ -106,7 +105,7 @@ def lint(task: Task, suite: Suite, *, verdicts: Sequence[Verdicts] | None = None
     """
     if verdicts is None:
         verdicts = judged([task], suite)[task.name]
-    places = [_Place(task, *numbered) for numbered in _scenarios(task)]
+    places = [_Place(task, where, scenario) for where, scenario in _scenarios(task)]
     found = [
         *_unused(task),
         *_untripped(task, verdicts),
@@ -220,13 +219,35 @@ def _side(requirement: Requirement) -> str:
 
 
 def _same_worlds(task: Task) -> Iterator[Finding]:
-    for (one, first), (other, second) in combinations(enumerate(task.scenarios, 1), 2):
-        if {r.formula for r in first.require} == {r.formula for r in second.require}:
-            message = (
-                f'world {other} ("{second.world.about}") requires the same as '
-                f'world {one} ("{first.world.about}")'
-            )
-            yield Finding("same-worlds", f"{one} and {other}", message, task.path, second.require[0].line)
+    for ablated in (False, True):
+        worlds = enumerate(task.judged_in(ablated=ablated), 1)
+        for (one, first), (other, second) in combinations(worlds, 2):
+            if _require_the_same(first, second):
+                where = "the ablation of world" if ablated else "world"
+                message = (
+                    f'{where} {other} ("{second.world.about}") requires the same as '
+                    f'{where} {one} ("{first.world.about}")'
+                )
+                subject = f"{'ablation ' if ablated else ''}{one} and {other}"
+                line = second.require[0].line if second.require else 1
+                yield Finding("same-worlds", subject, message, task.path, line)
+
+
+def _require_the_same(one: Scenario, other: Scenario) -> bool:
+    """Whether no sequence of events satisfies one and not the other; they may be written differently."""
+    first, second = ({r.formula: None for r in scenario.require} for scenario in (one, other))
+    if first.keys() == second.keys():
+        return True
+    reasoner = Reasoner([*first, *second])
+    try:
+        return all(
+            reasoner.trace([*held], denied) is None
+            for held, others in ((first, second), (second, first))
+            for denied in others
+            if denied not in held
+        )
+    except Undecided:
+        return False
 
 
 # --- one world
@@ -277,9 +298,12 @@ class _Place:
             yield self.undecided(subject, f'whether "{subject}" is implied in {self.where}', line)
             return
         if clash is not None:
-            reasons = listed([f'"{r.text}"' for r in others if r.formula in clash[0]])
-            holds = f"follows from {reasons}" if reasons else "holds whatever the robot does"
-            message = f'"{subject}" {holds} in {self.where}{clash[1]}, so it is never the only one to fail'
+            reasons = [f'"{r.text}"' for r in others if r.formula in clash[0]]
+            unless = f" without breaking {'one of ' * (len(reasons) > 1)}{listed(reasons)}" if reasons else ""
+            message = (
+                f'no sequence of the texts that were tried breaks "{subject}" in {self.where}{unless}'
+                f"{clash[1]}; it may never be the only one to fail"
+            )
             yield self.finding("implied", subject, message, line)
 
     def undecided(self, subject: str, what: str, line: int | None) -> Finding:
@@ -335,31 +359,9 @@ class _Place:
         return any(text.matches(one) and resolve_room(self.rooms, one) for one in others)
 
     def absent(self, requirement: Requirement) -> Iterator[Finding]:
-        for what, name, known in self.named(requirement):
-            if not is_among(name, known):
-                message = f'"{requirement.text}" is about the {what} "{name}", but {self.where} has none'
-                yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
-
-    def named(self, requirement: Requirement) -> Iterator[tuple[str, str, Sequence[str]]]:
-        """What a requirement names, of what sort it is, and what of this sort the world has."""
-        rooms = self.scenario.world.rooms
-        objects = [label for room in rooms for label in room.objects]
-        people = [person.name for room in rooms for person in room.people]
-        sorts: dict[str, tuple[str, list[str]]] = {
-            "goto": ("room", self.rooms),
-            "pick": ("object", objects),
-            "place": ("object", objects),
-            "check": ("object or person", [*objects, *people, *_PEOPLE]),
-        }
-        for element in elements(requirement.formula):
-            if element.kind in sorts:
-                what, known = sorts[element.kind]
-                found = (one for pattern in patterns(element.text) for one in alternatives(pattern))
-                yield from ((what, one, known) for one in found)
-        check = next(check for check in self.task.checks if check.name == requirement.check)
-        for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
-            if parameter == "person" or argument.lower() in _people(self.task):
-                yield "person", argument, people
+        for what, name in absent_names(requirement, self.scenario, self.task):
+            message = f'"{requirement.text}" is about the {what} "{name}", but {self.where} has none'
+            yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
 
 
 def _texts(element: Element) -> list[Text]:
@@ -367,23 +369,6 @@ def _texts(element: Element) -> list[Text]:
 
 
 _PLAIN = ", as long as each visit names one room of the world"
-_PEOPLE = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
-
-
-def _people(task: Task) -> set[str]:
-    """Who is in some world of a task, or has an office or a lab there; their names in small letters."""
-    rooms = [room for _, scenario in _scenarios(task) for room in scenario.world.rooms]
-    owners = [re.fullmatch(r"(.+)'s (?:office|lab)", room.name, re.IGNORECASE) for room in rooms]
-    names = [*(person.name for room in rooms for person in room.people), *(o[1] for o in owners if o)]
-    return {name.lower() for name in names}
-
-
-def _arguments(requirement: Requirement) -> list[str]:
-    call = ast.parse(requirement.text.strip().removeprefix("not "), mode="eval").body
-    values = call.args if isinstance(call, ast.Call) else []
-    return [str(value.value) for value in values if isinstance(value, ast.Constant)]
-
-
 # --- accepted findings
 
 

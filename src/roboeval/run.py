@@ -6,23 +6,28 @@ import contextlib
 import fcntl
 import json
 import os
+import shutil
+import tempfile
+import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from codebotler import __version__
 from codebotler.badinput import BadInput, read_text
 from roboeval.evaluate import evaluate, head
+from roboeval.published import published_completions
 from roboeval.records import (
     COMPLETIONS,
+    HASH_LINE,
     Appender,
     Completion,
-    check_known,
+    length_before,
     name_of,
-    published_completions,
     read_completions,
-    read_evaluations,
+    read_judged,
     recorded_completions,
     to_line,
 )
@@ -34,49 +39,57 @@ class Source:
     """Where completions come from.
 
     Args:
-        name: how sentences call it.
-        read: reads them from the start, each time it is called.
+        read: reads them from the start, each time it is called; each is one that the suite knows.
         run: the run folder they stand in, if they do.
     """
 
-    name: str
     read: Callable[[], Iterator[Completion]]
     run: Run | None = None
 
-    def checked(self, suite: Suite, tasks: frozenset[str] | None = None) -> Iterator[Completion]:
-        """Read them again, those of some tasks or all; each is one that the suite knows.
+    def of(self, tasks: frozenset[str] | None) -> Iterator[Completion]:
+        """Read them again, those of some tasks or all.
 
         Raises:
-            BadInput: one is not.
+            BadInput: one is wrong, or of a task or prompt that the suite does not know.
         """
-        for completion in check_known(self.read(), suite, self.name):
-            if tasks is None or completion.task in tasks:
-                yield completion
+        return (completion for completion in self.read() if tasks is None or completion.task in tasks)
 
 
 def open_source(text: str, suite: Suite) -> Source:
     """Find out what completions a person means.
 
     Args:
-        text: a run folder, a .jsonl file, a folder or zip of published .py files, or `recorded:NAME`.
-        suite: whose instructions a recorded model answers.
+        text: a run folder, a .jsonl file or a pipe, a folder or zip of published .py files, or
+            `recorded:NAME`.
+        suite: whose tasks and prompts they are of.
 
     Raises:
         BadInput: there is no such thing.
     """
     path = Path(text)
     if text.partition(":")[0] == "recorded" and not path.exists():
-        return Source(text, lambda: recorded_completions(text, suite))
+        return Source(lambda: recorded_completions(text, suite))
     if not path.exists():
         raise BadInput(
             "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
         )
     if (path / COMPLETIONS).is_file():
-        run = Run(path)
-        return Source(text, lambda: read_completions(run.completions, growing=True), run)
+        return Run(path).source(suite)
     if path.is_dir() or path.suffix == ".zip":
-        return Source(text, lambda: published_completions(path))
-    return Source(text, lambda: read_completions(path))
+        return Source(lambda: published_completions(path, suite))
+    lines = path if path.is_file() else _spooled(path)
+    return Source(lambda: read_completions(lines, suite, name=path))
+
+
+def _spooled(path: Path) -> Path:
+    """A file with what a pipe says, since that is read more than once; it is gone when this process ends."""
+    with path.open("rb") as pipe, tempfile.TemporaryFile() as file:
+        try:
+            shutil.copyfileobj(pipe, file)
+            file.flush()
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
+        return Path(f"/proc/self/fd/{os.dup(file.fileno())}")
 
 
 @dataclass(frozen=True)
@@ -98,9 +111,17 @@ class Run:
         """The file of an evaluation's rows; `key` is the suite's name, with -ablation where ablated."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
+    def programs(self, key: str) -> Path:
+        """The file that says, line by line, the hash of the program that each row judges."""
+        return self.path / "evaluations" / f"{key}.sha256"
+
     def head(self, key: str) -> Path:
         """The file that says by what the rows of an evaluation were judged."""
         return self.path / "evaluations" / f"{key}.json"
+
+    def source(self, suite: Suite | None = None) -> Source:
+        """Its completions; with a suite, all must be of tasks and prompts of it."""
+        return Source(lambda: read_completions(self.completions, suite, growing=True), self)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
@@ -109,38 +130,87 @@ class Run:
         Raises:
             BadInput: one is writing it, or the folder cannot be written.
         """
+        made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
+        lock = self.path / ".lock"
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(self.path / ".lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise BadInput(f"cannot be written ({error.strerror})", file=self.path) from None
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        if not _locked(descriptor):
             os.close(descriptor)
-            raise BadInput(
-                "another process is writing this run; wait until it has ended", file=self.path
-            ) from None
+            raise BadInput("another process is writing this run; wait until it has ended", file=self.path)
         try:
             yield
+        except BaseException:
+            if made and list(self.path.iterdir()) == [lock]:
+                lock.unlink()
+                _remove_empty(made)
+            raise
         finally:
             os.close(descriptor)
 
-    def keep(self, source: Source, suite: Suite) -> None:
+    def keep(self, source: Source) -> int:
         """Make this the run of a source's completions: copy them, unless they are here already.
+
+        Returns:
+            how many they are.
 
         Raises:
             BadInput: one of them is wrong, or other completions are here; then nothing is changed.
+            OSError: they cannot be written; then nothing is changed either.
         """
-        lines = b"".join(to_line(c.model_dump(exclude_unset=True)) for c in source.checked(suite))
-        if self.completions.exists():
-            if self.completions.read_bytes() != lines:
+        models: set[str | None] = set()
+        count = 0
+        for completion in source.read():
+            models.add(completion.model)
+            count += 1
+        with self.writing():
+            if self.completions.exists():
+                self._expect(source)
+                return count
+            about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
+            run_json = self.path / "run.json"
+            write_whole(run_json, to_text(about))
+            try:
+                with written_whole(self.completions) as file:
+                    file.writelines(map(_line, source.read()))
+            except BaseException:
+                run_json.unlink()
+                raise
+        return count
+
+    def _expect(self, source: Source) -> None:
+        with self.completions.open("rb") as file:
+            same = all(file.read(len(line)) == line for line in map(_line, source.read()))
+            if not same or file.read(1):
                 raise BadInput("this run holds other completions; name another folder", file=self.path)
-            return
-        models = {c.model for c in source.read()}
-        about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
-        write_whole(self.path / "run.json", to_text(about))
-        write_whole(self.completions, lines)
+
+
+PATIENCE = 20  # times that a lock is tried
+PAUSE = 0.05  # seconds between two
+
+
+def _locked(descriptor: int) -> bool:
+    """Lock a file; what a killed process was just starting may hold it for a moment longer."""
+    for _ in range(PATIENCE):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            time.sleep(PAUSE)
+        else:
+            return True
+    return False
+
+
+def _line(completion: Completion) -> bytes:
+    return to_line(completion.model_dump(exclude_unset=True))
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    with contextlib.suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
 
 
 def evaluate_run(
@@ -168,40 +238,66 @@ def evaluate_run(
         BadInput: the run is being written, or was judged otherwise or holds other completions than it did.
     """
     key = evaluation_key(suite, ablated=ablated)
-    source = Source(str(run.completions), lambda: read_completions(run.completions, growing=True), run)
     with run.writing():
-        rows = run.rows(key)
-        rows.parent.mkdir(exist_ok=True)
+        run.rows(key).parent.mkdir(exist_ok=True)
         if redo:
-            rows.unlink(missing_ok=True)
-            run.head(key).unlink(missing_ok=True)
+            for path in (run.rows(key), run.programs(key), run.head(key)):
+                path.unlink(missing_ok=True)
         about = {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
         _go_on_or_refuse(run.head(key), about)
-        appender = Appender(rows)
-        try:
-            completions = source.checked(suite, tasks)
-            yield from _judged(rows, completions)
+        with (
+            contextlib.closing(Appender(run.programs(key))) as programs,
+            contextlib.closing(Appender(run.rows(key))) as rows,
+        ):
+            completions = run.source(suite).of(tasks)
+            yield from _judged(rows, programs, completions)
+            hashes: deque[str] = deque()
             for row in evaluate(
-                completions, suite, ablated=ablated, workers=workers, require_isolation=require_isolation
+                _noting(hashes, completions),
+                suite,
+                ablated=ablated,
+                workers=workers,
+                require_isolation=require_isolation,
             ):
-                appender.append(to_line(row))
+                # The hash comes first: a crash in between leaves one too many, and no row without one.
+                programs.append(f"{hashes.popleft()}\n".encode())
+                rows.append(to_line(row))
                 yield row
-        finally:
-            appender.close()
 
 
-def _judged(rows: Path, completions: Iterator[Completion]) -> Iterator[dict[str, Any]]:
-    for number, row in read_evaluations(rows):
+def _noting(hashes: deque[str], completions: Iterator[Completion]) -> Iterator[Completion]:
+    for completion in completions:
+        hashes.append(completion.program_sha256)
+        yield completion
+
+
+def _judged(
+    rows: Appender, programs: Appender, completions: Iterator[Completion]
+) -> Iterator[dict[str, Any]]:
+    """The rows that are there; afterwards both files end where to go on."""
+    count = 0
+    for number, row, judged in read_judged(rows.path, programs.path):
+        if judged is None:  # the machine lost its power before the hash was on the disk
+            rows.cut(length_before(rows.path, number))
+            break
+        found = row["task"], row["prompt"], row["index"]
         completion = next(completions, None)
-        if completion is None or completion.key != (row["task"], row["prompt"], row["index"]):
+        if completion is None or completion.key != found:
             expected = "nothing more" if completion is None else name_of(completion.key)
-            found = name_of((row["task"], row["prompt"], row["index"]))
             raise BadInput(
-                f"judges {found} where the completions have {expected}; --redo starts over",
-                file=rows,
+                f"judges {name_of(found)} where the completions have {expected}; --redo starts over",
+                file=rows.path,
                 line=number,
             )
+        if completion.program_sha256 != judged:
+            raise BadInput(
+                f"the program of {name_of(found)} has changed since it was judged; --redo starts over",
+                file=rows.path,
+                line=number,
+            )
+        count += 1
         yield row
+    programs.cut(HASH_LINE * count)
 
 
 def _go_on_or_refuse(path: Path, about: dict[str, Any]) -> None:
@@ -273,15 +369,31 @@ def tasks_to_judge(
     return kept, left
 
 
-def write_whole(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes | memoryview) -> None:
     """Write a file so that it is there whole or as it was."""
+    with written_whole(path) as file:
+        file.write(content)
+
+
+@contextlib.contextmanager
+def written_whole(path: Path) -> Iterator[BinaryIO]:
+    """A file to write to, which takes its place when all is written; else what stood there stays."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(path.name + ".new")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    try:
+        with temporary.open("wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
 
 
 def to_text(data: dict[str, Any]) -> bytes:

@@ -24,6 +24,7 @@ from roboeval.tables import (
     NOT_RECORDED,
     Row,
     Selection,
+    by_hand,
     grid,
     key_of,
     kind_of,
@@ -50,6 +51,7 @@ __all__ = [
     "view_data",
 ]
 
+GONE = "the program that was judged no longer stands in this run"
 CHANGED = "the suite has changed since this was judged"
 
 DID = {"say": "said", "pick": "picked up", "place": "put down"}
@@ -74,7 +76,7 @@ def prompt_data(
 
     Args:
         rows: of the evaluation.
-        completions: that were judged.
+        completions: that were judged; the program of a row whose completion is not there is gone.
         suite: by which they were judged.
         task: its name.
         prompt: counted from 0.
@@ -93,7 +95,11 @@ def prompt_data(
         "task": task,
         **prompt_head(prompt, found, written),
         "programs": [
-            {"indices": [row["index"] for row in same], **_reason(same[0], suite, ablated=ablated)}
+            {
+                "indices": [row["index"] for row in same],
+                "gone": key_of(same[0]) not in written,
+                **_reason(same[0], suite, ablated=ablated),
+            }
             for same in programs.values()
         ],
     }
@@ -142,7 +148,7 @@ def _scenario(suite: Suite, row: Row, number: int, *, ablated: bool) -> Scenario
 
 
 def _trace(verdict: Row, scenario: Scenario | None) -> Trace:
-    trace = trace_from(verdict["trace"])
+    trace = trace_from(verdict["trace"], further=True)
     return trace if scenario is None else located(trace, scenario.world)
 
 
@@ -246,12 +252,16 @@ def prompt_view(
     table = grid("right", "left")
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _told(program))
-    return Group(*prompt_lines(task, data), Text(), table)
+    lines = prompt_lines(task, data)
+    lines[0].append(by_hand(data["models"]))
+    return Group(*lines, Text(), table)
 
 
 def _told(program: Mapping[str, Any]) -> Text:
     same = len(program["indices"])
     often = Text(f"x{same:,}  " if same > 1 else "")
+    if program["gone"]:
+        often.append(f"{GONE}\n", "yellow")
     if program["passed"]:
         return often.append("passed", "green")
     text = Text.assemble(often, kind_of(program["failure"]), f' in "{visible(program["world"])}"\n')
@@ -284,14 +294,14 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     why = data["failure"]
     head.append_text(Text("passed", "green") if why is None else kind_of(why))
     if data["model"] is not None:
-        head.append(f"\nwritten by {visible(data['model'])}", "dim")
+        head.append(f"\nwritten by {visible(data['model'])}{by_hand([data['model']])}", "dim")
     told = NOT_RECORDED if data["instruction"] is None else visible(data["instruction"])
     return head.append(f"\n{told}", "italic")
 
 
 def _program(program: str | None, marked: set[int | None]) -> list[RenderableType]:
     if program is None:
-        return [Text("program not recorded", "italic")]
+        return [Text(GONE, "yellow")]
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     source = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
     syntax = Syntax(

@@ -85,9 +85,17 @@ class TaskFile(_Form):
 class LimitsFile(_Form):
     """The limits as a suite file writes them."""
 
-    seconds: Annotated[float, Field(gt=0)] = 3600.0
-    calls: Annotated[int, Field(gt=0)] = 1_000
-    ticks: Annotated[int, Field(gt=0)] = 200_000
+    seconds: Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)] = 3600.0
+    calls: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 1_000
+    ticks: Annotated[int, Field(strict=True, gt=0, le=1_000_000_000)] = 200_000
+
+
+def _moment(value: object) -> object:
+    if isinstance(value, datetime) and value.tzinfo is not None and 1970 <= value.year < 2100:  # noqa: PLR2004 - years
+        return value
+    raise ValueError(
+        "it should be a time from 1970 to 2099 with its offset, such as 2024-01-01T12:00:00+00:00"
+    )
 
 
 class RulesFile(_Form):
@@ -98,9 +106,7 @@ class RulesFile(_Form):
     people: Literal["answer-to-any-name"] = "answer-to-any-name"
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0
-    clock_starts: Annotated[
-        datetime, BeforeValidator(lambda v: v.isoformat() if isinstance(v, datetime) else v)
-    ] = Rules().clock_starts
+    clock_starts: Annotated[datetime, BeforeValidator(_moment)] = Rules().clock_starts
 
     def rules(self) -> Rules:
         """The rules it describes."""
@@ -112,6 +118,6 @@ class SuiteFile(_Form):
     """A suite.yaml."""
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
-    version: int
+    version: Annotated[int, Field(strict=True, ge=0)]
     about: Text = ""
     rules: RulesFile = RulesFile()

@@ -1,215 +1,23 @@
-"""What a person reads after an evaluation: how often programs succeed and how they fail, counted."""
+"""A part of a run as tables: one task, prompt by prompt, and what all tables are made of."""
 
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from rich import box
-from rich.columns import Columns
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from codebotler.badinput import BadInput
-from roboeval.metrics import Estimate, PromptScore, TaskScore, overall, score_by_prompt
 from roboeval.records import Completion, Key
 from roboeval.suite import Suite
-from roboeval.taxonomy import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, ROBOT_KINDS, TASK
 
 Row: TypeAlias = Mapping[str, Any]
 
 NOT_RECORDED = "instruction not recorded"
-ALWAYS_SHOWN: Mapping[str, Sequence[str]] = {PYTHON: PYTHON_KINDS, ROBOT: ROBOT_KINDS, TASK: CATEGORIES}
-
-
-@dataclass(frozen=True)
-class Failures:
-    """How many completions failed by one class or one kind of it.
-
-    Args:
-        name: of the class or kind.
-        count: of completions.
-        share: of all completions.
-        kinds: of a class; the known ones come first, also where nothing failed by them.
-    """
-
-    name: str
-    count: int
-    share: float
-    kinds: tuple[Failures, ...] = ()
-
-
-@dataclass(frozen=True)
-class Summary:
-    """An evaluation in numbers.
-
-    Args:
-        k: of the pass@k that were asked for.
-        tasks: those that have completions, in the suite's order.
-        overall: pass@k over all prompts with a 95 % interval, for each k.
-        failures: by class.
-        missing: tasks of the suite that have no completion.
-    """
-
-    k: tuple[int, ...]
-    tasks: tuple[TaskScore, ...]
-    overall: tuple[Estimate, ...]
-    failures: tuple[Failures, ...]
-    missing: tuple[str, ...]
-
-    @property
-    def prompts(self) -> list[PromptScore]:
-        """The scores of all prompts of all tasks."""
-        return [prompt for task in self.tasks for prompt in task.prompts]
-
-
-def summary(rows: Iterable[Row], suite: Suite, *, k: Sequence[int] = (1,)) -> Summary:
-    """Count how the completions of an evaluation did.
-
-    Args:
-        rows: of the evaluation; read once.
-        suite: by which they were judged.
-        k: how many tries pass@k allows.
-
-    Raises:
-        BadInput: there is no row, or pass@k cannot be estimated for some prompt.
-    """
-    failed: dict[str, Counter[str]] = defaultdict(Counter)
-    results: list[tuple[str, int, bool]] = []
-    for row in rows:
-        results.append((row["task"], row["prompt"], row["passed"]))
-        if (why := row["failure"]) is not None:
-            failed[why["class"]][why["kind"]] += 1
-    if not results:
-        raise BadInput("no completion has been judged, so there is nothing to count")
-    scored = {score.task: score for score in score_by_prompt(results)}
-    tasks = tuple(scored[name] for name in dict.fromkeys([*suite.tasks, *scored]) if name in scored)
-    try:
-        estimates = tuple(overall(tasks, tries) for tries in k)
-    except ValueError as error:
-        fewest = min(prompt.n for task in tasks for prompt in task.prompts)
-        raise BadInput(f"{visible(str(error))}; choose k from 1 to {fewest}") from None
-    missing = tuple(name for name in suite.tasks if name not in scored)
-    return Summary(tuple(k), tasks, estimates, _failures(failed, len(results)), missing)
-
-
-def _failures(failed: Mapping[str, Counter[str]], n: int) -> tuple[Failures, ...]:
-    def of_class(name: str) -> Failures:
-        counts = failed.get(name, Counter())
-        known = ALWAYS_SHOWN.get(name, ())
-        others = sorted(counts.keys() - set(known), key=lambda kind: (-counts[kind], kind))
-        kinds = tuple(Failures(kind, counts[kind], counts[kind] / n) for kind in [*known, *others])
-        return Failures(name, counts.total(), counts.total() / n, kinds)
-
-    return tuple(of_class(name) for name in [*CLASSES, *sorted(failed.keys() - set(CLASSES))])
-
-
-# --- for people
-
-
-def render(summary: Summary, *, title: str, ablated: bool = False) -> RenderableType:
-    """The tables of an evaluation.
-
-    Args:
-        summary: what they show.
-        title: what was judged.
-        ablated: whether common sense only was required.
-    """
-    head = Text(visible(title), style="bold")
-    if ablated:
-        head.append(" (ablation: only common sense was required)", style="not bold")
-    parts: list[RenderableType] = [head, Text(), _task_table(summary), Text(), *_overall(summary)]
-    if summary.missing and not ablated:
-        parts.append(Text(f"no completions of {', '.join(map(visible, summary.missing))}", style="dim"))
-    n, failed = _judged(summary.prompts), sum(each.count for each in summary.failures)
-    if failed:
-        told = f"{failed:,} of {n:,} completions failed ({failed / n:.1%}); shares are of all completions:"
-        tables = Columns([_failure_table(each) for each in summary.failures], padding=(1, 3))
-        parts += [Text(), Text(told), Text(), tables]
-    return Group(*parts)
-
-
-def _judged(prompts: Iterable[PromptScore]) -> int:
-    return sum(prompt.n for prompt in prompts)
-
-
-def _task_table(summary: Summary) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("task", overflow="fold")
-    passes = [f"pass@{k}" for k in summary.k]
-    for name in ["completions", *passes, "worst prompt", "best prompt"]:
-        table.add_column(name, justify="right", no_wrap=True)
-    for task in summary.tasks:
-        means = [task.pass_at(k).mean for k in summary.k]
-        shares = [*means, task.lowest(summary.k[0]), task.highest(summary.k[0])]
-        cells = [Text(f"{share:.2f}", _mood(share)) for share in shares]
-        table.add_row(Text(visible(task.task)), f"{_judged(task.prompts):,}", *cells)
-    return table
-
-
-def _mood(share: float) -> str:
-    return "green" if share == 1 else "red" if share == 0 else ""
-
-
-def _overall(summary: Summary) -> list[Text]:
-    prompts = len(summary.prompts)
-    lines = []
-    for k, estimate in zip(summary.k, summary.overall, strict=True):
-        line = Text.assemble(f"pass@{k} over all prompts: ", (f"{estimate.mean:.3f}", "bold"))
-        if prompts > 1:
-            line.append(f" (95% interval {estimate.low:.3f} to {estimate.high:.3f}, {prompts} prompts)")
-        lines.append(line)
-    return lines
-
-
-def _failure_table(failures: Failures) -> Table:
-    table = grid("left", "right", "right")
-    for each in [failures, *failures.kinds]:
-        name = visible(each.name) if each is failures else f"  {visible(each.name)}"
-        style = "bold" if each is failures else "" if each.count else "dim"
-        table.add_row(Text(name), f"{each.count:,}", f"{each.share:.1%}", style=style)
-    return table
-
-
-# --- for machines
-
-
-def summary_data(summary: Summary) -> dict[str, Any]:
-    """A summary as plain data."""
-    estimates = zip(summary.k, summary.overall, strict=True)
-    return {
-        **_counts(summary.prompts),
-        **{f"pass@{k}": {"mean": e.mean, "low": e.low, "high": e.high} for k, e in estimates},
-        "tasks": [_task_score_data(task, summary.k) for task in summary.tasks],
-        "failures": [
-            {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}
-            for each in summary.failures
-        ],
-        "missing": list(summary.missing),
-    }
-
-
-def _task_score_data(task: TaskScore, ks: Sequence[int]) -> dict[str, Any]:
-    spreads = {
-        f"pass@{k}": {"mean": task.pass_at(k).mean, "lowest": task.lowest(k), "highest": task.highest(k)}
-        for k in ks
-    }
-    prompts = [
-        {"prompt": prompt.prompt, **_counts([prompt]), **{f"pass@{k}": prompt.pass_at(k) for k in ks}}
-        for prompt in task.prompts
-    ]
-    return {"task": task.task, **_counts(task.prompts), **spreads, "prompts": prompts}
-
-
-def _counts(prompts: Sequence[PromptScore]) -> dict[str, int]:
-    return {"completions": _judged(prompts), "passed": sum(prompt.c for prompt in prompts)}
-
-
-def _failure_data(failures: Failures, what: str) -> dict[str, Any]:
-    return {what: failures.name, "count": failures.count, "share": failures.share}
 
 
 # --- a part of a run
@@ -312,10 +120,11 @@ def key_of(row: Row) -> Key:
 def prompt_head(prompt: int, rows: Sequence[Row], written: Mapping[Key, Completion]) -> dict[str, Any]:
     """What a prompt told the model, and how many of its completions passed."""
     passed = sum(row["passed"] for row in rows)
-    told = (written[key_of(row)].instruction for row in rows if key_of(row) in written)
+    those = [written[key_of(row)] for row in rows if key_of(row) in written]
     return {
         "prompt": prompt,
-        "instructions": list(dict.fromkeys(text for text in told if text is not None)),
+        "instructions": list(dict.fromkeys(c.instruction for c in those if c.instruction is not None)),
+        "models": list(dict.fromkeys(c.model for c in those if c.model is not None)),
         "completions": len(rows),
         "passed": passed,
         "pass@1": passed / len(rows),
@@ -339,7 +148,8 @@ def _failure_kinds(rows: Sequence[Row]) -> list[dict[str, Any]]:
 def task_view(rows: Iterable[Row], completions: Iterable[Completion], suite: Suite, task: str) -> Group:
     """What `task_data` says, for a person."""
     data = task_data(rows, completions, suite, task)
-    parts: list[RenderableType] = [Text(visible(task), style="bold")]
+    models = {model for prompt in data["prompts"] for model in prompt["models"]}
+    parts: list[RenderableType] = [Text(visible(task) + by_hand(models), style="bold")]
     if data["summary"]:
         parts.append(Text(visible(data["summary"])))
     for prompt in data["prompts"]:
@@ -362,6 +172,14 @@ def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
 def kind_of(failure: Mapping[str, Any]) -> Text:
     """A failure's class and kind."""
     return Text.assemble((f"{visible(failure['class'])}: {visible(failure['kind'])}", "red"))
+
+
+def by_hand(models: Collection[str | None]) -> str:
+    """What a title adds if recorded programs are among those of some models, which stand for no real one."""
+    recorded = [model for model in models if model is not None and model.startswith("recorded:")]
+    if not recorded:
+        return ""
+    return f" ({'' if len(recorded) == len(models) else 'some '}programs written by hand)"
 
 
 # --- text that may come from a model

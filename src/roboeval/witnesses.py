@@ -99,12 +99,75 @@ def patterns(text: Text) -> Iterator[str]:
 
 
 def alternatives(pattern: str) -> list[str]:
-    """The parts of a regex that is no more than words with bars between them; otherwise the regex.
+    """A regex once for each of the words that it leaves the choice of, at its top or in a group.
+
+    Args:
+        pattern: the regex; alone in the answer where it leaves no choice, or refers back to a group.
+    """
+    if re.search(r"\\\d|\(\?P=|\(\?\(", pattern):
+        return [pattern]
+    branches = _branches(pattern)
+    return [one for branch in branches for one in _without_choice(branch)]
+
+
+def _branches(pattern: str) -> list[str]:
+    """What stands between the bars outside of groups and sets."""
+    pieces = re.findall(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|.", pattern, re.DOTALL)
+    branches, depth = [""], 0
+    for piece in pieces:
+        depth += (piece == "(") - (piece == ")")
+        if piece == "|" and depth == 0:
+            branches.append("")
+        else:
+            branches[-1] += piece
+    return branches if all(branches) else [pattern]
+
+
+_CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
+
+
+def _without_choice(pattern: str) -> list[str]:
+    one_less = (
+        pattern[: group.start()] + word + pattern[group.end() :]
+        for group in _CHOICE.finditer(pattern)
+        for word in group[1].split("|")
+    )
+    return [*one_less] or [pattern]
+
+
+def spelled_out(pattern: str) -> Iterator[str]:
+    """The plain texts in a regex, such as names, as they stand there.
 
     Args:
         pattern: the regex.
     """
-    return pattern.split("|") if re.fullmatch(r"[\w' ]+(\|[\w' ]+)+", pattern) else [pattern]
+    yield from _literals(_parsed(pattern))
+
+
+def _literals(items: Any) -> Iterator[str]:  # noqa: ANN401 - the tree of a private module of Python's
+    text = ""
+    for op, value in items:
+        if str(op) == "LITERAL":
+            text += chr(value)
+            continue
+        yield text
+        text = ""
+        for inner in _inner(str(op), value):
+            yield from _literals(inner)
+    yield text
+
+
+def _inner(op: str, value: Any) -> list[Any]:  # noqa: ANN401 - the same
+    match op:
+        case "BRANCH":
+            return list(value[1])
+        case "SUBPATTERN" | "ASSERT" | "ASSERT_NOT":
+            return [value[-1]]
+        case "ATOMIC_GROUP":
+            return [value]
+        case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
+            return [value[2]]
+    return []
 
 
 def is_among(pattern: str, labels: Iterable[str]) -> bool:

@@ -36,6 +36,11 @@ def test_error_names_the_file_and_the_line_where_there_are_any() -> None:
     assert str(BadInput("is wrong", file=Path("a.yaml"), line=3)) == "a.yaml, line 3: is wrong"
 
 
+TOO_LARGE = (
+    'w.yaml, line 2: "{} ... {}" is too large a number; write a smaller one, or put quotes around a text'
+)
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
@@ -68,19 +73,39 @@ def test_error_names_the_file_and_the_line_where_there_are_any() -> None:
             ),
         ),
         ("inner: *a\n", "w.yaml, line 1: this is no valid YAML: found undefined alias"),
-        ("a: \x07\n", "w.yaml: this is no valid YAML: control characters are not allowed"),
+        ("a: \x07\n", "w.yaml, line 1: the character U+0007 may not stand in YAML; remove it"),
         (
             "a: 1\nb: !!python/name:os.system 3\n",
-            (
-                "w.yaml, line 2: this is no valid YAML: "
-                "could not determine a constructor for the tag 'tag:yaml.org,2002:python/name:os.system'"
-            ),
+            'w.yaml, line 2: the tag "python/name:os.system" is not supported; remove it',
         ),
         (
             "a: 1\n{b: 1}: 2\n",
-            "w.yaml, line 2: this is no valid YAML: while constructing a mapping, found unhashable key",
+            "w.yaml, line 2: this key is no text; write one word or put quotes around it",
         ),
-        ("inner: 2001-13-01\n", "w.yaml: holds a value that cannot be read (month must be in 1..12)"),
+        ("a: 1\nb: x\ud800\n", "w.yaml, line 2: the character U+D800 may not stand in YAML; remove it"),
+        (
+            "a: 1\ninner: 2001-13-01\n",
+            'w.yaml, line 2: "2001-13-01" is not a date; correct it or put quotes around it',
+        ),
+        (
+            "a: 1\n0b_: 1\n",
+            'w.yaml, line 2: "0b_" is not a whole number; correct it or put quotes around it',
+        ),
+        ("inner: !!bool x\n", 'w.yaml, line 1: "x" is not true or false; correct it or put quotes around it'),
+        ("inner: !!timestamp x\n", 'w.yaml, line 1: "x" is not a date; correct it or put quotes around it'),
+        (f"a: 1\nb: {'9' * 5000}\n", long := TOO_LARGE.format("9" * 20, "9" * 20)),
+        (f"a: 1\nb: {'9' * 400}\n", long),
+        (f"a: 1\nb: 0x{'f' * 5000}\n", TOO_LARGE.format("0x" + "f" * 18, "f" * 20)),
+        ("a: 1\nb: !!set {x}\n", 'w.yaml, line 2: the tag "set" is not supported; remove it'),
+        ("a: 1\n!!set b: x\n", 'w.yaml, line 2: the tag "set" is not supported; remove it'),
+        ("a: =\n", 'w.yaml, line 1: "=" alone is no text; put quotes around it'),
+        (
+            "inner: {a: 1\n\n\n",
+            (
+                "w.yaml, line 3: this is no valid YAML: while parsing a flow mapping, "
+                "did not find expected ',' or '}'"
+            ),
+        ),
         (
             "inner: 1\nmany: 2\ninner: 3\n",
             keyed := 'w.yaml, line 3: the key "inner" stands here a second time; keep one of them',
@@ -155,19 +180,32 @@ BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 
 
+DEEP = "w.yaml, line {}: this is nested more than 50 deep, or within itself; write it flatter"
+
+
 @pytest.mark.parametrize(
-    "text",
+    ("text", "line"),
     [
-        pytest.param("inner: " + "[" * 60 + "]" * 60, id="lists"),
-        pytest.param("inner: " + "{a: " * 60 + "1" + "}" * 60, id="mappings"),
-        pytest.param("".join(" " * depth + "a:\n" for depth in range(60)), id="indented"),
-        pytest.param(BOMB, id="anchors that explode"),
-        pytest.param("inner: &a [*a]\n", id="a list within itself"),
-        pytest.param("&a\ninner: *a\n", id="a mapping within itself"),
+        pytest.param("a: 1\ninner: " + "[" * 60 + "]" * 60, 2, id="lists"),
+        pytest.param("a: 1\ninner: " + "{a: " * 60 + "1" + "}" * 60, 2, id="mappings"),
+        pytest.param("".join(" " * depth + "a:\n" for depth in range(60)), 50, id="indented"),
+        pytest.param("a: 1\ninner: &a [*a]\n", 2, id="a list within itself"),
+        pytest.param("&a\ninner: *a\n", 1, id="a mapping within itself"),
     ],
 )
-def test_yaml_that_is_too_much_is_refused_in_a_sentence(text: str) -> None:
-    assert sentence_about(text) == "w.yaml: is nested too deeply, or its anchors repeat too much"
+def test_yaml_that_is_nested_too_deeply_is_refused_in_a_sentence(text: str, line: int) -> None:
+    assert sentence_about(text) == DEEP.format(line)
+
+
+def test_anchors_that_explode_are_refused_in_a_sentence() -> None:
+    assert sentence_about(f"a: 1\n{BOMB}") == (
+        "w.yaml, line 2: up to here there are 100,000 entries, too many, or anchors repeat them"
+    )
+
+
+def test_a_sentence_is_short_and_one_line() -> None:
+    error = BadInput("a\nb" + "c" * 10_000, file="a.yaml", line=1)
+    assert str(error) == "a.yaml, line 1: a b" + "c" * 297 + " ... " + "c" * 300
 
 
 def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpreter() -> None:
@@ -181,7 +219,7 @@ def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpr
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout) == (
         0,
-        "w.yaml: is nested too deeply, or its anchors repeat too much\n",
+        DEEP.format(1) + "\n",
     )
 
 

@@ -1,10 +1,13 @@
+import ast
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.models.recorded import NAMES, recorded_model
-from codebotler.program import Program
+from codebotler.program import Program, undefined_names
 from codebotler.reply import program_of
+from codebotler.skills import SkillTable
 
 RECORDED = [
     pytest.param(reply.program, reply.fails, id=f"{name}-{number}")
@@ -143,6 +146,113 @@ def test_helpers_of_helpers_come_along() -> None:
     helper = "def rooms():\n    return ROOMS\n"
     expected = f"ROOMS = []\n\n\n{helper}\n\n{USES_HELPER}"
     assert source(fenced("ROOMS = []\n") + fenced(helper) + fenced(USES_HELPER)) == expected
+
+
+def blocks(*codes: str) -> str:
+    return "and\n".join(fenced(code) for code in codes)
+
+
+CALLS_A = "def task_program():\n    a()\n"
+USES_X = "def a():\n    say(x)\n"
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        pytest.param([CALLS_A, USES_X, "x = 1\n", "x = 2\n"], [0, 1, 2], id="the first definition is enough"),
+        pytest.param(["x = 1\n", "x = 2\n", USES_X, CALLS_A], [0, 2, 3], id="also in front"),
+        pytest.param(
+            [CALLS_A, "say(y)\ndef a():\n    pass\n", "y = 1\n", "y = 2\n", "y = 3\n"],
+            [0, 1, 2, 3, 4],
+            id="none that comes too late is enough",
+        ),
+        pytest.param(
+            ["y = 1\n", "say(y)\ndef a():\n    pass\n", CALLS_A, "y = 2\n"],
+            [0, 1, 2],
+            id="one in front of its use is enough",
+        ),
+        pytest.param([CALLS_A, "x = x\na = x\n", "x = 1\n"], [0, 1, 2], id="a block may not help itself"),
+        pytest.param(
+            ["x = 1\n", "def a():\n    say(x)\n    x = 2\n", CALLS_A, "x = 3\n"],
+            [0, 1, 2, 3],
+            id="no definition helps a local name used too early",
+        ),
+        pytest.param([CALLS_A, "x: int\na = 1\n", "x = 1\n"], [0, 1], id="who needs nothing gets nothing"),
+        pytest.param(
+            [CALLS_A, "def a():\n    say(x, b)\n", "x: int\n", "x = 1\n", "b = 2\n"],
+            [0, 1, 2, 3, 4],
+            id="an annotation is no definition",
+        ),
+        pytest.param(
+            [
+                "y = 0\n",
+                CALLS_A + "    b()\n",
+                "say(y)\ndef a():\n    pass\n",
+                "b = 1\ny = 1\n",
+                "y = 2\n",
+            ],
+            [0, 1, 2, 3],
+            id="one in front is enough whichever comes along first",
+        ),
+        pytest.param(
+            [
+                "b = 1\ny = 0\n",
+                CALLS_A + "    b()\n",
+                "say(y)\ndef a():\n    c()\n",
+                "c = 1\ny = 1\n",
+                "y = 2\n",
+            ],
+            [0, 1, 2, 3],
+            id="one in front stays enough",
+        ),
+        pytest.param(
+            ["y = 0\n", "say(y)\ndef a():\n    c()\n", CALLS_A, "from m import *\nc = 1\n", "y = 2\n"],
+            [0, 1, 2, 3],
+            id="one in front is enough whatever comes from a star",
+        ),
+        pytest.param(
+            ["c = x\n", CALLS_A, "def a():\n    global x\n    c\n", "x = 1\n"],
+            [0, 1, 2],
+            id="a global name is defined everywhere",
+        ),
+        pytest.param(
+            [CALLS_A, "def a():\n    b()\n", "from m import *\ndef b():\n    c()\n", "c = 1\n"],
+            [0, 1, 2],
+            id="from a star may come whatever is lacking",
+        ),
+        pytest.param(
+            [CALLS_A, "def a():\n    say(b, c)\n", "from m import *\nb = 1\n", "c = d\n", "d = 1\n"],
+            [0, 1, 2, 3],
+            id="also for later blocks",
+        ),
+        pytest.param(
+            ["return 1\n" + CALLS_A + "x = 1\n", USES_X, "x = 2\n"],
+            [0, 1],
+            id="a program that does not compile defines names",
+        ),
+        pytest.param([CALLS_A, "a = 1\nreturn\n", "a = 2\n"], [0, 2], id="a helper has to compile"),
+    ],
+)
+def test_which_other_blocks_come_along(given: list[str], kept: list[int]) -> None:
+    assert source(blocks(*given)) == "\n\n".join(given[i] for i in kept)
+
+
+def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyPatch) -> None:
+    read = []
+
+    def counted(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
+        read.append(sum(1 for _ in ast.walk(tree)))
+        return undefined_names(tree, skills)
+
+    def work(number: int) -> int:
+        read.clear()
+        chain = [f"def f{i}():\n    return f{i + 1}()\n" for i in range(number)]
+        last = f"f{number} = 1\n"
+        assert source(blocks(USES_HELPER, "rooms = f0\n", *chain, last)).endswith(last)
+        return sum(read)
+
+    monkeypatch.setattr("codebotler.reply.undefined_names", counted)
+    assert work(80) < 10 * work(10)
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,18 @@ from codebotler.tracefile import outcome_data, outcome_yaml, read_outcome, trace
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=10)
 options = st.builds(Option, texts, st.booleans())
+
+
+@st.composite
+def questions(draw: st.DrawFn) -> Event:
+    offered = tuple(draw(st.lists(options, max_size=4)))
+    return Event("ask", draw(texts), offered, draw(st.sampled_from([None, *(o.text for o in offered)])))
+
+
 events = st.one_of(
-    st.builds(Event, st.sampled_from(["goto", "say", "pick", "place", "wave"]), texts),
+    st.builds(Event, st.sampled_from(["goto", "say", "pick", "place", "check"]), texts),
     st.builds(Event, st.just("check"), texts, found=st.booleans()),
-    st.builds(Event, st.just("ask"), texts, st.lists(options).map(tuple), st.none() | texts),
+    questions(),
 )
 traces = st.lists(events, max_size=5).map(tuple)
 errors = st.builds(RunError, texts, texts)
@@ -63,9 +71,38 @@ GOOD = "status: robot-error\nerror: {kind: K, message: m}\nline: 3\ntrace:\n- [g
         ("kind: K", "kind: 3", 'line 2: "kind" is a number, not a text'),
         ("line: 3", "line: 0", 'line 3: "line" is 0, but it should be greater than or equal to 1'),
         ("line: 3", "place: lab", 'line 3: the key "place" means nothing here'),
-        ("[say, hi]", "[say]", "line 6: this entry is not as it should be: ['say'] is no element of a trace"),
-        ("[say, hi]", "[ask, q, [3], a]", "line 6: this entry is not as it should be: 3 is no option"),
-        ("[say, hi]", "say hi", "line 6: this entry is 'say hi', but 'say hi' is no element of a trace"),
+        ("[say, hi]", "[say]", "line 6: ['say'] is no element of a trace; write [say, text], with texts"),
+        (
+            "[say, hi]",
+            "[say, 3]",
+            "line 6: ['say', 3] is no element of a trace; write [say, text], with texts",
+        ),
+        (
+            "[say, hi]",
+            "[say, q, [a], b]",
+            "line 6: ['say', 'q', ['a'], 'b'] is no element of a trace; write [say,",
+        ),
+        (
+            "[say, hi]",
+            "[say, hi, true]",
+            "line 6: ['say', 'hi', True] is no element of a trace; write [say, text]",
+        ),
+        ("[say, hi]", "[check, hi, 1]", "is no element of a trace; write [check, text, true or false]"),
+        (
+            "[say, hi]",
+            "[ask, q]",
+            "write [ask, question, [option, ...], answer or null], with texts in quotes",
+        ),
+        ("[say, hi]", "[ask, q, yes, a]", "write [ask, question, [option, ...], answer or null], with texts"),
+        ("[say, hi]", "[ask, q, [a], b]", 'line 6: "b" is no option of the question "q"; correct the answer'),
+        ("[say, hi]", "[ask, q, [3], a]", "line 6: 3 is no option"),
+        (
+            "[say, hi]",
+            "[wave, kim]",
+            'line 6: "wave" is no kind of event; write one of check, goto, ask, say, pick, place',
+        ),
+        ("[say, hi]", "say hi", "line 6: 'say hi' is no element of a trace; write [kind, text, ...]"),
+        ("[say, hi]", "{say: hi}", "line 6: {'say': 'hi'} is no element of a trace; write [kind, text, ...]"),
     ],
 )
 def test_a_wrong_file_gets_a_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
@@ -77,3 +114,14 @@ def test_a_wrong_file_gets_a_sentence(tmp_path: Path, old: str, new: str, senten
     assert sentence in str(caught.value)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+def test_events_of_further_skills_are_read_where_they_may_stand() -> None:
+    data = [["wave", "kim"], ["smell", "tea", True], ["vote", "q", ["a"], "a"], ["say", "hi"]]
+    assert trace_data(trace_from(data, further=True)) == data
+    with pytest.raises(BadInput, match=r'^"wave" is no kind of event; write one of check, goto, ask, say, '):
+        trace_from(data)
+    with pytest.raises(BadInput, match=r"^\['wave', 3\] is no element of a trace$"):
+        trace_from([["wave", 3]], further=True)
+    with pytest.raises(BadInput, match=r"^\['ask', 'q'\] is no element of a trace; write \[ask, question, "):
+        trace_from([["ask", "q"]], further=True)

@@ -102,6 +102,18 @@ REGEX = 'w.yaml, line {}: "{}" is no valid regular expression: {}'
         (GOOD + "  - name: a\n    footprint: big\n", 'w.yaml, line 6: "footprint" is a text, not a list'),
         (GOOD + "  - {name: a, stand_at: [1, .nan]}\n", "w.yaml, line 5: this entry is no finite number"),
         (GOOD + "  - {name: a, stand_at: [-.inf, 1]}\n", "w.yaml, line 5: this entry is no finite number"),
+        (
+            GOOD + "  - {name: a, stand_at: [1.0e+300, 1]}\n",
+            "w.yaml, line 5: this entry is 1e+300, but it should be less than or equal to 1000000",
+        ),
+        (
+            GOOD + f"  - {{name: a, stand_at: [1, {'7' * 400}]}}\n",
+            (
+                f'w.yaml, line 5: "{"7" * 20} ... {"7" * 20}" is too large a number; '
+                "write a smaller one, or put quotes around a text"
+            ),
+        ),
+        ("robot: hall\nrooms: !!set {hall}\n", 'w.yaml, line 2: the tag "set" is not supported; remove it'),
         (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", "w.yaml, line 5: this entry is a text, not a number"),
         (GOOD + "  - hall\n", 'w.yaml, line 5: the room "hall" stands here twice; remove one'),
         (GOOD + "  - {name: lab}\n", 'w.yaml, line 5: the room "lab" stands here twice; remove one'),
@@ -202,7 +214,7 @@ TEXTS = st.text(st.characters(codec="utf-8"), max_size=12) | st.sampled_from(
 )
 REGEXES = TEXTS.filter(is_regex)
 NAMES = REGEXES.filter(bool)
-METRES = st.floats(allow_nan=False, allow_infinity=False)
+METRES = st.floats(-1e6, 1e6)
 POINTS = st.tuples(METRES, METRES)
 ROOMS = st.builds(
     Room,

@@ -4,7 +4,7 @@
 
 
 def task_program():
-    run = [c.cell_contents for c in say.__globals__["perform"].__closure__ if hasattr(c.cell_contents, "job")][0]
+    run = [c.cell_contents for c in say.__globals__["perform"].__closure__ if hasattr(c.cell_contents, "spent")][0]
     while True:
         run.spent = False
         try:

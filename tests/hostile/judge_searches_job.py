@@ -1,11 +1,10 @@
 """Tries to find more in what the engine sent than its own source and the names of skills."""
 # ends: finished
-# does: say clock cpu literals memory seconds skills source ticks
+# does: say calls entered known longest namespace now room seconds skills spent start ticks
 
 
 def task_program():
-    run = say.__globals__["perform"].__closure__[2].cell_contents
     for cell in say.__globals__["perform"].__closure__:
-        if hasattr(cell.cell_contents, "job"):
+        if hasattr(cell.cell_contents, "spent"):
             run = cell.cell_contents
-    say(" ".join(sorted(run.job)))
+    say(" ".join(sorted(vars(run))))

@@ -1,7 +1,8 @@
 """Tries to find more in the replies than was asked for."""
 # ends: finished
-# does: say ["ok", ["start", "vault"]]
+# does: say ('ok', ['start', 'vault'])
 
+import inspect
 import os
 
 
@@ -11,5 +12,6 @@ def frame(text):
 
 
 def task_program():
-    os.write(3, frame('["get_all_rooms", [], 0]'))
-    say(os.read(3, 10_000)[4:].decode())
+    os.write(3, frame('["get_all_rooms", [], 0, 1]'))
+    marshal = inspect.importlib._bootstrap_external.marshal
+    say(str(marshal.loads(os.read(3, 10_000)[4:])))

@@ -7,7 +7,6 @@ import subprocess
 
 def task_program():
     for wait in (
-        lambda: subprocess.select.select([], [], [], 100),
         lambda: subprocess.select.select([3], [], []),
         lambda: signal.sigtimedwait([signal.SIGTERM], 100),
     ):

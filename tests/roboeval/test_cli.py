@@ -3,6 +3,9 @@
 import csv
 import json
 import os
+import re
+import shlex
+import signal
 import subprocess
 import sys
 import zipfile
@@ -22,15 +25,19 @@ class Ended(NamedTuple):
     err: str
 
 
-def roboeval(*arguments: str | Path, cwd: Path | None = None) -> Ended:
-    environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
+ENVIRONMENT = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
+
+
+def roboeval(*arguments: str | Path, cwd: Path | None = None, before: str = "", after: str = "") -> Ended:
+    """Run a command, with something of bash before and after it."""
+    words = [sys.executable, "-m", "roboeval.cli", *map(str, arguments)]
     ended = subprocess.run(
-        [sys.executable, "-m", "roboeval.cli", *map(str, arguments)],
+        ["bash", "-c", f"{before} {shlex.join(words)} {after}"],
         capture_output=True,
         text=True,
         check=False,
         cwd=cwd,
-        env=environment,
+        env=ENVIRONMENT,
     )
     return Ended(ended.returncode, ended.stdout, ended.stderr)
 
@@ -88,17 +95,26 @@ def test_a_line_that_is_no_object(tmp_path: Path) -> None:
 
 
 def test_an_unknown_task(tmp_path: Path) -> None:
-    (tmp_path / "a.jsonl").write_text(row(task="SayGoodNight"))
+    (tmp_path / "a.jsonl").write_text(row() + row(task="SayGoodNight"))
     sentence = refused("evaluate", "a.jsonl", cwd=tmp_path)
-    assert sentence.startswith('a.jsonl: the suite has no task "SayGoodNight"; its tasks are CountSavory,')
+    assert sentence.startswith(
+        'a.jsonl, line 2: the suite has no task "SayGoodNight"; its tasks are CountSavory,'
+    )
 
 
-@pytest.mark.parametrize("prompt", [5, 10**30])
+@pytest.mark.parametrize("prompt", [5, 10**9 - 1])
 def test_a_prompt_out_of_range(tmp_path: Path, prompt: int) -> None:
     (tmp_path / "a.jsonl").write_text(row(prompt=prompt))
     assert refused("evaluate", "a.jsonl", cwd=tmp_path) == (
-        f"a.jsonl: SayGoodDay/{prompt}/0: the task has prompts 0 to 4"
+        f"a.jsonl, line 1: SayGoodDay/{prompt}/0: the task has prompts 0 to 4"
     )
+
+
+def test_an_unknown_task_of_a_published_file(tmp_path: Path) -> None:
+    (tmp_path / "py").mkdir()
+    (tmp_path / "py" / "SayGoodNight_0_0.py").write_text("completion = ''")
+    sentence = refused("evaluate", "py", cwd=tmp_path)
+    assert sentence.startswith('py/SayGoodNight_0_0.py: the suite has no task "SayGoodNight"; its tasks are')
 
 
 @pytest.mark.parametrize(
@@ -190,6 +206,10 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
     ("options", "sentence"),
     [
         (["--engine", "ray"], "--engine ray is not there yet; leave it out"),
+        (["--engine", "steam"], 'there is no engine "steam"; there is local, and ray is not there yet'),
+        (["--workers", "0"], "invalid value for '--workers': "),
+        (["--workers", "many"], "invalid value for '--workers': "),
+        (["--frobnicate"], "no such option: --frobnicate"),
         (["--worlds", "7"], "--worlds is not there yet; leave it out"),
         (["--suite", "plus"], 'the suite "plus" is not there yet; leave --suite out'),
         (["--suite", "nonsense"], 'there is no suite "nonsense"'),
@@ -203,10 +223,119 @@ def test_an_option_that_cannot_be_followed(tmp_path: Path, options: list[str], s
     assert refused("evaluate", "a.jsonl", *options, cwd=tmp_path).startswith(sentence)
 
 
-def test_nothing_is_half_written_when_a_row_is_wrong(tmp_path: Path) -> None:
+@pytest.mark.parametrize("arguments", [(), ("evaluate",), ("show", "a", "b", "c"), ("dance",), ("--frob",)])
+def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
+    if arguments:
+        command = "roboeval evaluate" if arguments == ("evaluate",) else "roboeval"
+        assert f"; `{command}" in refused(*arguments)
+    else:
+        ended = roboeval()
+        assert (ended.status, ended.err) == (0, "")
+        assert "evaluate" in ended.out
+
+
+@pytest.mark.parametrize(
+    "arguments", [("show", "run"), ("tasks",), ("export", "run"), ("import", "a.jsonl", "--out", "run")]
+)
+def test_a_suite_that_comes_later(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    sentence = refused(*arguments, "--suite", "plus", cwd=tmp_path)
+    assert sentence.startswith('the suite "plus" is not there yet; leave --suite out')
+
+
+@pytest.mark.parametrize("verb", ["evaluate", "import"])
+@pytest.mark.parametrize("out", ["run", "some/new/run"])
+def test_nothing_is_left_behind_when_a_row_is_wrong(tmp_path: Path, verb: str, out: str) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "{oops\n" + row(1))
-    refused("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path)
-    assert not (tmp_path / "run" / "completions.jsonl").exists()
+    refused(verb, "a.jsonl", "--out", out, cwd=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.jsonl"]
+
+
+# --- a machine that cannot
+
+
+FULL = r"[^\n]*: File too large; make room and give the same command again\n"
+SMALL_DISK = "ulimit -f 3;"  # in KiB: no file may grow beyond it
+
+
+def test_a_full_disk_ends_an_evaluation_in_one_sentence_and_it_goes_on(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text("".join(row(index, f"{GREETS}# {index}") for index in range(6)))
+    assert roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
+    ended = roboeval("evaluate", "run", cwd=tmp_path, before=SMALL_DISK)
+    assert (ended.status, ended.out) == (1, "")
+    assert re.fullmatch(r"roboeval: run/evaluations/paper\.jsonl" + FULL, ended.err)
+    rows = (tmp_path / "run" / "evaluations" / "paper.jsonl").read_bytes()
+    assert 1 <= rows.count(b"\n") < 6
+    assert rows.endswith(b"}\n")
+    assert roboeval("evaluate", "run", cwd=tmp_path).status == 0
+    assert (tmp_path / "run" / "evaluations" / "paper.jsonl").read_bytes().startswith(rows)
+
+
+def test_a_full_disk_leaves_no_half_run(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text("".join(row(index, "#" * 1000) for index in range(6)))
+    ended = roboeval("import", "a.jsonl", "--out", "new/run", cwd=tmp_path, before=SMALL_DISK)
+    assert (ended.status, ended.out) == (1, "")
+    assert re.fullmatch(r"roboeval: new/run/completions\.jsonl" + FULL, ended.err)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.jsonl"]
+
+
+def test_a_full_disk_leaves_an_exported_table_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text("".join(map(row, range(12))))
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
+    for kind in ("csv", "parquet"):
+        (tmp_path / "table").write_text("as it was")
+        limit = "ulimit -f 1;"
+        ended = roboeval("export", "run", "--format", kind, "--out", "table", cwd=tmp_path, before=limit)
+        assert ended.status == 1, ended
+        assert re.fullmatch("roboeval: table" + FULL, ended.err)
+        assert (tmp_path / "table").read_text() == "as it was"
+        assert not (tmp_path / "table.new").exists()
+
+
+def test_an_output_that_is_full_or_closed() -> None:
+    ended = roboeval("tasks", "--json", after="> /dev/full")
+    assert ended.status == 1
+    assert ended.err == (
+        "roboeval: the output: No space left on device; make room and give the same command again\n"
+    )
+    assert roboeval("tasks", "--json", after="| head -c 1").err == ""
+
+
+# --- Ctrl-C
+
+
+SLOW = "def task_program():\n    for i in range(150000): pass\n# {}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["a.jsonl", "--out", "run"], "stopped; the same command goes on where it was"),
+        (["kept"], "stopped; the same command goes on where it was"),
+        (["kept", "--redo"], "stopped; the same command without --redo goes on where it was"),
+        (["a.jsonl"], "stopped; nothing is kept (with --out RUN, what was judged would be)"),
+    ],
+)
+def test_ctrl_c_ends_in_one_true_sentence(tmp_path: Path, arguments: list[str], sentence: str) -> None:
+    (tmp_path / "a.jsonl").write_text("".join(row(i, SLOW.format(i)) for i in range(400)))
+    assert roboeval("import", "a.jsonl", "--out", "kept", cwd=tmp_path).status == 0
+    process = subprocess.Popen(
+        [sys.executable, "-m", "roboeval.cli", "evaluate", "--workers", "1", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env=ENVIRONMENT,
+    )
+    assert process.stderr is not None
+    said = process.stderr.readline()
+    assert said.startswith("judging: ")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate()
+    assert (process.returncode, out) == (130, "")
+    assert err.splitlines()[-1] == f"roboeval: {sentence}"
+    assert "Traceback" not in err
+    kept = list(tmp_path.glob("*/evaluations/paper.jsonl"))
+    assert bool(kept) == ("nothing is kept" not in sentence)
 
 
 def test_a_run_that_was_not_judged(tmp_path: Path) -> None:
@@ -240,6 +369,119 @@ def test_json_is_for_machines_alone(run: Path) -> None:
         ended = roboeval(*arguments, "--json")
         assert ended.err == ""
         json.loads(ended.out)
+
+
+def test_a_pipe_is_a_file_of_completions(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row() + row(1, "go_to('nowhere')"))
+    ended = roboeval("evaluate", "--json", cwd=tmp_path, after="<(cat a.jsonl)")
+    assert json.loads(ended.out)["completions"] == 2
+    wrong = roboeval("evaluate", cwd=tmp_path, after="<(cat a.jsonl; echo oops)")
+    assert (wrong.status, wrong.out) == (2, "")
+    assert re.fullmatch(r"roboeval: /dev/fd/\d+, line 3: this line is no JSON\n", wrong.err)
+
+
+def test_the_version() -> None:
+    assert re.fullmatch(r"roboeval \d+\.\d+\.\d+\n", roboeval("--version").out)
+
+
+def pasted(sentence: str, cwd: Path) -> Ended:
+    """How the command ends that a sentence names."""
+    (command,) = re.findall("`([^`]+)`", sentence)
+    name, *arguments = shlex.split(command)
+    assert name == "roboeval"
+    return roboeval(*arguments, cwd=cwd)
+
+
+def test_commands_in_sentences_can_be_pasted(tmp_path: Path) -> None:
+    roboeval("tasks", "--new", "MakeTea", "--suite", "my suite", cwd=tmp_path)
+    (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))
+    imported = roboeval("import", "a.jsonl", "--out", "my run", "--suite", "my suite", cwd=tmp_path)
+    unjudged = refused("show", "my run", "--suite", "my suite", cwd=tmp_path)
+    assert pasted(unjudged, tmp_path).status == 0
+    judged = pasted(imported.err, tmp_path)
+    assert judged.status == 0
+    shown = pasted(judged.err, tmp_path)
+    assert shown.out.startswith("MakeTea/0/0  TaskCompletionError")
+
+
+def test_commands_in_sentences_say_what_was_ablated(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
+    roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
+    unjudged = refused("show", "run", "--ablation", cwd=tmp_path)
+    assert unjudged == "run: has not been judged; `roboeval evaluate run --ablation` does it"
+    judged = pasted(unjudged, tmp_path)
+    assert pasted(judged.err.splitlines()[-1], tmp_path).out.startswith("LunchTime/0/0")
+
+
+def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(
+        "".join(map(row, range(3))) + row(task="LunchTime") + row(task="GetDrink")
+    )
+    options = ("--tasks", "LunchTime,SayGoodDay")
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", *options, cwd=tmp_path).status == 0
+    rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
+    rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:2]))
+    shown = roboeval("show", "run", cwd=tmp_path)
+    assert "2 of 4 completions judged\n" in shown.out
+    assert "not judged yet: LunchTime\n" in shown.out
+    assert "not selected: CountSavory, " in shown.out
+    again = "`roboeval evaluate run --tasks LunchTime,SayGoodDay` goes on"
+    assert shown.err == f"2 of 4 completions judged; {again}\n"
+    data = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
+    assert (data["judged"], data["to_judge"]) == (2, 4)
+    assert data["missing"]["not_judged"] == ["LunchTime"]
+    assert "GetDrink" in data["missing"]["not_selected"]
+    exported = roboeval("export", "run", cwd=tmp_path).err
+    assert exported.startswith("2 of 4 completions judged, and only these are in the table; ")
+    assert pasted(shown.err, tmp_path).status == 0
+    assert roboeval("show", "run", cwd=tmp_path).err == ""
+
+
+def test_a_program_that_was_changed_since_it_was_judged_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text("".join(map(row, range(3))))
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
+    (tmp_path / "run" / "completions.jsonl").write_text(row() + row(1, "say('other')") + row(2, "say('one')"))
+    changed = (
+        "SayGoodDay/0/1 and 1 other row judge another program than stands in run/completions.jsonl now; "
+        "`roboeval evaluate run --redo` judges what stands there"
+    )
+    for what in ((), ("SayGoodDay",), ("SayGoodDay/0",), ("SayGoodDay/0/1",)):
+        assert roboeval("show", "run", *what, cwd=tmp_path).err == changed + "\n"
+    one = roboeval("show", "run", "SayGoodDay/0/1", cwd=tmp_path).out
+    assert "the program that was judged no longer stands in this run" in one
+    assert "other" not in one
+    assert (
+        roboeval("show", "run", "SayGoodDay/0", cwd=tmp_path).out.count("no longer stands in this run") == 2
+    )
+    data = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
+    assert data["stale"] == ["SayGoodDay/0/1", "SayGoodDay/0/2"]
+    assert refused("export", "run", cwd=tmp_path) == changed
+    assert refused("evaluate", "run", cwd=tmp_path) == (
+        "run/evaluations/paper.jsonl, line 2: the program of SayGoodDay/0/1 has changed since it was judged; "
+        "--redo starts over"
+    )
+    assert pasted(changed, tmp_path).status == 0
+    assert roboeval("show", "run", cwd=tmp_path).err == ""
+
+
+@pytest.mark.parametrize(
+    ("models", "label"),
+    [
+        (["recorded:hasty", "recorded:careful"], "(programs written by hand)"),
+        (["recorded:hasty", "gpt"], "(some programs written by hand)"),
+        (["gpt", None], ""),
+    ],
+)
+def test_programs_written_by_hand_are_labelled_by_who_wrote_them(
+    tmp_path: Path, models: list[str | None], label: str
+) -> None:
+    rows = [{**json.loads(row(index)), "model": model} for index, model in enumerate(models)]
+    (tmp_path / "recorded.jsonl").write_text("".join(json.dumps(each) + "\n" for each in rows))
+    judged = roboeval("evaluate", "recorded.jsonl", "--out", "run", cwd=tmp_path)
+    assert judged.out.splitlines()[0] == f"recorded.jsonl {label}".rstrip()
+    assert roboeval("show", "run", cwd=tmp_path).out.splitlines()[0] == f"run {label}".rstrip()
+    for what in ("SayGoodDay", "SayGoodDay/0"):
+        assert roboeval("show", "run", what, cwd=tmp_path).out.splitlines()[0].endswith(label)
 
 
 def test_show_says_why(run: Path) -> None:
@@ -322,7 +564,8 @@ def test_help_costs_little() -> None:
         )
         for _ in range(3)
     )
-    bare = "import sys, typer; print('pydantic' in sys.modules or 'yaml' in sys.modules)"
+    heavy = "{'pydantic', 'yaml', 'rich', 'polars'}"
+    bare = f"import sys, roboeval.cli; print(bool({heavy} & sys.modules.keys()))"
     assert best < 3.0  # a figure for machines far slower than ours; what it costs here stands in the benches
     assert subprocess.run(
         [sys.executable, "-c", bare], capture_output=True, text=True, check=True

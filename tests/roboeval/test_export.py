@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from pathlib import Path
 from typing import Any
 
@@ -121,8 +122,27 @@ def test_half_of_a_surrogate_pair_is_written_out(tmp_path: Path) -> None:
     assert frame["error_message"].item() == r"\ud800"
 
 
+def test_a_table_is_written_where_a_link_leads_and_replaces_nothing_but_files(tmp_path: Path) -> None:
+    (tmp_path / "t").write_text("old")
+    (tmp_path / "link").symlink_to("t")
+    write(table([], []), tmp_path / "link", "csv")
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "t").read_text().startswith("task,")
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    write(table([], []), tmp_path / "pipe", "csv")
+    assert (tmp_path / "pipe").is_fifo()
+    assert os.read(reader, 100).startswith(b"task,")
+    os.close(reader)
+
+
+def test_a_long_table_keeps_its_order() -> None:
+    rows = [{**row(verdict("in")), "index": index} for index in range(25_000)]
+    assert table(iter(rows), [])["index"].to_list() == list(range(25_000))
+
+
 def test_a_wrong_format_or_place_is_explained(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r'^there is no format "xlsx"; choose one of csv, parquet$'):
         write(table([], []), tmp_path / "t", "xlsx")
-    with pytest.raises(BadInput, match="cannot be written"):
+    with pytest.raises(BadInput, match=r"no: there is no such folder$"):
         write(table([], []), tmp_path / "no" / "t.csv", "csv")

@@ -13,10 +13,14 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
+from codebotler.models.recorded import read_replies
 from codebotler.rtl import Formula, Regex, Without, Words, holds, parse
 from codebotler.rtl.formula import CutName
 from codebotler.trace import Event, Option, Trace
+from roboeval.catalogue import new_task
+from roboeval.evaluate import evaluate
 from roboeval.lint import Finding, lint, lint_suite, render
+from roboeval.records import Completion
 from roboeval.satisfiability import Automaton, Reasoner, Undecided
 from roboeval.suite import Suite, load_suite
 from roboeval.witnesses import can_match, representative_texts, samples
@@ -120,8 +124,10 @@ def test_a_requirement_that_follows_from_another(linted: Lint) -> None:
     checks = {"greets": GREETS_THERE, "goes": GOES, "speaks": SPEAKS}
     (one, other) = linted(checks, ["greets", "goes", "speaks"])
     assert (one.name, other.name) == ("implied: goes", "implied: speaks")
-    reason = "so it is never the only one to fail"
-    assert one.message == f'"goes" follows from "greets" in world 1, {reason}'
+    assert one.message == (
+        'no sequence of the texts that were tried breaks "goes" in world 1 without breaking "greets"; '
+        "it may never be the only one to fail"
+    )
     assert linted(checks, ["goes", "speaks"], ["greets"]) == []
 
 
@@ -130,13 +136,14 @@ def test_a_requirement_that_follows_from_several(linted: Lint) -> None:
     checks = {"greets": GREETS_THERE, "asks_first": asks_first}
     checks["asks"] = 'tr.ActAtFirst("kitchen", ask("tea", ".*"))'
     (finding,) = linted(checks, ["greets", "asks_first", "asks"])
-    assert '"asks" follows from "greets" and "asks_first"' in finding.message
+    assert 'breaks "asks" in world 1 without breaking one of "greets" and "asks_first"; ' in finding.message
     assert linted(checks, ["asks_first", "asks"], ["greets", "asks"]) == []
 
 
 def test_a_requirement_that_always_holds(linted: Lint) -> None:
     (finding,) = linted({"any": 'tr.AtLeast(say("a"), 0)'}, ["any"])
-    assert '"any" holds whatever the robot does' in finding.message
+    tried = 'no sequence of the texts that were tried breaks "any" in world 1'
+    assert finding.message == f"{tried}; it may never be the only one to fail"
 
 
 def test_what_takes_too_long_is_said(linted: Lint) -> None:
@@ -265,6 +272,84 @@ def test_one_of_several_alternatives_that_is_not_in_the_world(linted: Lint) -> N
     assert linted({"goes": 'tr.Exists(goto("kitchen|conference room"))'}, ["goes"]) == []
 
 
+@pytest.mark.parametrize(
+    ("pattern", "absent"),
+    [
+        ("(kitchen|attic)", ["attic"]),
+        ("^(?:the )?(?:kitchen|attic)$", ["^(?:the )?attic$"]),
+        ("the (kitchen|attic) please|conference room", ["the attic please"]),
+        (r"kitchen|\\battic\\b", [r"\battic\b"]),
+        ("(kitchen|attic)?", []),
+        ("(kitchen|attic)+", []),
+        ("(kitchen|conference room)", []),
+        ("(red|blue)? kitchen", []),
+        ("[|(]?kitchen", []),
+        (r"(kitchen|attic)(\\1)?", []),
+        ("kitchen|", []),
+    ],
+)
+def test_alternatives_in_a_group(linted: Lint, pattern: str, absent: list[str]) -> None:
+    found = linted({"goes": f'tr.Exists(goto("{pattern}"))'}, ["goes"])
+    assert [one.subject.removesuffix(" in goes") for one in found if one.kind == "absent"] == absent
+
+
+@pytest.mark.parametrize(
+    ("element", "absent"),
+    [
+        ('say("hello bob")', ["bob"]),
+        ('say(words("hello", r"\\b(ann|Bob)\\b"))', ["bob"]),
+        ('say(r"(?=.*bob).*")', ["bob"]),
+        ('ask("is bob in?", "yes")', ["bob"]),
+        ('ask("who?", "bob|ann")', ["bob"]),
+        ('say("bobsleigh")', []),
+        ('say("hello ann")', []),
+        ('say("carol is out")', []),
+        ('say("nobody")', []),
+    ],
+)
+def test_a_person_in_a_text_who_is_in_another_world_only(
+    tmp_path: Path, element: str, absent: list[str]
+) -> None:
+    new_task(tmp_path, "Hello")
+    path = tmp_path / "tasks" / "Hello.yaml"
+    text = path.read_text().replace("[kitchen, start_loc]", '[kitchen, start_loc, "carol\'s office"]')
+    text = text.replace("name: kim", "name: bob")
+    first, second = text.split("  - about: nobody is in the kitchen")
+    second = second.replace(
+        "    require:", "    people: {kitchen: [{name: ann}]}\n    require:\n      - mentions"
+    )
+    check = f"checks:\n  mentions: {{category: Location, rtl: {json.dumps(f'tr.Exists({element})')}}}\n"
+    first = re.sub("checks:.*\n", lambda _: check, first)
+    path.write_text(f"{first}  - about: nobody is in the kitchen{second}")
+    suite = load_suite(str(tmp_path))
+    found = lint(suite.task("Hello"), suite, verdicts=[])
+    assert [one.subject for one in found if one.kind == "absent"] == [
+        f"{name} in mentions" for name in absent
+    ]
+
+
+def test_worlds_that_require_the_same_in_other_words(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "mute": 'tr.Count(say("hello"), 0)', "goes": GOES}
+    checks["says_once"] = 'tr.AtLeast(say("hello"), 1) and not tr.AtLeast(say("hello"), 2)'
+    checks["says_1"] = 'tr.Count(say("hello"), 1)'
+    assert "same-worlds: 1 and 2" in names(linted(checks, ["speaks"], ["not mute"]))
+    assert "same-worlds: 1 and 2" in names(linted(checks, ["goes", "says_1"], ["says_once", "goes"]))
+    assert "same-worlds: 1 and 2" in names(linted(checks, ["says_1"], ["speaks", "says_once"]))
+    for one, other in ((["speaks"], ["says_1"]), (["says_1"], ["speaks"]), (["goes"], ["goes", "speaks"])):
+        assert "same-worlds" not in [each.kind for each in linted(checks, one, other)]
+
+
+def test_worlds_of_an_ablation_that_require_the_same(linted: Lint) -> None:
+    def ablated(*texts: str) -> list[str]:
+        require = "\n    ".join(("require: {require}", "ablation: [" + ", ".join(texts) + "]"))
+        found = linted(checks, ["speaks"], ["goes"], replaced=("require: {require}", require))
+        return [each.name for each in found if each.kind == "same-worlds"]
+
+    checks = {"speaks": SPEAKS, "goes": GOES}
+    assert ablated("speaks") == ["same-worlds: ablation 1 and 2"]
+    assert ablated() == ["same-worlds: ablation 1 and 2"]
+
+
 def test_worlds_that_require_the_same(linted: Lint) -> None:
     checks = {"speaks": SPEAKS, "goes": GOES}
     (finding,) = linted(checks, ["speaks", "goes"], ["speaks"], ["goes", "speaks"])
@@ -297,6 +382,31 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert render([]) == ""
     monkeypatch.chdir(tmp_path / "suite0" / "recorded")
     assert render(findings).startswith(f"{path}:6: ")
+
+
+# --- a new task
+
+
+def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path: Path) -> None:
+    new_task(tmp_path, "MakeTea")
+    suite = load_suite(str(tmp_path))
+    assert lint_suite(suite) == []
+    task = suite.task("MakeTea")
+    replies = read_replies(tmp_path / "recorded" / "mine" / "MakeTea.yaml")[task.prompts[0]]
+    rows = [
+        Completion(task="MakeTea", prompt=0, index=i, program=reply.program)
+        for i, reply in enumerate(replies)
+    ]
+    kinds = [(row["failure"] or {"kind": None})["kind"] for row in evaluate(rows, suite, workers=1)]
+    assert kinds == [reply.fails for reply in replies] == [None, "SayAtLocation", "SayAtLocation"]
+
+
+def test_a_new_task_leaves_programs_that_are_recorded_for_it(tmp_path: Path) -> None:
+    recorded = tmp_path / "recorded" / "careful" / "MakeTea.yaml"
+    recorded.parent.mkdir(parents=True)
+    recorded.write_text("[]\n")
+    new_task(tmp_path, "MakeTea")
+    assert [*tmp_path.glob("recorded/*/*")] == [recorded]
 
 
 # --- the paper's suite

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[dict[str, Any]
 
 def careful_run(path: Path, suite: Suite) -> Run:
     run = Run(path)
-    run.keep(Source("recorded:careful", lambda: recorded_completions("recorded:careful", suite)), suite)
+    run.keep(Source(lambda: recorded_completions("recorded:careful", suite)))
     return run
 
 
@@ -86,7 +87,7 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
         *[f"{GREETS}\n# {n}\n" + "x = [0] * " + str(n * 1000) for n in range(20)],
         ADDRESS + "#",
     ]
-    results = []
+    results, hashes = [], []
     for workers in (1, 4):
         run = a_run(tmp_path / f"run{workers}", programs)
         script = (
@@ -98,8 +99,11 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
             f"workers={workers}): pass\n"
         )
         subprocess.run([sys.executable, "-c", script], check=True)
+        assert run.programs("paper").read_bytes().count(b"\n") == len(programs)
         results.append(run.rows("paper").read_bytes())
+        hashes.append(run.programs("paper").read_bytes())
     assert results[0] == results[1]
+    assert hashes[0] == hashes[1]
     said = [event[1] for event in json.loads(results[0].splitlines()[0])["verdicts"][0]["trace"]]
     assert said[0].startswith("<object object at 0x")
 
@@ -129,6 +133,8 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     assert kills >= 3
     rows = judged(run, paper)
     assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
+    assert run.programs("paper").read_bytes() == whole.programs("paper").read_bytes()
+    assert run.head("paper").read_bytes() == whole.head("paper").read_bytes()
     assert len(rows) == sum(1 for _ in read_completions(run.completions))
 
 
@@ -140,6 +146,63 @@ def test_a_torn_last_row_is_judged_again(tmp_path: Path, paper: Suite, cut: int)
     run.rows("paper").write_bytes(whole[:-cut])
     judged(run, paper)
     assert run.rows("paper").read_bytes() == whole
+
+
+@pytest.mark.parametrize("more", ["0" * 64 + "\n", "0" * 30, ""])
+def test_a_hash_that_a_crash_left_without_its_row_is_dropped(tmp_path: Path, paper: Suite, more: str) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    rows, hashes = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
+    run.rows("paper").write_bytes(b"".join(rows.splitlines(keepends=True)[:2]))
+    run.programs("paper").write_bytes(hashes[:130] + more.encode())
+    judged(run, paper)
+    assert run.rows("paper").read_bytes() == rows
+    assert run.programs("paper").read_bytes() == hashes
+
+
+@pytest.mark.parametrize("left", [0, 64, 65, 100])
+def test_a_row_without_the_hash_of_its_program_is_judged_again(
+    tmp_path: Path, paper: Suite, left: int
+) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    rows, hashes = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
+    run.programs("paper").write_bytes(hashes[:left])
+    assert len(judged(run, paper)) == 3
+    assert run.rows("paper").read_bytes() == rows
+    assert run.programs("paper").read_bytes() == hashes
+
+
+def test_a_program_that_was_changed_is_refused_unless_all_is_redone(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    kept = run.completions.read_bytes()
+    run.completions.write_bytes(kept.replace(b"#1", b"#one"))
+    before = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
+    changed = r"line 2: the program of SayGoodDay/0/1 has changed since it was judged; --redo starts over"
+    with pytest.raises(BadInput, match=changed):
+        judged(run, paper)
+    assert before == (run.rows("paper").read_bytes(), run.programs("paper").read_bytes())
+    run.completions.write_bytes(kept)
+    assert len(judged(run, paper)) == 3
+    run.completions.write_bytes(kept.replace(b"#1", b"#one"))
+    judged(run, paper, redo=True)
+    assert len(judged(run, paper)) == 3
+
+
+def test_a_program_that_is_changed_while_it_waits_is_tied_to_what_was_judged(
+    tmp_path: Path, paper: Suite
+) -> None:
+    run = a_run(tmp_path / "run", [f"{GREETS}# {n:03}" for n in range(300)])
+    kept = run.completions.read_bytes()
+    rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False, workers=1)
+    next(rows)
+    run.completions.write_bytes(kept.replace(b"# 299", b"# abc"))
+    assert len(list(rows)) == 299
+    assert len(judged(run, paper)) == 300
+    run.completions.write_bytes(kept)
+    with pytest.raises(BadInput, match="SayGoodDay/0/299 has changed"):
+        judged(run, paper)
 
 
 def test_a_finished_evaluation_runs_nothing_again(tmp_path: Path, paper: Suite) -> None:
@@ -206,8 +269,8 @@ def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, pape
     with run.completions.open("ab") as file:
         file.write(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": GREETS}))
     source = open_source(str(run.path), paper)
-    assert [c.task for c in source.checked(paper, frozenset({"LunchTime"}))] == ["LunchTime"]
-    assert [c.task for c in source.checked(paper)] == ["SayGoodDay", "LunchTime"]
+    assert [c.task for c in source.of(frozenset({"LunchTime"}))] == ["LunchTime"]
+    assert [c.task for c in source.of(None)] == ["SayGoodDay", "LunchTime"]
 
 
 def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> None:
@@ -225,6 +288,33 @@ def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> 
     with pytest.raises(BadInput, match="this run holds other completions"):
         careful_run(run.path, paper)
     assert run.completions.read_bytes() == before
+
+
+@pytest.mark.parametrize("more", [GREETS, None])
+def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more: str | None) -> None:
+    run = a_run(tmp_path / "run", [GREETS, "#"])
+    other = a_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
+    with pytest.raises(BadInput, match="this run holds other completions"):
+        run.keep(open_source(str(other.path), paper))
+    assert run.keep(open_source(str(run.path), paper)) == 2
+
+
+def test_a_run_that_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
+    times = 0
+
+    def read() -> Iterator[Completion]:
+        nonlocal times
+        times += 1
+        yield Completion(task="SayGoodDay", prompt=0, index=0, program=GREETS)
+        if times > 1:
+            raise KeyboardInterrupt
+
+    (tmp_path / "there").mkdir()
+    for path in (tmp_path / "there" / "run", tmp_path / "new" / "run", tmp_path / "there"):
+        times = 0
+        with pytest.raises(KeyboardInterrupt):
+            Run(path).keep(Source(read))
+    assert sorted(path.name for path in tmp_path.rglob("*")) == [".lock", "there"]
 
 
 def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Path, paper: Suite) -> None:
@@ -275,6 +365,6 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     path = tmp_path / "rows.jsonl"
     path.write_bytes(to_line(row))
     run = Run(tmp_path / "run")
-    run.keep(open_source(str(path), paper), paper)
+    run.keep(open_source(str(path), paper))
     assert [c.model_dump(exclude_unset=True) for c in read_completions(run.completions)] == [row]
     assert Completion.model_validate(row).key == ("SayGoodDay", 0, 0)

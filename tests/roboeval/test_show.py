@@ -15,7 +15,7 @@ from codebotler.rtl import parse
 from codebotler.simulator.rules import Rules
 from codebotler.trace import Event, Option, Outcome, RunError, Status
 from codebotler.world import Person, Room, World
-from roboeval.evaluate import evaluation, judge
+from roboeval.evaluate import evaluation, judge, judgement
 from roboeval.records import Completion
 from roboeval.show import (
     Selection,
@@ -74,7 +74,7 @@ def completion(index: int = 0, program: str = "x = 1\ny = 2\n", **fields: Any) -
 def row(written: Completion, *outcomes: Outcome, ablated: bool = False) -> dict[str, Any]:
     scenarios = TASK.judged_in(ablated=ablated)
     verdicts = [judge(o, s) for o, s in zip(outcomes, scenarios, strict=False)]
-    return json.loads(json.dumps(evaluation(written, verdicts)))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(evaluation(written, judgement(verdicts))))  # type: ignore[no-any-return]
 
 
 def failed(status: Status, kind: str, message: str, *events: Event, line: int | None = None) -> Outcome:
@@ -180,7 +180,7 @@ def test_what_was_not_recorded_is_said_and_not_taken_from_the_suite(written: Com
     text = printed(completion_view(row(completion(), FINE), written, SUITE))
     assert "instruction not recorded" in text
     assert "Visit Amy." not in text
-    assert ("program not recorded" in text) == (written is None)
+    assert ("the program that was judged no longer stands in this run" in text) == (written is None)
 
 
 def test_a_completion_as_data_holds_every_step() -> None:
@@ -213,7 +213,7 @@ def test_worlds_of_one_name_are_told_apart_by_their_order() -> None:
         SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, ()), Scenario(WORLD, (BIDS,))))}
     )
     verdicts = [judge(MUTE, scenario) for scenario in suite.tasks["Visit"].scenarios]
-    data = completion_data(evaluation(completion(), verdicts), completion(), suite)
+    data = completion_data(evaluation(completion(), judgement(verdicts)), completion(), suite)
     assert '"bye"' in data["worlds"][1]["failed_checks"][0]["explanation"]
 
 
@@ -252,7 +252,7 @@ def test_a_step_that_an_explanation_names_is_never_left_out() -> None:
     suite = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, (once,)),))})
     trace = (*[Event("check", f"n{i}", found=False) for i in range(500)], Event("say", "hm"), *[GOTO] * 100)
     verdict = judge(Outcome(Status.FINISHED, trace), suite.tasks["Visit"].scenarios[0])
-    text = printed(completion_view(evaluation(completion(), [verdict]), completion(), suite))
+    text = printed(completion_view(evaluation(completion(), judgement([verdict])), completion(), suite))
     assert '\n     ... 488 more ...\n501      said "hm"\n     ... 94 more ...\n' in text
 
 

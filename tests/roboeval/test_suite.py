@@ -85,7 +85,28 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, s
 @pytest.mark.parametrize(
     ("suite", "sentence"),
     [
-        ("name: mine\nversion: one\n", "line 2: \"version\" is 'one', but it should be a valid integer"),
+        ("name: mine\nversion: one\n", 'line 2: "version" is a text, not a whole number'),
+        (
+            "name: mine\nversion: 1\nrules: {limits: {seconds: .inf}}\n",
+            'line 3: "seconds" is no finite number',
+        ),
+        (SUITE + "rules: {limits: {calls: yes}}\n", 'line 3: "calls" is a truth value, not a whole number'),
+        (
+            SUITE + "rules: {limits: {ticks: 1000000001}}\n",
+            'line 3: "ticks" is 1000000001, but it should be less than or equal to 1000000000',
+        ),
+        (
+            SUITE + "rules: {clock_starts: 5}\n",
+            'line 3: "clock_starts" is 5, but it should be a time from 1970',
+        ),
+        (
+            SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00\n",
+            'line 4: "clock_starts" is 2024-01-01 12:00:00, but it should be a time from 1970 to 2099',
+        ),
+        (
+            SUITE + "rules:\n  clock_starts: 9999-12-31T23:59:59Z\n",
+            "but it should be a time from 1970 to 2099",
+        ),
         (SUITE + "rules: {literals: loud}\n", "line 3: \"literals\" is 'loud', but it should be"),
         (SUITE + "rules: {gravity: 9.81}\n", 'line 3: the key "gravity" means nothing here'),
         (SUITE + "rules: {skill_seconds: 2}\n", 'line 3: "skill_seconds" is 2, but it should be 0'),
@@ -96,6 +117,11 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, s
 def test_a_rule_that_is_not_known_gets_a_sentence(tmp_path: Path, suite: str, sentence: str) -> None:
     with pytest.raises(BadInput, match=re.escape(sentence)):
         load_suite(a_suite(tmp_path, suite=suite))
+
+
+def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
+    suite = load_suite(a_suite(tmp_path, suite=SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00+02:00\n"))
+    assert suite.rules.clock_starts.timestamp() == 1_704_103_200
 
 
 def test_an_unknown_suite_gets_a_sentence() -> None:
@@ -119,10 +145,8 @@ def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) 
     folder = tmp_path / "my suite"
     new_task(folder, "MakeTea")
     suite = load_suite(str(folder))
-    assert [requirement.check for requirement in suite.task("MakeTea").scenarios[0].require] == [
-        "visits",
-        "announces_tea",
-    ]
+    required = [[r.text for r in scenario.require] for scenario in suite.task("MakeTea").scenarios]
+    assert required == [["announces_tea"], ['visits("kitchen")', "not announces_tea"]]
     with pytest.raises(BadInput, match="is there already"):
         new_task(folder, "MakeTea")
     with pytest.raises(BadInput, match="is no name for a task"):

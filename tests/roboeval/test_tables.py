@@ -1,9 +1,7 @@
-"""Counts of an evaluation, and that nothing a model wrote reaches the terminal as more than text."""
+"""A part of a run as tables, and that nothing a model wrote reaches the terminal as more than text."""
 
 from __future__ import annotations
 
-import json
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,8 +14,8 @@ from codebotler.simulator.rules import Rules
 from roboeval import tables
 from roboeval.records import Completion
 from roboeval.suite import Suite, Task
-from roboeval.tables import Selection, parse_selection, summary, summary_data, visible
-from roboeval.taxonomy import CATEGORIES, PYTHON_KINDS, ROBOT_KINDS
+from roboeval.summary import render, summary
+from roboeval.tables import Selection, parse_selection, visible
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800\n"
 SHOWN = r"[red]x[/red]\x1b[2J\x07\u202e\ud800\n"
@@ -59,79 +57,6 @@ def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False
     return captured.get()
 
 
-def test_a_summary_counts_tasks_prompts_and_failures() -> None:
-    data = summary_data(summary(iter(ROWS), SUITE, k=(1, 2)))
-    assert (data["completions"], data["passed"], data["missing"]) == (4, 1, ["Wait"])
-    assert data["pass@1"]["mean"] == 0.25
-    assert data["pass@2"]["mean"] == 0.5
-    (task,) = data["tasks"]
-    assert task["pass@1"] == {"mean": 0.25, "lowest": 0.0, "highest": 0.5}
-    assert task["pass@2"] == {"mean": 0.5, "lowest": 0.0, "highest": 1.0}
-    assert task["prompts"] == [
-        {"prompt": 0, "completions": 2, "passed": 1, "pass@1": 0.5, "pass@2": 1.0},
-        {"prompt": 1, "completions": 2, "passed": 0, "pass@1": 0.0, "pass@2": 0.0},
-    ]
-    counts = [(each["class"], each["count"], each["share"]) for each in data["failures"]]
-    assert counts == [
-        ("PythonError", 2, 0.5),
-        ("RobotExecutionError", 0, 0.0),
-        ("TaskCompletionError", 1, 0.25),
-    ]
-    json.dumps(data)
-
-
-def test_all_known_kinds_are_always_listed_and_others_after_them() -> None:
-    kinds = [[kind.name for kind in each.kinds] for each in summary(ROWS, SUITE).failures]
-    assert kinds == [[*PYTHON_KINDS, "MemoryError"], [*ROBOT_KINDS], [*CATEGORIES]]
-
-
-def test_each_prompt_counts_the_same_however_many_completions_it_has() -> None:
-    rows = [row(0, 0), row(1, 0), *(row(1, i, ("PythonError", "KeyError")) for i in range(1, 4))]
-    assert summary(rows, SUITE).overall[0].mean == (1 + 0.25) / 2
-
-
-def test_tasks_stand_in_the_order_of_the_suite() -> None:
-    rows = [row(0, 0, task="Wait"), row(0, 0)]
-    assert [task.task for task in summary(rows, SUITE).tasks] == ["Visit", "Wait"]
-
-
-def test_nothing_to_count_is_said() -> None:
-    with pytest.raises(BadInput, match=r"^no completion has been judged, so there is nothing to count$"):
-        summary([], SUITE)
-
-
-@pytest.mark.parametrize("k", [0, 3])
-def test_a_k_that_cannot_be_estimated_is_refused(k: int) -> None:
-    with pytest.raises(BadInput, match=r"choose k from 1 to 2$"):
-        summary(ROWS, SUITE, k=(k,))
-
-
-@pytest.mark.parametrize("width", [80, 120])
-def test_the_tables_fit_and_break_no_number(width: int) -> None:
-    rows = [row(p, i, ("PythonError", "NameError")) for p in range(2) for i in range(2000)]
-    text = printed(tables.render(summary(rows, SUITE, k=(1, 2)), title="runs/one"), width)
-    assert max(map(len, text.splitlines())) <= width
-    assert "runs/one" in text
-    assert "Visit" in text
-    assert "4,000 of 4,000 completions failed (100.0%)" in text
-    assert "pass@2 over all prompts: 0.000 (95% interval 0.000 to 0.000, 2 prompts)" in text
-    assert "no completions of Wait" in text
-    assert re.search(r"\n  NameError +4,000  100\.0%", text)
-    assert "ExhaustiveSearch" in text
-
-
-def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:
-    text = printed(tables.render(summary([row(0, 0)], SUITE), title="x"))
-    assert "interval" not in text
-    assert "SyntaxError" not in text
-
-
-def test_an_ablation_is_named_and_misses_no_task() -> None:
-    text = printed(tables.render(summary(ROWS, SUITE), title="x", ablated=True))
-    assert "x (ablation: only common sense was required)" in text
-    assert "Wait" not in text
-
-
 def test_a_task_is_shown_prompt_by_prompt() -> None:
     completions = [
         Completion(task="Visit", prompt=0, index=i, program="", instruction="Visit her.") for i in range(2)
@@ -141,6 +66,7 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
     assert data["prompts"][0] == {
         "prompt": 0,
         "instructions": ["Visit her."],
+        "models": [],
         "completions": 2,
         "passed": 1,
         "pass@1": 0.5,
@@ -162,7 +88,7 @@ def test_what_a_model_wrote_is_text(*, colour: bool) -> None:
     rows = [row(0, 0, ("PythonError", HOSTILE))]
     completions = [Completion(task="Visit", prompt=0, index=0, program="", instruction=HOSTILE)]
     views = [
-        tables.render(summary(rows, SUITE), title=HOSTILE),
+        render(summary(rows, SUITE), title=HOSTILE),
         tables.task_view(rows, completions, SUITE, "Visit"),
     ]
     for view in views:

@@ -26,6 +26,7 @@ from codebotler.rtl import (
     holds,
     parse,
 )
+from codebotler.rtl.syntax import DEEPEST
 from codebotler.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.trace import Event
 
@@ -176,6 +177,40 @@ def test_says_what_is_wrong_and_where(text: str, column: int, words: str) -> Non
 def test_deep_nesting_is_an_error_and_no_crash(text: str) -> None:
     with pytest.raises(RtlSyntaxError):
         parse(text)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "unit", "column"),
+    [
+        ('{}tr.Exists(say("a"))', "not ", 205),
+        ('tr{}.Exists(say("a"))', '.AfterFirst(say("a"))', 1),
+        ('tr.Exists(say({}"a"{}))', "words(", 321),
+    ],
+)
+def test_50_are_deep_enough_and_51_too_deep(pattern: str, unit: str, column: int) -> None:
+    close = ")" * unit.endswith("(")
+    text = pattern.format(unit * DEEPEST, close * DEEPEST)
+    assert str(parse(text)) == text
+    with pytest.raises(RtlSyntaxError, match="this is nested more than 50 deep") as caught:
+        parse(pattern.format(unit * (DEEPEST + 1), close * (DEEPEST + 1)))
+    assert caught.value.column == column
+
+
+def test_each_part_of_a_constraint_may_be_deep() -> None:
+    deep = "not " * (DEEPEST - 1) + 'tr.Exists(say("a"))'
+    assert str(parse(f"{deep} and {deep}")) == f"{deep} and {deep}"
+    with pytest.raises(RtlSyntaxError, match="nested more than"):
+        parse(f"{deep} and not {deep}")
+
+
+@pytest.mark.parametrize("test", ["Count", "AtLeast"])
+def test_a_number_may_be_the_largest_and_no_larger(test: str) -> None:
+    text = f'tr.{test}(say("a"), 1000000000)'
+    assert str(parse(text)) == text
+    assert not holds(parse(text), (Event("say", "a"),))
+    with pytest.raises(RtlSyntaxError, match="expected a number of at most 1000000000") as caught:
+        parse(f'tr.{test}(say("a"), 1000000001)')
+    assert caught.value.column == text.index("1000") + 1
 
 
 def test_nothing_is_evaluated() -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or, Stay
-from codebotler.rtl.semantics import CannotJudge, at_place, first, first_stay, holds, matches
+from codebotler.rtl.semantics import CannotJudge, at_place, cut, first, first_stay, holds, matches
 from codebotler.rtl.window import Window
 from codebotler.rtl.wording import (
     did,
@@ -20,17 +20,19 @@ from codebotler.rtl.wording import (
     pastimes,
     room,
     room_name,
+    shortened,
     times,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from codebotler.rtl.formula import Element, Formula, Test
     from codebotler.rtl.wording import Deed
     from codebotler.trace import Trace
 
 _MOST = 5
+_ROBOT = "the robot "
 
 
 @dataclass(frozen=True)
@@ -59,14 +61,34 @@ def explain(formula: Formula, trace: Trace) -> Explanation | None:
         if holds(formula, trace):
             return None
     except CannotJudge as error:
-        return _unjudged(formula, trace, error)
-    return _why_false(formula, trace)
+        reason = _unjudged(formula, trace, error)
+    else:
+        reason = _why_false(formula, trace)
+    # A text that a robot says or a formula looks for may hold line breaks.
+    return Explanation(reason.clause, reason.event, " ".join((reason.told + reason.detail).split()))
 
 
-def _unjudged(formula: Formula, trace: Trace, error: CannotJudge) -> Explanation:
+@dataclass(frozen=True)
+class _Reason:
+    """Why a formula fails.
+
+    Args:
+        clause: the smallest part of the formula, or its negation, that makes it fail.
+        event: what makes it fail.
+        told: what is or is not so.
+        detail: what comes nearest to it, or what there is to see, from a colon on.
+    """
+
+    clause: Formula
+    event: int | None
+    told: str
+    detail: str = ""
+
+
+def _unjudged(formula: Formula, trace: Trace, error: CannotJudge) -> _Reason:
     option = f"option {error.number + 1} of the question at step {error.event + 1}"
-    sentence = f"{option} is no text but {error.option.text}, so what was required cannot be judged"
-    return Explanation(_unjudged_part(formula, trace), error.event, sentence)
+    told = f"{option} is no text but {shortened(error.option.text)}, so what was required cannot be judged"
+    return _Reason(_unjudged_part(formula, trace), error.event, told)
 
 
 def _unjudged_part(formula: Formula, trace: Trace) -> Formula:
@@ -85,7 +107,7 @@ def _unjudged_part(formula: Formula, trace: Trace) -> Formula:
     return formula
 
 
-def _why_false(formula: Formula, trace: Trace) -> Explanation:
+def _why_false(formula: Formula, trace: Trace) -> _Reason:
     match formula:
         case And(parts):
             return _why_false(next(part for part in parts if not holds(part, trace)), trace)
@@ -97,17 +119,32 @@ def _why_false(formula: Formula, trace: Trace) -> Explanation:
             return _Absence(formula, (formula.element,), trace).explain()
 
 
-def _why_none(formula: Or, parts: tuple[Formula, ...], trace: Trace) -> Explanation:
+def _why_none(formula: Or, parts: tuple[Formula, ...], trace: Trace) -> _Reason:
     if test := _one_test(parts):
         reason = _Absence(test, tuple(_test(part).element for part in parts), trace).explain()
-        return Explanation(formula, reason.event, reason.sentence)
-    reasons = [_why_false(part, trace) for part in parts]
+        return replace(reason, clause=formula)
+    reasons = [_why_false(part, trace) for part in _alternatives(parts)]
     likeliest = next((reason for reason in reasons if reason.event is not None), reasons[0])
     if len(reasons) == 2:  # noqa: PLR2004 - only two are short enough to be told both
-        sentence = f"one of two things had to be so, but {reasons[0].sentence}, and {reasons[1].sentence}"
+        other = reasons[likeliest is reasons[0]]
+        told = f"one of two things had to be so, but {other.told}, and {_again(likeliest.told)}"
     else:
-        sentence = f"one of {len(reasons)} things had to be so, but none is; for one, {likeliest.sentence}"
-    return Explanation(formula, likeliest.event, sentence)
+        told = f"one of {len(reasons)} things had to be so, but none is; for one, {likeliest.told}"
+    return _Reason(formula, likeliest.event, told, likeliest.detail)
+
+
+def _alternatives(parts: tuple[Formula, ...]) -> Iterator[Formula]:
+    """The parts of an `or`, and those of an `or` among them in its stead."""
+    for part in parts:
+        if isinstance(part, Or) and not _one_test(part.parts):
+            yield from _alternatives(part.parts)
+        else:
+            yield part
+
+
+def _again(told: str) -> str:
+    """What is told after something else of the robot."""
+    return f"it {told.removeprefix(_ROBOT)}" if told.startswith(_ROBOT) else told
 
 
 def _one_test(parts: Sequence[Formula]) -> Test | None:
@@ -145,7 +182,7 @@ class _Absence:
         self.window = Window(test.cuts, trace)
         self.where = self.window.told()
 
-    def explain(self) -> Explanation:
+    def explain(self) -> _Reason:
         match self.test:
             case Exists():
                 return self.nowhere()
@@ -162,16 +199,16 @@ class _Absence:
                 return self.miscounted(number, "at least ")
         assert_never(self.test)
 
-    def nowhere(self) -> Explanation:
+    def nowhere(self) -> _Reason:
         if not self.trace:
             return self.because(
                 f"the robot did nothing at all, so it never {did(self.deed, 'past', never=True)}"
             )
         event, detail = self.instead(range(*self.window.span))
-        never = f"never {did(self.deed, 'past', never=True)}{self.where}{detail}"
-        return self.because(self.robot() + never, event)
+        never = f"never {did(self.deed, 'past', never=True)}{self.where}"
+        return self.because(self.robot() + never, event, detail)
 
-    def never_went(self) -> Explanation:
+    def never_went(self) -> _Reason:
         assert isinstance(self.test, ActAtFirst | ActAtSome)
         arrival = self.test.stay.arrival
         if not self.trace:
@@ -180,8 +217,8 @@ class _Absence:
             range(*self.window.span)
         )
         never = f"{self.never_arrived()}{self.window.told_until()}, where it was to "
-        never += f"{did(self.deed, 'base')}{detail}"
-        return self.because(self.window.told_after() + self.robot() + never)
+        never += did(self.deed, "base")
+        return self.because(self.window.told_after() + self.robot() + never, detail=detail)
 
     def robot(self) -> str:
         """The subject, after what should have begun the part of the trace but never happened."""
@@ -194,10 +231,11 @@ class _Absence:
         assert isinstance(self.test, ActAtFirst | ActAtSome)
         return f"never {did((self.test.stay.arrival,), 'past', never=True)}"
 
-    def not_there(self, stay: list[int], place: str, moves: Stay) -> Explanation:
+    def not_there(self, stay: list[int], place: str, moves: Stay) -> _Reason:
         span = self.window.span
         arrivals = [at for at in range(*span) if matches(moves.arrival, self.trace, at)]
-        outside = [at for at in arrivals if at not in set(stay)]
+        inside = set(stay)
+        outside = [at for at in arrivals if at not in inside]
         if isinstance(self.test, ActAtFirst):
             there = "there" if len(outside) == 1 else "during that stay"
             went = f"went to {room_name(self.trace[arrivals[0]].text)} at step {arrivals[0] + 1}"
@@ -209,20 +247,17 @@ class _Absence:
             only = pastimes(self.trace[at] for at in stay)
             detail = f": it only {only}" if only else ": it did nothing there"
         failed = f"did not {did(self.deed, 'base', never=True)} {there}"
-        sentence = f"{self.window.told_after()}the robot {went} but {failed}"
-        return self.because(
-            sentence + self.window.told_until() + detail, arrivals[0] if event is None else event
-        )
+        told = f"{self.window.told_after()}the robot {went} but {failed}{self.window.told_until()}"
+        return self.because(told, arrivals[0] if event is None else event, detail)
 
-    def miscounted(self, number: int, least: str) -> Explanation:
+    def miscounted(self, number: int, least: str) -> _Reason:
         found = [at for at in range(*self.window.span) if _seen(self.deed[0], self.trace, at)]
         if not found:
             never = self.nowhere()
             often = "" if number == 1 else f", but it should have {least}{times(number)}"
-            return self.because(never.sentence + often, never.event)
+            return replace(never, told=never.told + often)
         if number == 0:
-            must_not = _presence(Exists(self.deed[0], self.test.cuts), self.trace)
-            return self.because(must_not.sentence, must_not.event)
+            return replace(_presence(Exists(self.deed[0], self.test.cuts), self.trace), clause=self.test)
         told = f"the robot {did(self.deed, 'past')} {times(len(found))} ({_steps(found)}){self.where}"
         event = found[number] if len(found) > number else None
         return self.because(f"{told} instead of {least}{times(number)}", event)
@@ -245,9 +280,10 @@ class _Absence:
     def went(self, here: Sequence[int]) -> str:
         rooms = dict.fromkeys(self.trace[at].text for at in here if self.trace[at].kind == "goto")
         if not rooms:
-            return "" if any(event.kind == "goto" for event in self.trace) else ": it went nowhere"
+            told = is_any(self.deed[0].text) or any(event.kind == "goto" for event in self.trace)
+            return "" if told else ": it went nowhere"
         names = [room_name(name) for name in rooms]
-        shown = names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST} more rooms"]
+        shown = names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST:,} more"]
         return f": it only went to {listed(shown)}"
 
     def placed(self, done: list[int]) -> str:
@@ -266,56 +302,54 @@ class _Absence:
 
     def likeness(self, at: int) -> tuple[int, int]:
         event = self.trace[at]
-        return -min(missing(element.text, event.text) for element in self.deed), -at
+        return -max(missing(element.text, event.text) for element in self.deed), -at
 
-    def because(self, sentence: str, event: int | None = None) -> Explanation:
-        return Explanation(self.test, event, sentence)
+    def because(self, told: str, event: int | None = None, detail: str = "") -> _Reason:
+        return _Reason(self.test, event, told, detail)
 
 
-def _why_true(formula: Formula, trace: Trace) -> Explanation:
+def _why_true(formula: Formula, trace: Trace) -> _Reason:  # noqa: PLR0911 - one for each kind of formula
     match formula:
         case And(parts):
             facts = [_fact(part, trace) for part in parts]
             both = "both" if len(facts) == 2 else "all"  # noqa: PLR2004 - that is what both means
             event = next((fact.event for fact in reversed(facts) if fact.event is not None), None)
-            return Explanation(
-                Not(formula), event, f"the robot {_joined(facts)}, which must not {both} be so"
-            )
+            return _Reason(Not(formula), event, f"the robot {_joined(facts)}, which must not {both} be so")
         case Or(parts):
             return _why_true(next(part for part in parts if holds(part, trace)), trace)
         case Not(part):
             return _why_false(part, trace)
         case Count(element, 0):
             absence = _Absence(Exists(element, formula.cuts), (element,), trace).explain()
-            return Explanation(Not(formula), absence.event, absence.sentence)
+            return replace(absence, clause=Not(formula))
         case AtLeast(_, 0):
             sentence = "anything happens at least 0 times, so this can never be satisfied"
-            return Explanation(Not(formula), None, sentence)
+            return _Reason(Not(formula), None, sentence)
+        case AtLeast(element, 1):
+            return replace(_presence(Exists(element, formula.cuts), trace), clause=Not(formula))
         case _:
             return _presence(formula, trace)
 
 
-def _presence(test: Test, trace: Trace) -> Explanation:
+def _presence(test: Test, trace: Trace) -> _Reason:
     window = Window(test.cuts, trace)
     fact = _fact(test, trace)
     assert fact.event is not None
     began = window.never_began()
-    told_anyway = any(at is None and one.name.startswith("Before") for one, at in window.made)
-    since = f" (it {began}, so every step counts)" if began and not told_anyway else ""
+    since = f" (it {began}, so every step counts)" if began else ""
     if isinstance(test, Count | AtLeast):
         limit = "not be exactly" if isinstance(test, Count) else "be less than"
-        sentence = f"the robot {fact.told}{fact.where}, but it must {limit} {times(test.number)}{since}"
-        return Explanation(Not(test), fact.event, sentence)
-    duties = f", which it must not do{window.duties()}{since}"
+        told = f"{fact.told}{fact.where}, but it must {limit} {times(test.number)}{since}"
+        return _Reason(Not(test), fact.event, f"the robot {told}")
+    told_anyway = any(at is None and one.name.startswith("Before") for one, at in window.made)
+    duties = f", which it must not do{window.duties()}{'' if told_anyway else since}"
     visit = "" if isinstance(test, Exists) else fact.where
     event = trace[fact.event]
-    if test.element.kind in {"say", "ask"} and not (
-        is_any(test.element.text) and test.element.options is None
-    ):
-        told = f"{did((test.element,), 'past')} at step {fact.event + 1}{visit}{duties}: it {offered(event)}"
-    else:
-        told = f"{fact.told}{visit}{duties}"
-    return Explanation(Not(test), fact.event, f"the robot {told}")
+    spoken = test.element.kind in {"say", "ask"}
+    if not spoken or (is_any(test.element.text) and test.element.options is None):
+        return _Reason(Not(test), fact.event, f"the robot {fact.told}{visit}{duties}")
+    told = f"{did((test.element,), 'past')} at step {fact.event + 1}{visit}{duties}"
+    return _Reason(Not(test), fact.event, f"the robot {told}", f": it {offered(event)}")
 
 
 @dataclass(frozen=True)
@@ -339,19 +373,15 @@ def _joined(facts: list[_Fact]) -> str:
     return listed([listed([fact.told for fact in group]) + where for where, group in groups], "and also")
 
 
-def _fact(formula: Formula, trace: Trace) -> _Fact:  # noqa: PLR0911 - one for each kind of formula
+def _fact(formula: Formula, trace: Trace) -> _Fact:
     match formula:
         case And(parts):
             facts = [_fact(part, trace) for part in parts]
             return _Fact(facts[-1].event, _joined(facts))
         case Or(parts):
             return _fact(next(part for part in parts if holds(part, trace)), trace)
-        case Not(Not(part)):
-            return _fact(part, trace)
         case Not(part):
-            reason = _why_false(part, trace)
-            told = reason.sentence.removeprefix("the robot ")
-            return _Fact(reason.event, told if told != reason.sentence else f"acted so that {told}")
+            return _fact_of_false(part, trace)
         case Exists(element):
             window = Window(formula.cuts, trace)
             at = first(element, trace, window.span)
@@ -362,6 +392,28 @@ def _fact(formula: Formula, trace: Trace) -> _Fact:  # noqa: PLR0911 - one for e
         case Count() | AtLeast():
             return _counted(formula, trace)
     assert_never(formula)
+
+
+def _fact_of_false(formula: Formula, trace: Trace) -> _Fact:  # noqa: PLR0911 - one for each kind of formula
+    """What is so because a formula is not."""
+    match formula:
+        case Not(part):
+            return _fact(part, trace)
+        case And(parts):
+            return _fact_of_false(next(part for part in parts if not holds(part, trace)), trace)
+        case Or(parts) if not _one_test(parts):
+            return _fact(And(tuple(map(Not, parts))), trace)
+        case Count(element, 0):
+            return _fact(Exists(element, formula.cuts), trace)
+        case Count() | AtLeast():
+            return _counted(formula, trace)
+        case ActAtFirst() | ActAtSome() if (
+            first(formula.stay.arrival, trace, cut(formula.cuts, trace)) is None
+        ):
+            return _fact_of_false(Exists(formula.stay.arrival, formula.cuts), trace)
+    absence = _why_false(formula, trace).told
+    told = absence.removeprefix(_ROBOT)
+    return _Fact(None, told if told != absence else f"acted so that {told}")
 
 
 def _deed_at_place(test: ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
@@ -379,7 +431,7 @@ def _counted(test: Count | AtLeast, trace: Trace) -> _Fact:
     if not found:
         return _Fact(None, f"never {did((test.element,), 'past', never=True)}", window.told())
     told = f"{did((test.element,), 'past')} {times(len(found))} ({_steps(found)})"
-    return _Fact(found[max(test.number, 1) - 1], told, window.told())
+    return _Fact(found[min(max(test.number, 1), len(found)) - 1], told, window.told())
 
 
 def _seen(element: Element, trace: Trace, at: int) -> bool:

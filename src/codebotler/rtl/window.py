@@ -56,7 +56,7 @@ class Window:
             if at is not None:
                 bounds.append(f" {when} {did((one.element,), 'ing')}{last} (step {at + 1})")
             elif when == "before":
-                came = "did not do after that" if bounds else "never did"
+                came = "did not do in that time" if self._anywhere(one) else "never did"
                 bounds.append(f" before {did((one.element,), 'ing')} (which it {came})")
         return " and".join(bounds)
 

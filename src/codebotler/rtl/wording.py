@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from codebotler.rtl.formula import Element, Regex, Text, Without, Words
+from codebotler.rtl.formula import Element, Regex, Text, Without, Words, compile_regex
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -34,6 +34,7 @@ _PASTIMES = {
     "pick": "picked something up",
     "place": "put something down",
 }
+_END_OF_WORD = r"\b"
 _SHOWN = 70
 _MOST = 5
 
@@ -114,9 +115,9 @@ def lacking(deed: Deed, event: Event) -> str:
     named = len(absent) > 1 or not absent or not absent[0].startswith("does not match")
     reasons = [f"which {listed(absent) if named else 'does not match'}"] if absent else []
     if not event.options and deed[0].options is not None:
-        return ", and ".join([*reasons, "it had no options"])
+        return f"{reasons[0]}, and it had no options" if reasons else "which does not count without options"
     if len(deed) > 1:
-        return ", and ".join([*reasons, f"none of its options ({_options(event)}) does better"])
+        return ", and ".join([*reasons, f"none of its options ({_options(event)}) will do"])
     if not absent and deed[0].options is not None:
         wanted = with_texts(deed[0].options)
         is_one = f"has {wanted.removeprefix('with ')}" if wanted.startswith("with ") else f"is one {wanted}"
@@ -126,7 +127,7 @@ def lacking(deed: Deed, event: Event) -> str:
 
 def _options(event: Event) -> str:
     names = [quoted(option.text) for option in event.options]
-    return listed(names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST} more"])
+    return listed(names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST:,} more"])
 
 
 def lacks(text: Text, actual: str) -> list[str]:
@@ -140,13 +141,13 @@ def lacks(text: Text, actual: str) -> list[str]:
         case Words(parts):
             absent = [lack for part in parts for lack in lacks(part, actual)]
             return _merged(absent, "lacks ")
-        case _ if text.matches(actual):
-            return []
-        case Without(pattern):
-            return [f"has {_word(pattern)}"]
+        case Without():
+            return [f"has the word {quoted(found[0])}"] if (found := text.compiled.search(actual)) else []
         case Regex(pattern):
-            if start := _forbidden_start(pattern):
-                return [f'starts with "{start}"']
+            if text.matches(actual):
+                return []
+            if (start := _forbidden_start(pattern)) and (found := compile_regex(start).match(actual)):
+                return [f"starts with {quoted(found[0])}"]
             return [f"lacks {named}" if (named := _named(pattern)) else f"does not match /{pattern}/"]
 
 
@@ -187,7 +188,8 @@ def room_name(name: str) -> str:
     Args:
         name: as the robot was told.
     """
-    return f"the {name}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else _shortened(name) or '""'
+    short = shortened(name)
+    return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else short or '""'
 
 
 def quoted(text: str) -> str:
@@ -196,7 +198,17 @@ def quoted(text: str) -> str:
     Args:
         text: any text.
     """
-    return f'"{_shortened(text)}"'
+    return f'"{shortened(text)}"'
+
+
+def shortened(text: str) -> str:
+    """A text on one line, cut off where it is too long for a sentence.
+
+    Args:
+        text: any text.
+    """
+    line = " ".join(text.split())
+    return line if len(line) <= _SHOWN else line[: _SHOWN - 1].rstrip() + "…"
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
@@ -217,7 +229,7 @@ def times(number: int) -> str:
     Args:
         number: 0 or more.
     """
-    return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number} times")
+    return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number:,} times")
 
 
 def is_any(text: Text) -> bool:
@@ -256,7 +268,7 @@ def _qualities(text: Text) -> list[str]:
             if is_any(text):
                 return []
             if start := _forbidden_start(pattern):
-                return [f'not starting with "{start}"']
+                return [f'not starting with "{listed(literals(start.removesuffix(_END_OF_WORD)), "or")}"']
             return [f"with {named}" if (named := _named(pattern)) else f"matching /{pattern}/"]
 
 
@@ -273,8 +285,9 @@ def _word(pattern: str) -> str:
 
 
 def _forbidden_start(pattern: str) -> str:
-    inner = re.fullmatch(r"\^\(\?!(.*)\\b\)", pattern)
-    return listed(literals(inner[1]), "or") if inner else ""
+    """What a text must not start with, as a regex, where a pattern says nothing else."""
+    inner = re.fullmatch(r"\^\(\?!((.*)\\b)\)", pattern)
+    return inner[1] if inner and literals(inner[2]) else ""
 
 
 def _merged(parts: list[str], head: str) -> list[str]:
@@ -285,9 +298,11 @@ def _merged(parts: list[str], head: str) -> list[str]:
 
 
 def _destination(text: Text, anywhere: str) -> str:
+    if is_any(text):
+        return anywhere
     match text:
         case Regex(pattern):
-            return anywhere if is_any(text) else f"to {room(pattern)}"
+            return f"to {room(pattern)}"
         case Without(pattern):
             return (
                 f"{anywhere} but to {room(pattern)}"
@@ -295,7 +310,7 @@ def _destination(text: Text, anywhere: str) -> str:
                 else f"elsewhere than to {room(pattern)}"
             )
         case Words():
-            return f"to a room {with_texts(text)}".rstrip()
+            return f"to a room {with_texts(text)}"
 
 
 def _thing(text: Text, thing: str) -> str:
@@ -333,8 +348,3 @@ def _topic(text: Text, question: str) -> str:
             return f"about {listed(names, 'or')}"
         case _:
             return f"{question} {with_texts(text)}"
-
-
-def _shortened(text: str) -> str:
-    line = " ".join(text.split())
-    return line if len(line) <= _SHOWN else line[: _SHOWN - 1].rstrip() + "…"

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import json
+import marshal
 import os
 import signal
 import socket
-import struct
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-from codebotler.simulator.sandbox.channel import HEADER, MAX_FRAME
+from codebotler.simulator.sandbox import CPU_SECONDS, HEADER, MAX_FRAME
+from codebotler.trace import RunError, Status
 
-LONGEST = 120.0  # seconds; nothing that computes takes so long, so a child that does only waits
+LONGEST = 120.0  # seconds of waiting for a child in all; nothing that computes takes so long
+FILTERED, KILLED_BY_FILTER = 2, 3  # what Linux says of a process and its list of system calls
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
 
@@ -26,12 +28,14 @@ class Child:
         pid: its process id, which stays its own until the next run.
         channel: the socket to it.
         wait: waits for its end and returns its exit status, or minus the signal.
+        closes: whether closing its walls can be seen from outside, which takes seccomp.
     """
 
-    def __init__(self, pid: int, channel: socket.socket, wait: Callable[[], int]) -> None:
+    def __init__(self, pid: int, channel: socket.socket, wait: Callable[[], int], *, closes: bool) -> None:
         self.pid, self._channel, self._wait = pid, channel, wait
-        self._buffer = b""
-        self._deadline = time.monotonic() + LONGEST
+        self._closes = closes
+        self._buffer = bytearray()
+        self._patience = LONGEST
 
     def send(self, message: object) -> None:
         """Send a frame; a child that is gone is noticed when it is listened to.
@@ -39,24 +43,38 @@ class Child:
         Raises:
             TimeoutError: the child waits for something else than to listen.
         """
-        data = json.dumps(message).encode()
-        rest = memoryview(struct.pack(">I", len(data)) + data)
+        data = marshal.dumps(message)  # type: ignore[arg-type]  # made of texts, numbers and the like
+        rest = memoryview(len(data).to_bytes(HEADER, "big") + data)
         stuck = Stuck(self.pid)
         self._channel.settimeout(SILENCE)
         while rest:
-            self._check_time()
+            began = time.monotonic()
             try:
                 rest = rest[self._channel.send(rest) :]
             except TimeoutError:
                 stuck.check()
             except OSError:
                 return
+            self._be_patient(began)
 
     def receive(self) -> object:
-        """The child's next message; None when it has hung up.
+        """The child's next message, which is JSON; None when it has hung up.
 
         Raises:
             ProtocolError: it is none.
+            TimeoutError: the child waits for something that will never come.
+        """
+        frame = self.receive_bytes(MAX_FRAME)
+        return None if frame is None else _parsed(frame)
+
+    def receive_bytes(self, most: int) -> bytes | None:
+        """The child's next frame; None when it has hung up.
+
+        Args:
+            most: how long it may be, in bytes.
+
+        Raises:
+            ProtocolError: it is longer.
             TimeoutError: the child waits for something that will never come.
         """
         stuck = Stuck(self.pid)
@@ -64,35 +82,56 @@ class Child:
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
-                if end - HEADER > MAX_FRAME:
+                if end - HEADER > most:
                     raise ProtocolError("a frame is too long")
                 if len(self._buffer) >= end:
-                    frame, self._buffer = self._buffer[HEADER:end], self._buffer[end:]
-                    return _parsed(frame)
-            self._check_time()
+                    frame = bytes(self._buffer[HEADER:end])
+                    del self._buffer[:end]
+                    return frame
+            began = time.monotonic()
             try:
                 piece = self._channel.recv(1 << 16)
             except TimeoutError:
                 stuck.check()
-                continue
             except OSError:
                 return None
-            if not piece:
-                return None
-            self._buffer += piece
+            else:
+                if not piece:
+                    return None
+                self._buffer += piece
+            self._be_patient(began)
 
-    def _check_time(self) -> None:
-        if time.monotonic() > self._deadline:
+    def _be_patient(self, since: float) -> None:
+        self._patience -= time.monotonic() - since
+        if self._patience < 0:
             raise TimeoutError
+
+    def kill(self) -> None:
+        """End it, if it has not ended."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
 
     def end(self) -> int:
         """End it, if it has not ended, and return its exit status, or minus the signal."""
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(self.pid, signal.SIGKILL)
+        self.kill()
         try:
             return self._wait()
         finally:
             self._channel.close()
+
+    def rest(self) -> None:
+        """Wait anew: what it was asked has been answered."""
+        self._patience = LONGEST
+
+    def was_closed(self) -> bool:
+        """Whether its walls were closed, as far as can be seen; also told of the dead, until the next run."""
+        if not self._closes:
+            return True
+        try:
+            status = Path(f"/proc/{self.pid}/status").read_text(encoding="ascii", errors="replace")
+        except OSError:
+            return False
+        return any(f"\nSeccomp:\t{mode}\n" in status for mode in (FILTERED, KILLED_BY_FILTER))
 
     def ended(self) -> int:
         """Wait a moment for it to end by itself; then like `end`."""
@@ -101,6 +140,27 @@ class Child:
                 break
             threading.Event().wait(0.002)
         return self.end()
+
+
+def cause_of_death(status: int) -> tuple[Status, RunError]:
+    """What a process died of that did not say how it ended.
+
+    Args:
+        status: its exit status, or minus the signal.
+    """
+    match -status:
+        case signal.SIGXCPU:
+            return Status.TIMEOUT, RunError(
+                "TimeoutError", f"{CPU_SECONDS} seconds of processor time in one step"
+            )
+        case signal.SIGSYS:
+            return Status.KILLED, RunError(
+                "ForbiddenCall", "the program asked the kernel for what is forbidden"
+            )
+        case signal.SIGKILL:
+            return Status.KILLED, RunError("MemoryError", "the process was killed from outside")
+    how = f"signal {-status}" if status < 0 else f"exit status {status}"
+    return Status.KILLED, RunError("Crash", f"the process ended by itself ({how})")
 
 
 def _parsed(frame: bytes) -> object:

@@ -2,20 +2,47 @@
 
 from __future__ import annotations
 
-import signal
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, TypeAlias
 
-from codebotler.simulator.child import Child, LostChildError, ProtocolError
-from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
-from codebotler.skills import Skill
-from codebotler.trace import Option, Outcome, RunError, Status
+from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
+from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.simulator.rules import Rules
+from codebotler.simulator.sandbox import ACTS, LOOKS, TELLS
+from codebotler.skills import Skill, SkillTable
+from codebotler.trace import Option, Outcome, RunError, Status, Trace
 
-MEMORY = 512 * 1024 * 1024
-CPU_SECONDS = 5
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 LAST_LINE = 1_000_000
 LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
+WAITS = "it waits for something that can never come"
+Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
+
+
+class Robot(Protocol):
+    """Who executes the skills that a program asks for; executing one may take as long as it likes."""
+
+    rules: Rules
+    skills: SkillTable
+    now: float
+    """What the program's clock shows, in seconds since the start."""
+    never_fails: frozenset[str]
+    """Skills that return nothing and cannot fail, so that a program need not wait for them."""
+    only_looks: frozenset[str]
+    """Skills that change nothing, and whose result stays the same until another skill is executed."""
+
+    @property
+    def trace(self) -> Trace:
+        """What it has done so far."""
+
+    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        """Execute one skill.
+
+        Raises:
+            RobotError: it cannot.
+        """
 
 
 class Conversation:
@@ -23,41 +50,30 @@ class Conversation:
 
     Args:
         child: the fresh child.
-        source: the program.
+        code: the program, as the preparer made it.
         robot: who executes its skills.
-
-    Raises:
-        LostChildError: the child ended before its walls were closed.
     """
 
-    def __init__(self, child: Child, source: str, robot: SimulatedRobot) -> None:
+    def __init__(self, child: Child, code: bytes, robot: Robot) -> None:
         self.child, self.robot, self.limits = child, robot, robot.rules.limits
         self.ledger = Ledger()
         self.errors: list[RobotError] = []
-        child.send(
-            {
-                "source": source,
-                "literals": robot.rules.literals,
-                "skills": [
-                    [s.name, [[p.name, p.type.__name__] for p in s.parameters]] for s in robot.skills.values()
-                ],
-                "ticks": self.limits.ticks,
-                "seconds": self.limits.seconds,
-                "clock": robot.rules.clock_starts.timestamp(),
-                "memory": MEMORY,
-                "cpu": CPU_SECONDS,
-            }
-        )
-        if child.receive() != "ready":
-            child.end()
-            raise LostChildError("a child ended before it was closed")
+        self._heard = False
+        limits = self.limits
+        bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
+        child.send((code, described(robot), (*bounds, robot.rules.clock_starts.timestamp())))
 
     def outcome(self) -> Outcome:
-        """Talk to the end."""
+        """Talk to the end.
+
+        Raises:
+            ImportsMoreError: the program imports something, and the library is not there.
+            LostChildError: the child ended before its walls were closed.
+        """
         try:
             final = self._talk()
         except TimeoutError:
-            self.ledger.limit = "it waits for something that can never come"
+            self.ledger.limit = WAITS
             final = None
         except ProtocolError as error:
             self.child.end()
@@ -74,11 +90,14 @@ class Conversation:
     def _talk(self) -> dict[str, object] | None:
         overrun = 0
         while (message := self.child.receive()) is not None:
+            self._heard = True
             if isinstance(message, dict):
                 return message
             match message:
-                case [str() as name, list() as values, int() | float() as now]:
-                    self.child.send(self._answer(name, values, now))
+                case [str() as name, list() as values, int() | float() as now, int() as waits]:
+                    answer = self._answer(name, values, now)
+                    if waits:
+                        self.child.send(answer)
                 case _:
                     raise ProtocolError("a request is malformed")
             overrun += self.ledger.limit is not None
@@ -92,10 +111,17 @@ class Conversation:
         if self.ledger.limit is None:
             if name in self.robot.skills:
                 return self._perform(self.robot.skills[name], values)
-            if name != "too-long":
-                raise ProtocolError("there is no such skill")
-            self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
+            self.ledger.limit = self._beyond(name)
         return ("stop", None)
+
+    def _beyond(self, name: str) -> str:
+        """The limit that a request which is no skill tells of; one to sleep has been told by its time."""
+        match name:
+            case "wait":
+                return WAITS
+            case "too-long":
+                return f"a text of more than {self.limits.text:,} characters"
+        raise ProtocolError("there is no such skill")
 
     def _let_time_pass(self, now: float) -> None:
         if now > self.limits.seconds:
@@ -126,6 +152,8 @@ class Conversation:
     def _ended(self, final: dict[str, object]) -> Outcome:
         line = final.get("line")
         match final:
+            case {"end": "again"}:
+                raise ImportsMoreError
             case {"end": "finished"}:
                 return Outcome(Status.FINISHED, self.robot.trace)
             case {"end": "timeout"}:
@@ -142,22 +170,26 @@ class Conversation:
                 return self._outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")
 
     def _died(self, status: int) -> Outcome:
-        if status == -signal.SIGXCPU:
-            return self._outcome(
-                Status.TIMEOUT, "TimeoutError", f"{CPU_SECONDS} seconds of processor time in one step"
-            )
-        if status == -signal.SIGSYS:
-            return self._outcome(
-                Status.KILLED, "ForbiddenCall", "the program asked the kernel for what is forbidden"
-            )
-        if status == -signal.SIGKILL:
-            return self._outcome(Status.KILLED, "MemoryError", "the process was killed from outside")
-        how = f"signal {-status}" if status < 0 else f"exit status {status}"
-        return self._outcome(Status.KILLED, "Crash", f"the process ended by itself ({how})")
+        if not self._heard and not self.child.was_closed():
+            raise LostChildError("a child ended before it was closed")
+        cause, error = cause_of_death(status)
+        return Outcome(cause, self.robot.trace, error)
 
     def _outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
         where = line if type(line) is int and 0 < line <= LAST_LINE else None
         return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
+
+
+def described(robot: Robot) -> Description:
+    """The skills of a robot as a child needs to know them: name, parameters and way of calling of each."""
+    return tuple(
+        (
+            skill.name,
+            tuple((p.name, p.type.__name__) for p in skill.parameters),
+            TELLS if skill.name in robot.never_fails else LOOKS if skill.name in robot.only_looks else ACTS,
+        )
+        for skill in robot.skills.values()
+    )
 
 
 def _arguments(skill: Skill, values: list[object]) -> list[Argument]:
@@ -180,6 +212,10 @@ def _option(value: object) -> Option:
             return Option(text, is_text)
         case _:
             raise ProtocolError("an option is malformed")
+
+
+class ImportsMoreError(Exception):
+    """The program imports what is not there; it must be run again where it is."""
 
 
 @dataclass

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import os
+import pickle
+import sys
+import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import islice
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
-from codebotler.simulator.child import LostChildError
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
@@ -19,10 +22,12 @@ from codebotler.skills import SKILLS, SkillTable
 from codebotler.trace import Outcome
 from codebotler.world import World
 
-__all__ = ["EngineError", "Lanes", "run", "simulate"]
+__all__ = ["EngineError", "Lanes", "digest", "run"]
 
 LOG = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
+NOT_LINUX = "programs are less isolated here: only Linux has a list of allowed system calls (seccomp)"
+ON_WINDOWS = "programs are run on Linux and macOS only; on Windows, use this inside WSL"
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
@@ -54,29 +59,24 @@ def run(
 
         def run_pair(pair: tuple[str, World]) -> Outcome:
             source, world = pair
-            return simulate(lanes.here(), source, lambda: SimulatedRobot(world, rules, skills, behaviours))
+            return lanes.here().run(source, lambda: SimulatedRobot(world, rules, skills, behaviours))
 
-        yield from lanes.map_distinct(run_pair, pairs)
+        worlds: dict[World, int] = {}
+
+        def name(pair: tuple[str, World]) -> bytes:
+            source, world = pair
+            return digest(source, str(worlds.setdefault(world, len(worlds))))
+
+        yield from lanes.map_distinct(run_pair, pairs, name=name)
 
 
-def simulate(lane: Lane, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
-    """Run a program with a simulated robot, once more if its process was lost through no fault of its own.
-
-    Args:
-        lane: where to run it.
-        source: the program, which need not even parse.
-        new_robot: makes the robot, in the initial state of its world.
-
-    Raises:
-        EngineError: its process was lost twice.
-    """
-    try:
-        return lane.run(source, new_robot())
-    except LostChildError:
-        try:
-            return lane.run(source, new_robot())
-        except LostChildError as error:
-            raise EngineError(f"an isolated process was lost twice: {error}") from None
+def digest(*texts: str) -> bytes:
+    """A short name for texts, which no other texts have."""
+    hashed = hashlib.sha256()
+    for text in texts:
+        data = text.encode(errors="surrogatepass")
+        hashed.update(len(data).to_bytes(8, "big") + data)
+    return hashed.digest()
 
 
 class Lanes:
@@ -91,15 +91,18 @@ class Lanes:
     """
 
     def __init__(self, workers: int, *, require_isolation: bool = False) -> None:
+        if sys.platform == "win32":
+            raise EngineError(ON_WINDOWS)
         self.workers = workers
         self._pool = ThreadPoolExecutor(workers, thread_name_prefix="lane")
         self._local = threading.local()
         first = Lane()
         if not first.has_seccomp:
+            missing = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
             if require_isolation:
                 first.close()
-                raise EngineError(NO_SECCOMP)
-            LOG.warning(NO_SECCOMP)
+                raise EngineError(missing)
+            LOG.warning(missing)
         self._lanes = [first]
         self._idle = [first]
         self._stopping = False
@@ -130,16 +133,58 @@ class Lanes:
             self._local.lane = lane
         return lane
 
-    def map_distinct(self, function: Callable[[Key], Value], keys: Iterable[Key]) -> Iterator[Value]:
-        """Like `map`, in threads, calling the function once for equal keys and reading ahead a little."""
-        done: dict[Hashable, Future[Value]] = {}
-        waiting: deque[Future[Value]] = deque()
+    def map_distinct(
+        self, function: Callable[[Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]
+    ) -> Iterator[Value]:
+        """Like `map`, in threads, calling the function once for equal keys and reading ahead a little.
+
+        Args:
+            function: what to do; its results are pickled.
+            keys: what to do it to.
+            name: a short name of a key, which no other key has.
+        """
+        waiting: deque[tuple[bytes, Future[Value] | None]] = deque()
+        running: dict[bytes, Future[Value]] = {}
         remaining = iter(keys)
-        while True:
-            for key in islice(remaining, max(0, 8 * self.workers - len(waiting))):
-                if key not in done:
-                    done[key] = self._pool.submit(function, key)
-                waiting.append(done[key])
-            if not waiting:
-                return
-            yield waiting.popleft().result()
+        with Done() as done:
+            while True:
+                for key in islice(remaining, max(0, 8 * self.workers - len(waiting))):
+                    named = name(key)
+                    if named not in done and named not in running:
+                        running[named] = self._pool.submit(function, key)
+                    waiting.append((named, running.get(named)))
+                if not waiting:
+                    return
+                named, future = waiting.popleft()
+                if future is None:
+                    yield done[named]
+                    continue
+                value = future.result()
+                if running.pop(named, None) is not None:
+                    done[named] = value
+                yield value
+
+
+class Done:
+    """Results by name, in a file that nobody else sees, so that a million of them need little memory."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by __exit__
+        self._places: dict[bytes, int] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def __contains__(self, name: bytes) -> bool:
+        return name in self._places
+
+    def __setitem__(self, name: bytes, value: object) -> None:
+        self._places[name] = self._file.seek(0, os.SEEK_END)
+        pickle.dump(value, self._file)
+
+    def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - whatever was put there
+        self._file.seek(self._places[name])
+        return pickle.load(self._file)  # noqa: S301 - we wrote it

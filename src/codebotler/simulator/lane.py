@@ -1,116 +1,106 @@
-"""A lane: one zygote, and the runs it forks one at a time."""
+"""A lane: the processes that run programs one at a time: a preparer and two zygotes."""
 
 from __future__ import annotations
 
-import os
-import socket
-import struct
-import subprocess
-import sys
+import logging
+import zlib
+from collections.abc import Callable
 
-from codebotler.simulator.child import Child, LostChildError
-from codebotler.simulator.conversation import Conversation
+from codebotler.simulator.child import LostChildError
+from codebotler.simulator.conversation import Conversation, ImportsMoreError
+from codebotler.simulator.preparer import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox import FLAGS, ZYGOTE
-from codebotler.trace import Outcome, RunError, Status
-from codebotler.world import Room, World
+from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, ZYGOTE
+from codebotler.simulator.zygote import Zygote
+from codebotler.trace import Outcome
 
-MAX_SOURCE = 5_000_000
-REHEARSAL = World((Room("room"),), "room")
+EVENTS = logging.getLogger("codebotler.engine.events")
+"""What happens to each run: started, how it ended and why; at level DEBUG, so that it is off by default."""
 
 
 class Lane:
-    """One zygote and the runs it forks, one at a time.
+    """What runs programs one at a time.
+
+    Nearly all programs import nothing. They run in children of a zygote that is small, and cheap to fork; the
+    others in those of a zygote that has the standard library, which is started when the first of them comes.
 
     Raises:
-        EngineError: the zygote does not start.
+        EngineError: the processes cannot be started.
     """
 
     def __init__(self) -> None:
         self._stopped = False
-        self._start()
+        self._preparer = Preparer()
+        self._zygotes: dict[str, Zygote] = {}
+        try:
+            self.has_seccomp = self._zygote(ZYGOTE).has_seccomp
+        except LostChildError as error:
+            raise EngineError(f"the engine does not start: {error}") from None
 
-    def run(self, source: str, robot: SimulatedRobot) -> Outcome:
-        """Run one program with one robot.
+    def run(self, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
+        """Run a program with a robot, once more if a process was lost through no fault of the program.
 
         Args:
             source: the program, which need not even parse.
-            robot: who executes its skills; it has done nothing yet.
+            new_robot: makes the robot who executes its skills, in the initial state of its world.
 
         Raises:
-            LostChildError: the process ended through no fault of the program; the lane can be used again.
-            EngineError: the lane was stopped.
+            EngineError: a process was lost twice, or the lane was stopped.
         """
-        if len(source) > MAX_SOURCE:
-            error = RunError("MemoryError", f"the program is longer than {MAX_SOURCE:,} characters")
-            return Outcome(Status.PYTHON_ERROR, (), error)
+        name = zlib.crc32(source.encode(errors="surrogatepass"))
+        EVENTS.debug("program %08x: started", name)
         try:
-            return Conversation(self._fork(), source, robot).outcome()
+            outcome = self._try(source, new_robot)
+        except LostChildError as first:
+            EVENTS.debug("program %08x: a process was lost, and it is run again: %s", name, first)
+            try:
+                outcome = self._try(source, new_robot)
+            except LostChildError as error:
+                raise EngineError(f"an isolated process was lost twice: {error}") from None
+        why = "" if outcome.error is None else f" ({outcome.error.kind}: {outcome.error.message})"
+        EVENTS.debug("program %08x: %s%s", name, outcome.status.value, why)
+        return outcome
+
+    def stop(self) -> None:
+        """End all processes and with them a run that is still going on; its thread notices."""
+        self._stopped = True
+        self._preparer.kill()
+        for zygote in list(self._zygotes.values()):
+            zygote.kill()
+
+    def close(self) -> None:
+        """Give back all that the lane holds; nothing may be running."""
+        self._preparer.close()
+        while self._zygotes:
+            self._zygotes.popitem()[1].close()
+
+    def _try(self, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
+        try:
+            robot = new_robot()
+            prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
+            if isinstance(prepared, Outcome):
+                return prepared
+            if not prepared.imports:
+                try:
+                    return self._converse(ZYGOTE, prepared, robot)
+                except ImportsMoreError:
+                    robot = new_robot()
+            return self._converse(LIBRARY_ZYGOTE, prepared, robot)
         except (LostChildError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
             self.close()
-            self._start()
             raise LostChildError(str(error)) from None
 
-    def stop(self) -> None:
-        """End the zygote and with it a run that is still going on; its thread notices."""
-        self._stopped = True
-        self._zygote.kill()
+    def _converse(self, role: str, prepared: Prepared, robot: SimulatedRobot) -> Outcome:
+        return Conversation(self._zygote(role).fork(), prepared.code, robot).outcome()
 
-    def close(self) -> None:
-        """Give back all that the lane holds; nothing may be running."""
-        self._zygote.kill()
-        self._zygote.wait()
-        for descriptor in (self._wake, self._report):
-            os.close(descriptor)
-        self._door.close()
-
-    def _start(self) -> None:
-        wake, self._wake = os.pipe()
-        self._report, report = os.pipe()
-        door, self._door = socket.socketpair()
-        with door:
-            inherited = (wake, door.fileno(), report)
-            self._zygote = subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
-                [sys.executable, *FLAGS, str(ZYGOTE), *map(str, inherited)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                cwd="/",
-                env={"PYTHONHASHSEED": "0", "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1"},
-                pass_fds=inherited,
-                start_new_session=True,
-            )
-        os.close(wake)
-        os.close(report)
-        try:
-            self.has_seccomp = self._read_report() == 1
-            self._rehearse()
-        except (LostChildError, OSError):
-            raise EngineError("the zygote of the engine does not start") from None
-
-    def _rehearse(self) -> None:
-        """Run an empty program: by then the heap of the zygote, which programs can see, has settled."""
-        Conversation(self._fork(), "task_program = int", SimulatedRobot(REHEARSAL)).outcome()
-
-    def _fork(self) -> Child:
-        ours, theirs = socket.socketpair()
-        try:
-            with theirs:
-                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
-            os.write(self._wake, b"x")
-            pid = self._read_report()
-        except (LostChildError, OSError):
-            ours.close()
-            raise
-        return Child(pid, ours, self._read_report)
-
-    def _read_report(self) -> int:
-        data = os.read(self._report, struct.calcsize("=q"))
-        if not data:
-            raise LostChildError("the zygote has ended")
-        return int(struct.unpack("=q", data)[0])
+    def _zygote(self, role: str) -> Zygote:
+        if role not in self._zygotes:
+            self._zygotes[role] = Zygote(role)
+            if self._stopped:
+                self._zygotes[role].kill()
+        return self._zygotes[role]
 
 
 class EngineError(RuntimeError):

@@ -63,6 +63,8 @@ class SimulatedRobot:
     ) -> None:
         self.rules, self.skills = rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
+        self.never_fails = frozenset(name for name, does in self.behaviours.items() if does is say)
+        self.only_looks = frozenset(name for name, does in self.behaviours.items() if does in LOOKING)
         self.rooms = [room.name for room in world.rooms]
         self.room = world.robot
         self.things = {room.name: [Thing(label) for label in room.objects] for room in world.rooms}
@@ -219,6 +221,10 @@ BEHAVIOURS: Mapping[str, Behaviour] = {
     "place": place,
 }
 """What each of the eight skills does."""
+
+
+LOOKING = (get_current_location, get_all_rooms, is_in_room)
+"""Behaviours that change nothing, and whose result stays the same until the robot acts."""
 
 
 def located(trace: Trace, world: World) -> Trace:

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.simulator.engine import EngineError, run
+from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.trace import Outcome, Status
@@ -138,7 +139,7 @@ def test_pairs_are_read_only_a_little_ahead() -> None:
 # --- the same everywhere
 
 UNSTEADY = """
-import random, datetime, uuid
+import random, datetime, uuid, os, secrets, tempfile, logging, threading
 class A: pass
 def task_program():
     say(str(object()) + str(A()) + repr(task_program))
@@ -154,19 +155,23 @@ def task_program():
     random.shuffle(items)
     say(str(items))
     say(str(time.time()) + str(time.perf_counter()) + str(datetime.datetime.now()))
+    say(str(uuid.uuid4()) + str(uuid.uuid1()) + secrets.token_hex() + str(os.urandom(8)))
+    say(next(tempfile._get_candidate_names()) + str(random._inst.__class__().random()))
+    say(str(logging.LogRecord("", 0, "", 0, "", (), None).__dict__))
+    say(str(threading.get_native_id()) + str(threading.get_ident()) + str(os.getppid()))
     say("NUMBER")
 """
 
 
 def test_outcome_depends_neither_on_workers_nor_on_the_start_nor_on_what_ran_before() -> None:
-    programs = [UNSTEADY.replace("NUMBER", str(number)) for number in range(10, 22)]
+    programs = [UNSTEADY.replace("NUMBER", f"unseen_{number}") for number in range(10, 22)]
     pairs = [(program, WORLD) for program in programs]
     first = list(run(pairs, workers=1, rules=AS_WRITTEN))
     assert list(run(pairs, workers=4, rules=AS_WRITTEN)) == first
     before = [(saying("x" * number), WORLD) for number in range(5)]
     assert list(run([*before, *reversed(pairs)], workers=1, rules=AS_WRITTEN))[5:] == first[::-1]
     assert len({tuple(said(outcome)[:-1]) for outcome in first}) == 1
-    assert len(said(first[0])) == 10
+    assert len(said(first[0])) == 14
 
 
 # --- nothing is left
@@ -353,3 +358,40 @@ def test_program_of_enormous_length_is_refused_without_being_read() -> None:
 
 def test_isolation_can_be_required() -> None:
     assert len(list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))) == 1
+
+
+def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureFixture) -> None:
+    programs = [saying("a"), "def task_program(): go_to('x')", "import os\nos._exit(3)"]
+    pairs = [(program, WORLD) for program in programs]
+    list(run(pairs, workers=1))
+    assert not caplog.records
+    with caplog.at_level("DEBUG", logger="codebotler.engine.events"):
+        list(run(pairs, workers=1))
+    told = [record.getMessage().partition(": ")[2] for record in caplog.records]
+    assert told == [
+        "started",
+        "finished",
+        "started",
+        'robot-error (GoToInvalidLocation: there is no room "x")',
+        "started",
+        "killed (Crash: the process ended by itself (exit status 3))",
+    ]
+
+
+def test_windows_is_refused_with_the_platform_patched(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(EngineError, match="inside WSL"):
+        list(run([(saying("a"), WORLD)], workers=1))
+
+
+def test_macos_is_less_isolated_and_says_so_with_the_platform_patched(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(Lane, "has_seccomp", property(lambda _: False, lambda *_: None), raising=False)
+    monkeypatch.setattr(sys, "platform", "darwin")
+    assert said(next(run([(saying("a"), WORLD)], workers=1))) == ["a"]
+    assert [record.getMessage() for record in caplog.records] == [
+        "programs are less isolated here: only Linux has a list of allowed system calls (seccomp)"
+    ]
+    with pytest.raises(EngineError, match="only Linux"):
+        list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))

@@ -31,7 +31,6 @@ from typing import IO
 import pytest
 
 from codebotler.rtl import parse
-from codebotler.simulator.engine import simulate
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
@@ -197,7 +196,7 @@ class Reach:
             "ABSTRACT_SOCKET": MARKER,
             "MARKER": MARKER,
             "PARENT_PID": str(os.getpid()),
-            "ZYGOTE_PID": str(self.lane._zygote.pid),
+            "ZYGOTE_PID": str(self.zygotes()[-1]),
             "BYSTANDER_PID": str(self.bystander.pid),
         }
 
@@ -206,8 +205,12 @@ class Reach:
             source = source.replace(f"@{name}@", value)
         return source
 
+    def zygotes(self) -> list[int]:
+        """The processes that fork those of the runs."""
+        return [zygote._process.pid for zygote in self.lane._zygotes.values()]
+
     def run(self, source: str) -> Outcome:
-        return simulate(self.lane, source, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
+        return self.lane.run(source, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
 
     def files(self) -> dict[str, object]:
         """All that is below the folder, with contents, rights and times."""
@@ -229,9 +232,9 @@ class Reach:
             "signals": list(self.signals),
             "living processes": living_below(os.getpid()),
             "processes with the marker": carry_the_marker(),
-            "zygote": self.lane._zygote.pid,
+            "zygotes": self.zygotes(),
             "descriptors": descriptors(os.getpid()),
-            "descriptors of the zygote": descriptors(self.lane._zygote.pid),
+            "descriptors of the zygotes": list(map(descriptors, self.zygotes())),
         }
 
 
@@ -291,6 +294,7 @@ def reach(
     libc = ctypes.CDLL(None)
     os.environ["SECRET_OF_THE_ENGINE"] = SECRET
     reach = Reach(folder, Lane(), bystander, listeners)
+    reach.run(HONEST)  # by now all processes are there
     before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
     yield reach
@@ -308,7 +312,7 @@ def honest(reach: Reach) -> Outcome:
     """What an honest program does before any hostile one has run, in a lane of its own."""
     lane = Lane()
     try:
-        outcome = simulate(lane, HONEST, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
+        outcome = lane.run(HONEST, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
     finally:
         lane.close()
     assert outcome.status is Status.FINISHED, outcome
@@ -438,10 +442,10 @@ def test_a_signal_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -
 
 
 def test_a_stopped_zygote_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
-    os.kill(reach.lane._zygote.pid, signal.SIGSTOP)
-    os.waitid(os.P_PID, reach.lane._zygote.pid, os.WSTOPPED | os.WNOWAIT)
+    os.kill(reach.zygotes()[-1], signal.SIGSTOP)
+    os.waitid(os.P_PID, reach.zygotes()[-1], os.WSTOPPED | os.WNOWAIT)
     assert changed() == {"living processes"}
-    os.kill(reach.lane._zygote.pid, signal.SIGCONT)
+    os.kill(reach.zygotes()[-1], signal.SIGCONT)
     while changed():
         select.select([], [], [], 0.01)
 

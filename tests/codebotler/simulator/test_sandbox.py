@@ -72,6 +72,17 @@ WORKS: dict[str, tuple[str, object]] = {
         ["a", "b"],
     ),
     "5 two own calls are two": (task("say('a')") + "task_program()\ntask_program()\n", ["a", "a"]),
+    "5 own call of a lambda": ("task_program = lambda: say('a')\ntask_program()\n", ["a"]),
+    "5 own call of another function": ("def main(): say('a')\ntask_program = main\ntask_program()\n", ["a"]),
+    "5 own call of a partial": (
+        "import functools\ntask_program = functools.partial(say, 'a')\ntask_program()\n",
+        ["a"],
+    ),
+    "5 call by another name": (task("say('a')") + "main = task_program\nmain()\n", ["a"]),
+    "5 method of that name is another": (
+        "class A:\n    def task_program(self): say('b')\nA().task_program()\n" + task("say('a')"),
+        ["b", "a"],
+    ),
     "6 name in an f-string": (task("Greeting = 'Good Day!'\nsay(f'{Greeting}')"), ["good day!"]),
     "7 code between two quotes": (task("Text = 'a'\nsay('\"' + Text + '\"')"), ['"a"']),
     "8 literals of every kind are lowered": (
@@ -197,6 +208,53 @@ WORKS: dict[str, tuple[str, object]] = {
         + task("try:\n    f()\nexcept RecursionError:\n    say(str(n))"),
         ["990"],
     ),
+    "what the sandbox needs cannot be taken from it": (
+        "import builtins, json, os, sys\n"
+        "for name in ('len', 'str', 'isinstance', 'type', 'zip', 'int', 'list'):\n"
+        "    setattr(builtins, name, None)\n"
+        "json.dumps = json.loads = os.read = os.write = sys.setrecursionlimit = None\n"
+        + task("say('a')\ngo_to(\"amy's lab\")\nsay(ask('', '', ['2']))"),
+        ["a", "2"],
+    ),
+    "robot errors of one kind are of one class": (
+        task(
+            "kinds = []\nfor room in 'xy':\n    try:\n        go_to(room)\n"
+            "    except Exception as error: kinds.append(type(error))\n"
+            "say(str(kinds[0] is kinds[1]))"
+        ),
+        ["True"],
+    ),
+    "what is known is asked again": (
+        task(
+            "for i in range(2): say(str(is_in_room('mug')))\ngo_to(\"amy's lab\")\n"
+            "for i in range(2): say(str(is_in_room('mug')))\npick('mug')\n"
+            "say(str(is_in_room('stapler')) + get_current_location())\n"
+            "get_all_rooms().clear()\nsay(str(len(get_all_rooms())))"
+        ),
+        ["False", "False", "True", "True", "Trueamy's lab", "3"],
+    ),
+    "timed waits cost simulated time": (
+        task(
+            "import queue, select, threading\n"
+            "threading.Event().wait(2)\nsay(str(time.monotonic()))\n"
+            "try:\n    queue.Queue().get(timeout=100)\nexcept queue.Empty:\n    say(str(time.monotonic()))\n"
+            "try:\n    queue.SimpleQueue().get(timeout=3)\nexcept queue.Empty: say(str(time.monotonic()))\n"
+            "lock = threading.Lock()\nwith lock:\n    say(str(lock.acquire(timeout=5)))\n"
+            "say(str(lock.acquire(False)) + str(lock.acquire(False)) + str(time.monotonic()))\n"
+            "threading.Condition().__enter__()\nselect.select([], [], [], 10)\nsay(str(time.monotonic()))\n"
+            "with threading.RLock() as held: say(str(held))"
+        ),
+        ["2.0", "102.0", "105.0", "False", "TrueFalse110.0", "120.0", "True"],
+    ),
+    "chance and identities repeat": (
+        task(
+            "import _random, os, random, threading, uuid\n"
+            "for kind in (_random.Random, random.Random, type(random._inst)): say(str(kind().random()))\n"
+            "say(str((os.getpid(), threading.get_native_id(), threading.main_thread().native_id)))\n"
+            "say(str(uuid.uuid1(clock_seq=7)))"
+        ),
+        [*["0.8444218515250481"] * 3, "(1, 1, 1)", "4a016000-a89d-11ee-8007-000000000001"],
+    ),
     "prints a gigabyte": (task("text = 'x' * 10**6\nfor i in range(1000): print(text)\nsay('a')"), ["a"]),
     "swallows a caught stop of its own": (task("try:\n    exit()\nexcept SystemExit:\n    say('a')"), ["a"]),
 }
@@ -206,6 +264,7 @@ T = Status.TIMEOUT
 P = Status.PYTHON_ERROR
 ON_THE_LINE = "the program spoke on the robot's line"
 SPENT = "200,000 turns of loops"
+TOO_DEEP = "the program is too large, or nested too deeply"
 SUPPRESSED = "from contextlib import suppress\nwith suppress(BaseException):\n    while 1: pass\n"
 FAILS: dict[str, tuple[str, object]] = {
     "16 endless recursion keeps its class": (
@@ -314,6 +373,47 @@ FAILS: dict[str, tuple[str, object]] = {
         task("say('x' * 2_000_000)"),
         (T, "TimeoutError", "a text of more than 10,000 characters"),
     ),
+    # exceptions that deceive
+    "raises the robot's error anew": (
+        task("try:\n    go_to('x')\nexcept Exception as error:\n    raise type(error)('mine')"),
+        (Status.ROBOT_ERROR, "GoToInvalidLocation", 'there is no room "x"'),
+    ),
+    "exception of a class that lies about its name": (
+        task(
+            "class M(type):\n    __name__ = property(lambda cls: 1 / 0)\n"
+            "class E(Exception, metaclass=M): pass\nraise E('a')"
+        ),
+        (P, "E", "a"),
+    ),
+    "exception that lies about its class": (
+        task(
+            "class E(Exception):\n    __class__ = property(lambda self: 1 / 0)\n"
+            "    __traceback__ = code = number = property(lambda self: 1 / 0)\n"
+            "    def __eq__(self, other): return 1 / 0\n    def __str__(self): return 1 / 0\nraise E('a')"
+        ),
+        (P, "E", ""),
+    ),
+    "exit of a class that lies about its code": (
+        task("class E(SystemExit):\n    code = property(lambda self: None)\nraise E(3)"),
+        (P, "E", "3"),
+    ),
+    # what does not parse
+    "null character": ("x = 1\ny = '\0'\n", (P, "SyntaxError", "source code cannot contain null characters")),
+    "nested too deeply": ("x = " + "[" * 150 + "-" * 150 + "1" + "]" * 150, (P, "MemoryError", TOO_DEEP)),
+    "nested far too deeply": ("x = " + "-" * 100_000 + "1", (P, "MemoryError", TOO_DEEP)),
+    "too many blocks": (
+        "".join(" " * n + "while 1:\n" for n in range(21)) + " " * 21 + "pass\n",
+        (P, "SyntaxError", "too many statically nested blocks"),
+    ),
+    "imports what is ours": (
+        "import codebotler\n",
+        (P, "ModuleNotFoundError", "No module named 'codebotler'"),
+    ),
+    "imports what nobody has": ("import numpy\n", (P, "ModuleNotFoundError", "No module named 'numpy'")),
+    "imports it by a call": (
+        "__import__('numpy')\n",
+        (P, "ModuleNotFoundError", "No module named 'numpy'"),
+    ),
     # what hangs, and what the kernel refuses
     "hangs in C": (
         task("sum(range(10**12))"),
@@ -388,6 +488,11 @@ LINES: dict[str, tuple[str, object]] = {
     "in a skill": (task("say('a')\ngo_to('attic')"), ("GoToInvalidLocation", 3)),
     "in a loop": (task("for i in range(3):\n    pick('mug')"), ("PickInvalidObject", 3)),
     "in a loop without end": (task("\n\nwhile True:\n    x = 1"), ("TimeoutError", 5)),
+    "null character": ("x = 1\ny = '\0'\n", ("SyntaxError", 2)),
+    "too many blocks": (
+        "".join(" " * n + "while 1:\n" for n in range(21)) + " " * 21 + "pass\n",
+        ("SyntaxError", 21),
+    ),
     "nowhere": ("def main(): pass\n", ("NameError", None)),
     **{
         f"sleeping for {wrong or 'nothing'}": (task(f"say('a')\ntime.sleep({wrong})"), (kind, 3))
@@ -452,7 +557,7 @@ def test_program_fails_with_the_right_status_and_leaves_the_next_one_alone(
     assert outcome.status == status
     assert kind in (None, outcome.error.kind)
     assert outcome.error.message.startswith(message or "")
-    if kind != "RecursionError":
+    if kind not in ("RecursionError", "GoToInvalidLocation"):
         assert outcome.trace == ()
     assert said(outcomes[f"after {name}"]) == [f"honest {list(FAILS).index(name)}"]
 

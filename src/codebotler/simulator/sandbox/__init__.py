@@ -1,14 +1,35 @@
-"""The isolated side of the engine: a zygote that forks one closed child for each run of a program.
+"""The isolated side of the engine: processes that prepare programs, and fork one closed child for each run.
 
 A child holds the program and nothing else: the world, the robot and the trace stay with the engine, and the
-child asks for skills over a socket. Everything it says is checked there; here is only what keeps it in. The
-zygote runs under a bare interpreter, so nothing here imports more than the standard library.
+child asks for skills over a socket. Everything it says is checked there; here is only what keeps it in. All
+of it runs under a bare interpreter and imports as little as it can, since every page of memory and every
+library makes each fork dearer.
 """
 
-from pathlib import Path
+START = __file__.rpartition("/")[0] + "/start.py"
+"""The script that the engine starts, with the name of a role and the descriptors for it."""
 
-ZYGOTE = Path(__file__).with_name("zygote.py")
-"""The script that the engine starts."""
+FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
+"""The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings."""
 
-FLAGS = ("-S", "-s", "-P", "-B")
-"""The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written."""
+CHANNEL = 3
+"""The descriptor by which a closed process and the engine talk: HEADER bytes of length, then content."""
+
+HEADER, MAX_FRAME = 4, 1_000_000
+
+MEMORY = 512 * 1024 * 1024
+"""Bytes of address space of an isolated process."""
+
+CPU_SECONDS = 5
+"""Seconds of processor time of a closed process, against what ticks cannot see, such as one long call."""
+
+PREPARER, ZYGOTE, LIBRARY_ZYGOTE = "preparer", "zygote", "library-zygote"
+"""The roles: who compiles programs, who forks runs, and who forks runs that import something."""
+
+ACTS, TELLS, LOOKS = 0, 1, 2
+"""How a skill is called: waiting for its result; without waiting, since there is none and it cannot fail; and
+waiting only until the result is known, which then stays as it is until the robot acts."""
+
+PLAIN, IMPORTING, REFUSED = b"p", b"i", b"-"
+"""What the preparer's answer begins with: before the code of a program, before that of one which imports more
+than is always there, and before the reason why there is none."""

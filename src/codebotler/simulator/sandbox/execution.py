@@ -6,69 +6,102 @@ import builtins
 import itertools
 import sys
 import types
-from collections.abc import Callable
-from typing import Any
+from _json import encode_basestring_ascii as quoted
+from marshal import loads
+from sys import setrecursionlimit
 
+from codebotler.simulator.sandbox import ACTS, LOOKS, TELLS
 from codebotler.simulator.sandbox.channel import receive, send
-from codebotler.simulator.sandbox.ticks import ENTER, ENTRY, PROGRAM, TICK, prepared
 
-# Python 3.11 counts calls into C as well: with one more, a function can call itself as often as under 3.12.
-RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any, TypeAlias
+
+    Skills: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
+
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # functions below look here for `len`, not where a program can write
+
+# The names and the file that `ticks` gives a program; what parses it is too large to be here.
+PROGRAM = "<program>"
+TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"
+
+# Python 3.11 counts calls into C as well: with two more, a function can call itself as often as under 3.12.
+RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1002
 HEADROOM = 50  # for what a skill calls, so that the limit is met by the program, not on the way to the robot
 
 
 class Run:
     """One run of one program: its budget, its clock and its line to the engine.
 
-    Args:
-        job: what the engine sent: source, literals, skills, ticks, clock.
+    All that can be is made before the fork, in the zygote.
     """
 
-    def __init__(self, job: dict[str, Any]) -> None:
-        self.job = job
+    def __init__(self) -> None:
+        self.skills: Skills = ()
         self.now = 0.0
-        self.spent = False
-        self.entered = False
-
-    def execute(self) -> dict[str, object]:
-        """Run the program to its end and say how it ended."""
-        namespace = types.ModuleType("__main__")
-        for name, function in self.names().items():
-            setattr(namespace, name, function)
-        sys.modules["__main__"] = namespace
-        tick = self.ticker()
-        setattr(builtins, TICK, tick)
+        self.spent = self.entered = False
+        self.ticks = self.calls = self.room = 0
+        self.start = self.seconds = 0.0
+        self.longest = 0
+        self.known: dict[str, Any] = {}
+        self.namespace = types.ModuleType("__main__")
         # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
-        setattr(builtins, ENTRY, lambda: tick())  # noqa: PLW0108 - the call in between is what it is for
-        setattr(builtins, ENTER, self.enter)
-        try:
-            code = prepared(self.job["source"], lowercase=self.job["literals"] == "lowercase")
-            exec(code, namespace.__dict__)  # noqa: S102 - this is what the sandbox is for
-            if not self.entered:
-                exec("task_program()", namespace.__dict__)  # noqa: S102 - the same
-        except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
-            return self.ended_by(error)
-        return {"end": "timeout", "line": None} if self.spent else {"end": "finished"}
+        tick = self.ticker()
+        for name, function in ((TICK, tick), (ENTRY, lambda: tick()), (ENTER, self.enter)):  # noqa: PLW0108
+            setattr(builtins, name, function)
 
-    def ended_by(self, error: BaseException) -> dict[str, object]:
-        """Describe what ended the program."""
-        line = last_line(error)
-        if self.spent or isinstance(error, BudgetSpentError):
-            return {"end": "timeout", "line": line}
-        if isinstance(error, SystemExit) and (
-            error.code is None or (type(error.code) is int and error.code == 0)
-        ):
-            return {"end": "finished"}
-        if isinstance(error, RobotError) and error.number >= 0:
-            return {"end": "robot-error", "number": error.number, "line": line}
-        if isinstance(error, SyntaxError) and line is None:
-            line = error.lineno
-        return {
-            "end": "python-error",
-            "kind": type.__getattribute__(type(error), "__name__")[:100],
-            "message": message_of(error)[:1000],
-            "line": line,
-        }
+    def provide(self, skills: Skills) -> None:
+        """Give the program what it can use without an import: the skills, and `sys` and `time`.
+
+        Args:
+            skills: name, parameters (name and type, `str` or `list`) and way of calling of each.
+        """
+        self.skills = skills
+        names = vars(self.namespace)
+        names.update((name, self.skill(name, parameters, way)) for name, parameters, way in skills)
+        names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
+
+    def execute(self, code: bytes, limits: tuple[int, float, int, int, int, float]) -> str:
+        """Run the program to its end and say how it ended.
+
+        Args:
+            code: marshalled.
+            limits: ticks, simulated seconds, skill calls, characters of a text and of all texts; and what the
+                clock shows at the start, in seconds.
+        """
+        self.ticks, self.seconds, self.calls, self.longest, self.room, self.start = limits
+        names = vars(self.namespace)
+        sys.modules["__main__"] = self.namespace
+        try:
+            exec(loads(code), names)  # noqa: S102, S302 - this is what the sandbox is for
+            if not self.entered:
+                exec("task_program()", names)  # noqa: S102 - the same
+        except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
+            setrecursionlimit(RECURSION_LIMIT + HEADROOM)
+            return self.ended_by(error)
+        return '{"end":"timeout","line":null}' if self.spent else '{"end":"finished"}'
+
+    def ended_by(self, error: BaseException) -> str:
+        """Describe what ended the program; the exception's class may be the program's own."""
+        kind, line = type(error), last_line(error)
+        message = str.__getitem__(message_of(error), slice(1000))  # it may take ticks
+        where = f'"line":{"null" if line is None else line}'
+        if self.spent or issubclass(kind, BudgetSpentError):
+            return f'{{"end":"timeout",{where}}}'
+        if issubclass(kind, SystemExit):
+            code = own(SystemExit, "code", error)
+            if code is None or (type(code) is int and code == 0):
+                return '{"end":"finished"}'
+        if issubclass(kind, RobotError):
+            number = number_of(error)
+            if number is not None:
+                return f'{{"end":"robot-error","number":{number},{where}}}'
+        if issubclass(kind, SyntaxError) and line is None:
+            lineno = own(SyntaxError, "lineno", error)
+            where = f'"line":{lineno if type(lineno) is int else "null"}'
+        name = str.__getitem__(NAME_OF(kind), slice(100))
+        return f'{{"end":"python-error","kind":{quoted(name)},"message":{quoted(message)},{where}}}'
 
     def enter(self) -> None:
         """Note that the program has started `task_program` by itself."""
@@ -77,32 +110,24 @@ class Run:
     def ticker(self) -> Callable[[], None]:
         """The function that counts ticks and, once they are spent, raises each time it is called."""
         count = itertools.count(1).__next__
-        limit = self.job["ticks"]
 
         def tick() -> None:
-            if count() > limit or self.spent:
+            if count() > self.ticks or self.spent:
                 self.spent = True
                 raise BudgetSpentError
 
         return tick
 
-    def names(self) -> dict[str, object]:
-        """What a program can use without an import: the skills, and `sys` and `time`."""
-        return {name: self.skill(name, parameters) for name, parameters in self.job["skills"]} | {
-            "sys": sys,
-            "time": sys.modules["time"],
-        }
-
-    def skill(self, name: str, parameters: list[list[str]]) -> object:
+    def skill(self, name: str, parameters: tuple[tuple[str, str], ...], way: int) -> object:
         """A function with a skill's name and parameters that asks the engine."""
         names = ", ".join(parameter for parameter, _ in parameters)
         arguments = "".join(f"{parameter}, " for parameter, _ in parameters)
         types_: list[tuple[str, type]] = [
-            (parameter, list if kind == "list" else str) for parameter, kind in parameters
+            (name, list if kind == "list" else str) for name, kind in parameters
         ]
         scope = {
-            "perform": lambda *values: self.perform(name, types_, values),
-            "limit": sys.setrecursionlimit,
+            "perform": lambda *values: self.perform(name, types_, way, values),
+            "limit": setrecursionlimit,
         }
         exec(  # noqa: S102 - of trusted text
             f"def {name}({names}):\n"
@@ -113,53 +138,86 @@ class Run:
         )
         return scope[name]
 
-    def perform(self, name: str, parameters: list[tuple[str, type]], values: tuple[Any, ...]) -> Any:  # noqa: ANN401
+    def perform(
+        self, name: str, parameters: list[tuple[str, type]], way: int, values: tuple[Any, ...]
+    ) -> Any:  # noqa: ANN401
         """Ask the engine for a skill; texts must be `str` and options a `list`, exactly."""
-        arguments: list[object] = []
         options: list[Any] = []
+        arguments = []
         for (parameter, kind), value in zip(parameters, values, strict=True):
             given: type = type(value)
             if given is not kind:
                 wanted = "a list" if kind is list else "text"
-                raise TypeError(f"{name}: {parameter} must be {wanted}, not {given.__name__}")
+                raise TypeError(f"{name}: {parameter} must be {wanted}, not {NAME_OF(given)}")
             if kind is list:
                 options = list(value)
-                arguments.append([[str(option), isinstance(option, str)] for option in options])
+                arguments.append(f"[{','.join([option_text(option) for option in options])}]")
             else:
-                arguments.append(value)
-        result = self.request([name, arguments])
-        return options[result] if options and isinstance(result, int) else result
+                arguments.append(quoted(value))
+        if self.spent:
+            raise BudgetSpentError
+        request = f"{quoted(name)},[{','.join(arguments)}]"
+        result = self.ask(request, way)
+        return options[result] if options and type(result) is int else result
+
+    def ask(self, request: str, way: int) -> Any:  # noqa: ANN401 - what a skill returns
+        """Ask for a skill, and wait for the answer only where it is not known before."""
+        self.calls -= 1
+        self.room -= len(request)
+        if way != ACTS and self.calls >= 0 and self.room > 0 and len(request) <= self.longest:
+            if way == TELLS:
+                return self.tell(request)
+            if request in self.known:
+                self.tell(request)
+                known = self.known[request]
+                return known.copy() if type(known) is list else known
+        if way == ACTS:
+            self.known.clear()
+        result = self.request(request)
+        if way == LOOKS:
+            self.known[request] = result.copy() if type(result) is list else result
+        return result
 
     def sleep(self, seconds: object, /) -> None:
         """Let simulated time pass; the engine hears of it with the next request, or when the time is up."""
         if not isinstance(seconds, int | float):
-            raise TypeError(f"{type(seconds).__name__!r} object cannot be interpreted as an integer")
+            raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
             raise ValueError("sleep length must be non-negative and finite")
         self.now += seconds
-        if self.now > self.job["seconds"]:
-            self.request(["sleep", []])
+        if self.now > self.seconds:
+            self.request('"sleep",[]')
 
-    def request(self, message: list[object]) -> Any:  # noqa: ANN401 - what a skill returns
+    def wait_for_ever(self) -> None:
+        """End the run: nothing that the program waits for can come, since it is alone."""
+        self.request('"wait",[]')
+
+    def tell(self, request: str) -> None:
+        """Send one request that needs no reply, with the time at which it is made."""
+        send(f"[{request},{self.now!r},0]")
+
+    def request(self, request: str) -> Any:  # noqa: ANN401 - what a skill returns
         """Send one request with the time at which it is made, and wait for its reply."""
         if self.spent:
             raise BudgetSpentError
-        send([*message, self.now])
+        send(f"[{request},{self.now!r},1]")
         kind, value = receive()
         if kind == "ok":
             return value
         if kind == "error":
-            number, name, text = value
-            error = type(name, (RobotError,), {"__module__": "robot"})(text)
-            error.number = number
-            raise error
+            raise robot_error(*value)
         self.spent = True
         raise BudgetSpentError
 
 
+def option_text(option: object) -> str:
+    """An option as it crosses the line: its text, and whether it was one."""
+    return f"[{quoted(str(option))},{'true' if issubclass(type(option), str) else 'false'}]"
+
+
 def last_line(error: BaseException) -> int | None:
     """The line of the program at which an exception arose."""
-    line, traceback = None, error.__traceback__
+    line, traceback = None, own(BaseException, "__traceback__", error)
     while traceback is not None:
         if traceback.tb_frame.f_code.co_filename == PROGRAM:
             line = traceback.tb_lineno
@@ -167,14 +225,21 @@ def last_line(error: BaseException) -> int | None:
     return line
 
 
+def own(kind: type[BaseException], name: str, error: BaseException) -> Any:  # noqa: ANN401 - of any type
+    """An attribute of an exception as its base class keeps it, past what a class of the program may say."""
+    return kind.__dict__[name].__get__(error)
+
+
 def message_of(error: BaseException) -> str:
-    """What an exception says; its class may be the program's own."""
-    if isinstance(error, SyntaxError) and error.filename == PROGRAM and isinstance(error.msg, str):
-        return error.msg  # without the place, which is said beside it
+    """What an exception says."""
     try:
-        return str.__str__(str(error))
+        return str(error)
     except BaseException:  # noqa: BLE001 - the program's own __str__ may raise anything
         return ""
+
+
+NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
+"""The name of a class, past what its metaclass may say."""
 
 
 class BudgetSpentError(BaseException):
@@ -185,3 +250,31 @@ class RobotError(Exception):
     """The robot could not do what the program asked for."""
 
     number = -1
+
+
+RAISED: dict[str, type[RobotError]] = {}
+
+
+def robot_error(number: int, kind: str, text: str) -> RobotError:
+    """An error of the robot, of one class for each kind.
+
+    Args:
+        number: by which the engine knows it; what the program makes of its class stands for the latest.
+        kind: the name of its class.
+        text: what it says.
+    """
+    if kind not in RAISED:
+        RAISED[kind] = type(kind, (RobotError,), {"__module__": "robot"})
+    RAISED[kind].number = number
+    error = RAISED[kind](text)
+    error.number = number
+    return error
+
+
+def number_of(error: BaseException) -> int | None:
+    """The number of a robot's error; None for an error of the program's own making."""
+    try:
+        number = error.number  # type: ignore[attr-defined]  # or whatever the program has made of it
+    except BaseException:  # noqa: BLE001 - the same
+        return None
+    return number if type(number) is int and number >= 0 else None

@@ -1,95 +1,142 @@
-"""Forks one child a run, each from the same heap, and reports how it ended."""
+"""The zygote: forks one child a run, each from the same heap, and reports how it ended."""
 
 from __future__ import annotations
 
-import contextlib
-import ctypes
 import gc
-import importlib
 import os
-import platform
-import select
-import signal
-import socket
-import struct
-from typing import NoReturn
+import sys
+from _socket import CMSG_SPACE, socket
+from marshal import loads
+from posix import getpid, getppid
 
-from codebotler.simulator.sandbox.channel import CHANNEL, receive, send
+from codebotler.simulator.sandbox import CHANNEL
+from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.execution import Run
 from codebotler.simulator.sandbox.surroundings import simulate_surroundings
-from codebotler.simulator.sandbox.walls import can_install, enclose, seccomp_filter
+from codebotler.simulator.sandbox.walls import die_with_parent, enclose, give_up_rights, usable_filter
 
-WAKE, DOOR, REPORT = 4, 5, 6
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import NoReturn
 
-PRELOADED = """
-    abc array asyncio base64 bisect calendar cmath codecs collections collections.abc colorsys
-    concurrent.futures contextlib copy csv dataclasses datetime _strptime decimal difflib enum fractions
-    functools hashlib heapq html inspect io itertools json keyword locale logging math numbers operator
-    os os.path pathlib pprint queue random re secrets shlex signal socket statistics string struct
-    subprocess sys tempfile textwrap threading time timeit traceback types typing unicodedata unittest
-    unittest.mock uuid warnings weakref zoneinfo encodings.ascii encodings.base64_codec
-    encodings.charmap encodings.cp1252 encodings.hex_codec encodings.idna encodings.latin_1
-    encodings.punycode encodings.raw_unicode_escape encodings.rot_13 encodings.unicode_escape
-    encodings.utf_16 encodings.utf_16_be encodings.utf_16_le encodings.utf_32 encodings.utf_7
-    encodings.utf_8 encodings.utf_8_sig
-""".split()  # noqa: SIM905 - a list of a hundred quoted words is no easier to read
+    from codebotler.simulator.sandbox.walls import Filter
+
+DOOR, REPORT = 4, 5
+DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
 
 
-def serve() -> None:
+def serve(root: str, *, library: bool) -> None:
     """Serve runs, one at a time, until the engine closes its end.
 
-    All that a program may import is imported here: the walls allow no file to be opened later.
+    Args:
+        root: the folder from which our own modules were imported; programs do not find it.
+        library: whether programs are to find the standard library.
     """
-    for name in PRELOADED:
-        importlib.import_module(name)
-    seccomp = seccomp_filter(platform.machine())
-    if seccomp is not None and not can_install(seccomp):
-        seccomp = None
-    door = socket.socket(fileno=DOOR)
+    door = socket(fileno=DOOR)
+    run = Run()
+    simulate_surroundings(run)
+    run.provide(loads(door.recv(1 << 16)))  # noqa: S302 - from the engine
+    if library:
+        from codebotler.simulator.sandbox.library import load_library  # noqa: PLC0415 - it is large
+
+        load_library(run)
+    sys.path.remove(root)
+    sys.pycache_prefix = None
+    for name in [name for name in sys.modules if name.partition(".")[0] == "codebotler"]:
+        del sys.modules[name]
+    sys.meta_path[:] = [NothingMore() if library else MoreInTheLibrary()]
+    give_up_rights()
+    seccomp = usable_filter()
     gc.collect()
     gc.freeze()
-    os.write(REPORT, struct.pack("=q", 0 if seccomp is None else 1))
-    while one_run(door, seccomp):
+    report(0 if seccomp is None else 1)
+    while one_run(door, run, seccomp):
         pass
 
 
-def child(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None, parent: int) -> NoReturn:
-    """Be the child of one run: take the channel, close the walls, run the program, say how it ended."""
-    descriptors = socket.recv_fds(door, 1, 1)[1]
-    os.dup2(descriptors[0], CHANNEL)
-    os.closerange(CHANNEL + 1, 256)
-    job = receive()
-    enclose(job, seccomp, parent)
-    send("ready")
-    run = Run(job)
-    simulate_surroundings(run)
-    send(run.execute())
-    os._exit(0)
+class NothingMore:
+    """Finds no module: all that a program can import has been imported."""
+
+    def find_spec(self, name: str, *_: object) -> NoReturn:
+        """Say so, in Python's words."""
+        raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
-def one_run(door: socket.socket, seccomp: ctypes.Array[ctypes.c_char] | None) -> bool:
+class MoreInTheLibrary:
+    """Ends a run whose program imports something here, so that it is repeated where the library is loaded."""
+
+    def find_spec(self, *_: object) -> NoReturn:
+        """Say so to the engine."""
+        send('{"end":"again"}')
+        os._exit(0)
+
+
+def one_run(door: socket, run: Run, seccomp: Filter | None) -> bool:
     """Fork the child of one run and report its process id and, at its end, its wait status.
 
-    The dead child is reaped only when the next run is asked for, so that until then its id stays its own. All
-    that is allocated here is freed on return, so that every child starts from the same heap.
+    The dead child is reaped only when the next run is asked for, so that until then its id stays its own.
     """
-    if not os.read(WAKE, 1):
+    line = asked_for(door)
+    if line < 0:
         return False
-    with contextlib.suppress(ChildProcessError):
-        os.waitpid(-1, 0)
-    parent = os.getpid()
+    parent = getpid()
     pid = os.fork()
     if pid == 0:
         try:
-            child(door, seccomp, parent)
+            child(line, run, seccomp, parent)
         finally:
             os._exit(1)
-    os.write(REPORT, struct.pack("=q", pid))
-    watch = os.pidfd_open(pid)
-    if watch not in select.select([watch, WAKE], [], [])[0]:
-        os.kill(pid, signal.SIGKILL)  # the engine is gone
-    os.close(watch)
-    ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
-    status = 0 if ended is None else ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
-    os.write(REPORT, struct.pack("=q", status))
+    os.close(line)
+    report(pid)
+    report(end_of(pid))
     return True
+
+
+def asked_for(door: socket) -> int:
+    """Wait for the next run, bury the last child, and return the descriptor of the new one's line."""
+    ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR))[1]
+    if not ancillary:
+        return -1
+    try:  # noqa: SIM105 - contextlib is large
+        os.waitpid(-1, 0)
+    except ChildProcessError:
+        pass
+    return int.from_bytes(ancillary[0][2][:DESCRIPTOR], sys.byteorder)
+
+
+def end_of(pid: int) -> int:
+    """Wait for the end of a child; its status, or minus the signal."""
+    ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+    if ended is None:
+        return 0
+    return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
+
+
+def child(line: int, run: Run, seccomp: Filter | None, parent: int) -> NoReturn:
+    """Be the child of one run: take the channel, close the walls, run the program, say how it ended."""
+    os.dup2(line, CHANNEL)
+    os.closerange(CHANNEL + 1, 256)
+    die_with_parent()
+    if getppid() != parent:  # it died before that: no signal will come
+        os._exit(1)
+    enclose(seccomp)
+    steady_heap()
+    code, skills, limits = receive()
+    if skills != run.skills:
+        run.provide(skills)
+    send(run.execute(code, limits))
+    os._exit(0)
+
+
+def steady_heap() -> None:
+    """Use up what the zygote has freed, in an order that differs between forks: addresses would show it."""
+    KEPT.append([[bytes(size), object()] for size in SIZES for _ in range(EACH)])
+
+
+KEPT: list[object] = []
+SIZES, EACH = range(0, 144, 16), 3
+
+
+def report(number: int) -> None:
+    """Tell the engine a number."""
+    os.write(REPORT, number.to_bytes(8, sys.byteorder, signed=True))

@@ -4,26 +4,77 @@ from __future__ import annotations
 
 import ast
 import types
+from collections.abc import Iterator
 
 PROGRAM = "<program>"
 TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"  # names that no source text can spell
+TASK = "task_program"
+DEEPEST = 250
+MOST_BLOCKS = 20
+BLOCKS = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
+SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 
-def prepared(source: str, *, lowercase: bool) -> types.CodeType:
+def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset[str]]:
     """Parse a program, lower its literals if the suite wants it, and compile it with ticks.
 
+    Returns:
+        the code, and the names of the modules that import statements name.
+
     Raises:
-        SyntaxError: it does not parse (and what else the compiler raises).
+        SyntaxError: it does not parse.
+        MemoryError: it is too large, or nested more deeply than every version of Python can hold.
     """
     if "\0" in source:
-        raise SyntaxError("source code cannot contain null characters", (PROGRAM, 1, 1, None))
-    tree = ast.parse(source, PROGRAM)
-    nodes = list(ast.walk(tree))
-    if lowercase:
-        lower_literals(nodes)
-    for node in nodes:
-        add_ticks(node)
-    return compile(tree, PROGRAM, "exec", dont_inherit=True)
+        line = source.count("\n", 0, source.index("\0")) + 1
+        raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
+    try:
+        tree = ast.parse(source, PROGRAM)
+        nodes = list(walk(tree))
+        imports = frozenset(name for node in nodes for name in imported(node))
+        if lowercase:
+            lower_literals(nodes)
+        for node in nodes:
+            add_ticks(node)
+        for node in tree.body:
+            note_entries(node)
+        return compile(tree, PROGRAM, "exec", dont_inherit=True), imports
+    except (RecursionError, MemoryError):
+        raise MemoryError("the program is too large, or nested too deeply") from None
+
+
+def walk(tree: ast.AST) -> Iterator[ast.AST]:
+    """All nodes of a tree.
+
+    Versions of Python differ in how deep they can go and in where they notice, so that both is decided here.
+
+    Raises:
+        MemoryError: it is nested too deeply.
+        SyntaxError: too many loops and the like stand in each other.
+    """
+    waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]
+    while waiting:
+        node, depth, blocks = waiting.pop()
+        if depth > DEEPEST:
+            raise MemoryError
+        if isinstance(node, SCOPES):
+            blocks = 0
+        elif isinstance(node, BLOCKS):
+            blocks += 1
+            if blocks > MOST_BLOCKS:
+                raise SyntaxError("too many statically nested blocks", (PROGRAM, node.lineno, 1, None))
+        yield node
+        waiting.extend((child, depth + 1, blocks) for child in ast.iter_child_nodes(node))
+
+
+def imported(node: ast.AST) -> list[str]:
+    """The modules that a node imports, if it is an import statement."""
+    match node:
+        case ast.Import(names):
+            return [alias.name for alias in names]
+        case ast.ImportFrom(module=module, level=level):
+            return ["." * level + (module or "")]
+    return []
 
 
 def lower_literals(nodes: list[ast.AST]) -> None:
@@ -43,11 +94,7 @@ def add_ticks(node: ast.AST) -> None:
     """Count a node's turns or entries: a tick at the head of what it runs again."""
     match node:
         case ast.FunctionDef() | ast.AsyncFunctionDef():
-            head = [call(ENTRY, node.body[0])]
-            if node.name == "task_program":
-                head.append(call(ENTER, node.body[0]))
-            at = 1 if ast.get_docstring(node, clean=False) is not None else 0
-            node.body[at:at] = head
+            insert_head(node, ENTRY)
         case ast.For() | ast.AsyncFor() | ast.While() | ast.ExceptHandler():
             node.body.insert(0, call(TICK, node.body[0]))
         case ast.Try() | ast.TryStar():
@@ -59,6 +106,26 @@ def add_ticks(node: ast.AST) -> None:
         case ast.comprehension():
             tick = call(TICK, node.iter).value
             node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), tick), node.iter))
+        case ast.Call(func=ast.Name(id=name)) if name == TASK:
+            enter = call(ENTER, node.func).value
+            node.func = ast.copy_location(ast.BoolOp(ast.Or(), [enter, node.func]), node.func)
+
+
+def note_entries(statement: ast.stmt) -> None:
+    """Let each function of the module that bears the task's name note that it was entered, however called."""
+    waiting: list[ast.AST] = [statement]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == TASK:
+            insert_head(node, ENTER)
+        if not isinstance(node, SCOPES):
+            waiting.extend(ast.iter_child_nodes(node))
+
+
+def insert_head(node: ast.FunctionDef | ast.AsyncFunctionDef, name: str) -> None:
+    """Call a function of ours first thing in a function, after its docstring."""
+    at = 1 if ast.get_docstring(node, clean=False) is not None else 0
+    node.body.insert(at, call(name, node.body[0]))
 
 
 def call(name: str, where: ast.AST) -> ast.Expr:

@@ -5,55 +5,64 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
-import signal
-import struct
 import sys
-from typing import Any
 
-from codebotler.simulator.sandbox.channel import CHANNEL
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, MEMORY
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    Filter: TypeAlias = ctypes.Array[ctypes.c_char]
 
 
-def enclose(job: dict[str, Any], seccomp: ctypes.Array[ctypes.c_char] | None, parent: int) -> None:
-    """Close everything but the channel and give up every right, in the only order that works."""
-    for name, value in limits(job["memory"], job["cpu"]).items():
-        set_limit(name, value)
+def give_up_rights() -> None:
+    """Give up for ever what neither this process needs nor any that it forks."""
+    for name in ("CORE", "FSIZE", "MEMLOCK", "MSGQUEUE"):
+        set_limit(name, 0)
+    set_limit("AS", MEMORY)
     become_nobody()
-    die_with(parent)
+    die_with_parent()
     hide_memory()
     refuse_new_rights()
+
+
+def enclose(seccomp: Filter | None) -> None:
+    """Close everything but the channel; after `give_up_rights`, here or in the process that forked this one.
+
+    Args:
+        seccomp: what may be asked of the kernel; None where it takes no such list.
+    """
+    set_limit("NPROC", 0)
+    set_limit("NOFILE", CHANNEL + 1)
+    limit_time(CPU_SECONDS)
     if seccomp is not None:
         install(seccomp)
 
 
-def limits(memory: int, cpu: int) -> dict[str, tuple[int, int]]:
-    """The limits of a child by name, each with the one to which a process may raise it.
-
-    Args:
-        memory: bytes of address space.
-        cpu: seconds of processor time.
-    """
-    none = dict.fromkeys(("CORE", "FSIZE", "NPROC", "MEMLOCK", "MSGQUEUE"), (0, 0))
-    return {**none, "NOFILE": (4, 4), "AS": (memory, memory), "CPU": (cpu, cpu + 1)}
+def set_limit(name: str, value: int) -> None:
+    """Set one limit of this process for ever; some systems have fewer of them."""
+    kind = getattr(resource, "RLIMIT_" + name, None)
+    if kind is not None:
+        resource.setrlimit(kind, (value, value))
 
 
-def set_limit(name: str, value: tuple[int, int]) -> None:
-    """Set one limit of this process."""
-    resource.setrlimit(getattr(resource, "RLIMIT_" + name), value)
+def limit_time(seconds: int) -> None:
+    """End this process by SIGXCPU when it has used so much processor time, a second later by SIGKILL."""
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
 
 def become_nobody() -> None:
-    """Give up being root; whoever is not stays who they are."""
+    """Give up being root, whom RLIMIT_NPROC does not bind; whoever is not root stays who they are."""
     if os.geteuid() == 0:
         os.setgroups([])
         os.setresgid(NOBODY, NOBODY, NOBODY)
         os.setresuid(NOBODY, NOBODY, NOBODY)
 
 
-def die_with(parent: int) -> None:
-    """Be killed when the parent ends; a change of user would undo this."""
-    prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before that: no signal will come
-        os._exit(1)
+def die_with_parent() -> None:
+    """Be killed when the thread ends that has started this process; a change of user would undo this."""
+    prctl(PR_SET_PDEATHSIG, SIGKILL)
 
 
 def hide_memory() -> None:
@@ -66,19 +75,23 @@ def refuse_new_rights() -> None:
     prctl(PR_SET_NO_NEW_PRIVS, 1)
 
 
-def install(seccomp: ctypes.Array[ctypes.c_char]) -> None:
+def install(seccomp: Filter) -> None:
     """Ask nothing more of the kernel than the list allows."""
     prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
 
 
 NOBODY = 65534
+SIGKILL = 9
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 38
+MACHINE = os.uname().machine
 SECCOMP_MODE_FILTER = 2
 LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 def prctl(option: int, *values: int) -> None:
-    """Ask the kernel to change what this process may do."""
+    """Ask the kernel to change what this process may do; only Linux can be asked."""
+    if sys.platform != "linux":
+        return
     arguments = [ctypes.c_ulong(value) for value in (*values, 0, 0, 0, 0)[:4]]
     if LIBC.prctl(ctypes.c_int(option), *arguments) != 0:
         raise OSError(ctypes.get_errno(), f"prctl({option}) failed")
@@ -105,12 +118,12 @@ X32 = 0x40000000
 PROT_EXEC = 4
 
 
-def seccomp_filter(machine: str) -> ctypes.Array[ctypes.c_char] | None:
+def seccomp_filter(machine: str = MACHINE) -> Filter | None:
     """The list of what a child may ask of the kernel, as a BPF program; None on an unknown machine.
 
     Reading and writing go to the channel only, memory is never executable; all else is refused with EPERM.
     """
-    if machine not in SYSCALLS or not sys.platform.startswith("linux"):
+    if machine not in SYSCALLS or sys.platform != "linux":
         return None
     architecture, numbers = SYSCALLS[machine]
     guarded = {
@@ -132,14 +145,30 @@ def seccomp_filter(machine: str) -> ctypes.Array[ctypes.c_char] | None:
         body = [(LOAD, 0, 0, argument), test, (RETURN, 0, 0, ALLOW), (RETURN, 0, 0, DENY)]
         code += [(EQUAL, 0, len(body), numbers[name]), *body]
     code.append((RETURN, 0, 0, DENY))
-    instructions = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *line) for line in code))
-    header = ctypes.create_string_buffer(struct.pack("HxxxxxxP", len(code), ctypes.addressof(instructions)))
+    instructions = ctypes.create_string_buffer(b"".join(map(instruction, code)))
+    header = ctypes.create_string_buffer(
+        len(code).to_bytes(8, sys.byteorder) + ctypes.addressof(instructions).to_bytes(8, sys.byteorder)
+    )
     header.instructions = instructions  # type: ignore[attr-defined]  # keeps them alive
     return header
 
 
-def can_install(seccomp: ctypes.Array[ctypes.c_char]) -> bool:
-    """Whether the kernel takes the filter here, which a container may forbid; tried in another process."""
+def instruction(line: tuple[int, int, int, int]) -> bytes:
+    """One instruction of a BPF program: operation, jump if true, jump if false, operand."""
+    operation, if_true, if_false, operand = line
+    return (
+        operation.to_bytes(2, sys.byteorder) + bytes((if_true, if_false)) + operand.to_bytes(4, sys.byteorder)
+    )
+
+
+def usable_filter() -> Filter | None:
+    """The filter for this machine, if its kernel takes it, which a container may forbid."""
+    seccomp = seccomp_filter()
+    return seccomp if seccomp is not None and can_install(seccomp) else None
+
+
+def can_install(seccomp: Filter) -> bool:
+    """Whether the kernel takes the filter; tried in another process."""
     pid = os.fork()
     if pid == 0:
         try:

@@ -1,0 +1,79 @@
+"""Locks as programs see them: a program is alone, so that waiting for one only lets simulated time pass."""
+
+from __future__ import annotations
+
+import _thread
+
+from codebotler.simulator.sandbox.execution import Run
+
+
+class Lock:
+    """Takes the place of `_thread.lock`: one that is held stays held, since nobody else could release it."""
+
+    run: Run
+
+    def __init__(self) -> None:
+        self._times = 0
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
+        """Take it, if it is free; otherwise wait, which costs simulated time or, without a limit, the run."""
+        if not blocking and timeout != -1:
+            raise ValueError("can't specify a timeout for a non-blocking call")
+        if self._is_free():
+            self._times += 1
+            return True
+        if blocking and timeout < 0:
+            self.run.wait_for_ever()
+        if blocking:
+            self.run.sleep(timeout)
+        return False
+
+    def release(self) -> None:
+        """Let it go."""
+        if not self._times:
+            raise RuntimeError("release unlocked lock")
+        self._times -= 1
+
+    def locked(self) -> bool:
+        """Whether it is held."""
+        return self._times > 0
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
+
+    def _is_free(self) -> bool:
+        return not self._times
+
+    def _at_fork_reinit(self) -> None:
+        self._times = 0
+
+
+class RLock(Lock):
+    """Takes the place of `_thread.RLock`; what `threading.Condition` asks of one is here."""
+
+    def _is_free(self) -> bool:
+        return True
+
+    def _is_owned(self) -> bool:
+        return self._times > 0
+
+    def _recursion_count(self) -> int:
+        return self._times
+
+    def _release_save(self) -> int:
+        times, self._times = self._times, 0
+        return times
+
+    def _acquire_restore(self, times: int) -> None:
+        self._times = times
+
+
+def simulate_locks(run: Run) -> None:
+    """Let all locks that are made from now on be these; `threading` and its like must not be imported yet."""
+    Lock.run = run
+    for each in (Lock, RLock):
+        each.__module__ = "_thread"
+    vars(_thread).update(allocate_lock=Lock, allocate=Lock, lock=Lock, LockType=Lock, RLock=RLock)

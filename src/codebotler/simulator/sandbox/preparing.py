@@ -1,0 +1,47 @@
+"""The preparer: a closed process that parses and compiles programs and never runs a line of one.
+
+A program runs in several worlds, each time in a fresh child. Compiled here, once and in a process that is
+warm, it costs each of them next to nothing. Code goes through the engine unopened, to the child that runs it.
+"""
+
+from __future__ import annotations
+
+import os
+import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: nothing can be imported behind the walls
+from _json import encode_basestring_ascii as quoted
+from marshal import dumps
+
+from codebotler.simulator.sandbox import CHANNEL, IMPORTING, PLAIN, REFUSED
+from codebotler.simulator.sandbox.channel import receive, send_bytes
+from codebotler.simulator.sandbox.ticks import prepared
+from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
+
+DOOR = 4
+ALWAYS_THERE = frozenset({"sys", "time", "__future__"})
+REHEARSAL = "def task_program():\n    for room in get_all_rooms():\n        say(f'in {room}')\n"
+WITHOUT_REFERENCES = 2  # later versions of the format depend on what else this process holds
+
+
+def serve() -> None:
+    """Prepare one program after the other until the engine closes its end."""
+    give_up_rights()
+    seccomp = usable_filter()
+    answer(REHEARSAL, lowercase=True)
+    os.dup2(DOOR, CHANNEL)
+    os.closerange(CHANNEL + 1, 256)
+    enclose(seccomp)
+    while True:
+        source, lowercase = receive()
+        send_bytes(answer(source, lowercase=lowercase))
+
+
+def answer(source: str, *, lowercase: bool) -> bytes:
+    """A byte that says what follows; then the code, or why there is none, as JSON."""
+    try:
+        code, imports = prepared(source, lowercase=lowercase)
+    except Exception as error:  # noqa: BLE001 - the compiler has many ways to refuse a program
+        line = error.lineno if isinstance(error, SyntaxError) else None
+        message = error.msg if isinstance(error, SyntaxError) else str(error)
+        kind = quoted(type(error).__name__)
+        return REFUSED + f"[{kind},{quoted(message[:1000])},{'null' if line is None else line}]".encode()
+    return (PLAIN if imports <= ALWAYS_THERE else IMPORTING) + dumps(code, WITHOUT_REFERENCES)

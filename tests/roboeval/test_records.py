@@ -1,0 +1,79 @@
+"""Rows of completions: what is accepted can be copied and read again, and nothing else is accepted."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from codebotler.badinput import BadInput
+from roboeval.records import MAX_ROW, read_completions, to_line
+from roboeval.run import Run, open_source
+from roboeval.suite import Suite
+
+ROW = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": "x = 1"}
+
+
+def sentence_about(path: Path, line: bytes) -> str:
+    path.write_bytes(line)
+    with pytest.raises(BadInput) as caught:
+        list(read_completions(path))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "what"),
+    [
+        ("prompt", 10**9, "input should be less than 1000000000"),
+        ("index", 10**9, "input should be less than 1000000000"),
+        ("index", 10**25, "input should be less than 1000000000"),
+        ("index", -1, "input should be greater than or equal to 0"),
+        ("index", True, "input should be a valid integer"),
+        ("index", "3", "input should be a valid integer"),
+    ],
+)
+def test_a_number_that_is_none_gets_a_sentence(tmp_path: Path, name: str, value: object, what: str) -> None:
+    path = tmp_path / "a.jsonl"
+    assert sentence_about(path, to_line(ROW | {name: value})) == f'{path}, line 1: "{name}" is wrong: {what}'
+
+
+@given(st.dictionaries(st.text(), st.text(st.characters()) | st.integers() | st.floats(allow_nan=False)))
+def test_a_line_is_one_line_that_reads_as_its_row(row: dict[str, Any]) -> None:
+    line = to_line(row)
+    assert line.decode().count("\n") == 1
+    assert json.loads(line) == json.loads(json.dumps(row))
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "\ud800" + "é" * 2_400_000,
+        "\ud800" * 800_000,
+        "é" * 2_400_000,
+        "\n" * 2_400_000,
+    ],
+)
+def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
+    tmp_path: Path, paper: Suite, program: str
+) -> None:
+    path = tmp_path / "a.jsonl"
+    row = ROW | {"program": program}
+    path.write_text(json.dumps(row, ensure_ascii=False).replace("\ud800", "\\ud800"))
+    run = Run(tmp_path / "run")
+    run.keep(open_source(str(path), paper))
+    assert [c.program for c in read_completions(run.completions)] == [program]
+
+
+def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
+    tmp_path: Path, paper: Suite
+) -> None:
+    path = tmp_path / "a.jsonl"
+    line = json.dumps(ROW | {"usage": [1] * 2_400_000}, separators=(",", ":")).encode()
+    assert len(line) < MAX_ROW
+    sentence = f"{path}, line 1: as a row this is longer than 5,000,000 bytes; shorten the program"
+    assert sentence_about(path, line) == sentence
+    with pytest.raises(BadInput, match="as a row this is longer"):
+        Run(tmp_path / "run").keep(open_source(str(path), paper))
+    assert not (tmp_path / "run").exists()

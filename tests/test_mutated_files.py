@@ -1,0 +1,151 @@
+"""Thousands of files, each damaged a little, are read or refused in a sentence with a line."""
+
+import random
+import warnings
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput, YamlFile
+from codebotler.models.recorded import FOLDER, RecordingFile
+from codebotler.tracefile import OutcomeFile
+from codebotler.world import WorldFile
+from roboeval.suite import SUITES, read_task
+from roboeval.suitefile import SuiteFile
+
+WORLD = """\
+about: second floor, after lunch
+robot: start_loc
+rooms:
+  - start_loc
+  - alice's office
+  - {name: kitchen, footprint: [[6, 0], [9, 0], [9, 4], [6, 4]], stand_at: [7.5, 1]}
+objects: {kitchen: [mug, bottle of water]}
+people: {alice's office: [{name: alice, answers: ["yes", tea]}, {name: .*}]}
+may_wait_forever: true
+"""
+SUITE = """\
+name: mine
+version: 1
+rules:
+  limits: {calls: 7, seconds: 3.5, ticks: 9}
+  clock_starts: 2024-01-01T12:00:00+00:00
+"""
+OUTCOME = """\
+status: robot-error
+error: {kind: K, message: m}
+line: 3
+trace:
+- [goto, lab]
+- [ask, q, [a, {no text: b}], a]
+- [check, x, true]
+"""
+BITS = (
+    *("[", "]", "{", "}", ":", " - ", "\n", "  ", "'", '"', "|", ">", "&a ", "*a ", "? ", "#", "%", "@", "`"),
+    *("!!set ", "!!int ", "!!float ", "!!bool ", "!!timestamp ", "!!str ", "!!omap ", "!!null ", "!x "),
+    *("~", "null", "yes", "1e999", ".nan", "0x_", "9" * 400, "9" * 5000, "2001-13-01", "=", "<<: ", "1:2"),
+    *(
+        "\0",
+        "\x07",
+        "\ud800",
+        "\x85",
+        "\u2028",
+        "\ufeff",
+        "\t",
+        "(",
+        "*",
+        "\\",
+        "a{9999999999}",
+        "...\n",
+        "---\n",
+    ),
+)
+
+
+def world(file: YamlFile) -> object:
+    return file.validate(WorldFile).world(file)
+
+
+def recordings(file: YamlFile) -> object:
+    items = file.data if isinstance(file.data, list) else []
+    return [file.validate(RecordingFile, item, at=(index,)) for index, item in enumerate(items)]
+
+
+def outcome(file: YamlFile) -> object:
+    return file.validate(OutcomeFile).outcome(file)
+
+
+def suite(file: YamlFile) -> object:
+    return file.validate(SuiteFile).rules.rules()
+
+
+Read = Callable[[YamlFile], object]
+TASKS: list[tuple[str, Read]] = [
+    (path.read_text(), partial(read_task, path=path)) for path in sorted(SUITES.glob("paper/tasks/*.yaml"))
+]
+RECORDED: list[tuple[str, Read]] = [
+    (path.read_text(), recordings) for path in sorted(Path(FOLDER).glob("*/SayGoodDay.yaml"))
+]
+
+
+def damaged(text: str, chance: random.Random) -> str:
+    for _ in range(chance.choice([1, 1, 1, 2, 3])):
+        at = chance.randrange(len(text) + 1)
+        lines = text.split("\n")
+        row, other = chance.randrange(len(lines)), chance.randrange(len(lines))
+        match chance.randrange(5):
+            case 0:
+                text = text[:at] + chance.choice(BITS) + text[at:]
+            case 1:
+                text = text[:at] + text[at + chance.randrange(1, 6) :]
+            case 2:
+                text = (
+                    text[:at]
+                    + chr(chance.choice([chance.randrange(128), chance.randrange(0x110000)]))
+                    + text[at + 1 :]
+                )
+            case 3:
+                lines[row], lines[other] = lines[other], lines[row]
+                text = "\n".join(lines)
+            case 4:
+                lines[row] = lines[row].partition(":")[0] + ": " + chance.choice(BITS)
+                text = "\n".join(lines)
+    return text
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        pytest.param([(WORLD, world)], id="worlds"),
+        pytest.param([(SUITE, suite)], id="suites"),
+        pytest.param([(OUTCOME, outcome)], id="outcomes"),
+        pytest.param(TASKS, id="tasks"),
+        pytest.param(RECORDED, id="recordings"),
+    ],
+)
+def test_a_damaged_file_is_read_or_refused_in_a_sentence_with_a_line(files: list[tuple[str, Read]]) -> None:
+    chance = random.Random(20)
+    refused = 0
+    for _ in range(1_000):
+        text, read = chance.choice(files)
+        text = damaged(text, chance)
+        error = refusal(text, read)
+        if error is not None:
+            refused += 1
+            assert error.line is not None or "the file is empty" in str(error)
+            assert 1 <= (error.line or 1) <= len(text.splitlines())
+            assert "\n" not in str(error)
+            assert len(str(error)) < 700
+    assert refused > 100
+
+
+def refusal(text: str, read: Read) -> BadInput | None:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)  # of regexes that are odd but valid
+            read(YamlFile(text, "w.yaml"))
+    except BadInput as error:
+        return error
+    return None
