@@ -17,6 +17,7 @@ from codebotler.simulator.sandbox import CPU_SECONDS, HEADER, MAX_FRAME
 from codebotler.trace import RunError, Status
 
 LONGEST = 120.0  # seconds of waiting for a child in all; nothing that computes takes so long
+FILTERED, KILLED_BY_FILTER = 2, 3  # what Linux says of a process and its list of system calls
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
 
@@ -130,7 +131,7 @@ class Child:
             status = Path(f"/proc/{self.pid}/status").read_text(encoding="ascii", errors="replace")
         except OSError:
             return False
-        return "\nSeccomp:\t2\n" in status
+        return any(f"\nSeccomp:\t{mode}\n" in status for mode in (FILTERED, KILLED_BY_FILTER))
 
     def ended(self) -> int:
         """Wait a moment for it to end by itself; then like `end`."""

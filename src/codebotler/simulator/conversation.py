@@ -15,6 +15,7 @@ from codebotler.trace import Option, Outcome, RunError, Status, Trace
 
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 LAST_LINE = 1_000_000
+LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 WAITS = "it waits for something that can never come"
 Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
@@ -164,7 +165,7 @@ class Conversation:
                 return self._outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
             case {"end": "python-error", "kind": str(kind), "message": str(message)}:
                 name = kind if kind.isidentifier() else "Exception"
-                return self._outcome(Status.PYTHON_ERROR, name[:100], message[:1000], line)
+                return self._outcome(Status.PYTHON_ERROR, name[:100], message, line)
             case _:
                 return self._outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")
 
@@ -176,7 +177,7 @@ class Conversation:
 
     def _outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
         where = line if type(line) is int and 0 < line <= LAST_LINE else None
-        return Outcome(status, self.robot.trace, RunError(kind, message), where)
+        return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
 
 
 def described(robot: Robot) -> Description:

@@ -35,7 +35,7 @@ def enclose(seccomp: Filter | None) -> None:
     """
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
-    resource.setrlimit(resource.RLIMIT_CPU, (CPU_SECONDS, CPU_SECONDS + 1))
+    limit_time(CPU_SECONDS)
     if seccomp is not None:
         install(seccomp)
 
@@ -45,6 +45,11 @@ def set_limit(name: str, value: int) -> None:
     kind = getattr(resource, "RLIMIT_" + name, None)
     if kind is not None:
         resource.setrlimit(kind, (value, value))
+
+
+def limit_time(seconds: int) -> None:
+    """End this process by SIGXCPU when it has used so much processor time, a second later by SIGKILL."""
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
 
 
 def become_nobody() -> None:

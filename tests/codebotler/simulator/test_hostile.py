@@ -1,0 +1,460 @@
+"""Programs that try to break out, to do harm or to cheat; each file of tests/hostile is one, and fails.
+
+A program's first line says what it tries. Comments below say how its run must end (`# ends: STATUS KIND`),
+what its robot must have done by then (`# does: KIND TEXT`, one line an event; nothing by default) and whether
+that is what was asked of it (`# earns: yes`; no by default). `@NAME@` stands for something real that it could
+reach if a wall were missing.
+"""
+
+import _ctypes
+import contextlib
+import ctypes
+import json
+import math
+import os
+import platform
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import groupby, pairwise
+from pathlib import Path
+from typing import IO
+
+import pytest
+
+from codebotler.rtl import parse
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import Rules
+from codebotler.trace import Event, Outcome, Status
+from codebotler.tracefile import outcome_data
+from codebotler.world import Person, Room, World
+from roboeval.evaluate import judge
+from roboeval.records import to_line
+from roboeval.suite import Requirement, Scenario
+
+PROGRAMS = sorted((Path(__file__).parents[2] / "hostile").glob("*.py"))
+AS_WRITTEN = Rules(literals="as-written")
+SECRET = "hush-" + os.urandom(8).hex()
+MARKER = "i-was-here-" + os.urandom(8).hex()
+NOBODY = 65534
+PHRASE = "open sesame"
+WORLD = World(
+    (Room("start"), Room("vault", (SECRET,), (Person(".*", ("yes", SECRET)),))), "start", about=SECRET
+)
+SAYS_IT_THERE = parse(f'tr.ActAtFirst("vault", say("{PHRASE}"))')
+ASKED = Scenario(WORLD, (Requirement("says it there", "says it there", SAYS_IT_THERE, "SayAtLocation"),))
+LONGEST = 25.0  # seconds; the watchdog's five, on a busy machine
+HONEST = """
+import builtins, collections, fractions, json, os, random, statistics, string, sys, textwrap, timeit
+
+def task_program():
+    gc = timeit.gc
+    go_to("vault")
+    say("open sesame")
+    say(str([len(vars(builtins)), sorted("ba"), hash("a"), id([]), str(object())]))
+    say(str([len(vars(str)), "a".upper(), len(sys.modules), len(vars(json)), len(vars(random))]))
+    say(str([random.random(), random.choice("abc"), string.ascii_lowercase, json.dumps([1, {"a": 2}])]))
+    say(str([str(collections.Counter("aab")), fractions.Fraction(1, 2) + 1]))
+    say(str([textwrap.fill.__defaults__, statistics.quantiles([1, 2, 3, 4])]))
+    say(str([dict(os.environ), time.time(), time.monotonic(), sys.argv, sys.path, len(sys.meta_path)]))
+    say(str([sys.getrecursionlimit(), sys.get_int_max_str_digits(), gc.get_threshold(), gc.isenabled()]))
+"""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What a program's comments say of it."""
+
+    ends: tuple[str, ...]
+    does: tuple[str, ...]
+    earns: bool
+
+
+def declared(source: str) -> Declared:
+    lines = [line[2:].partition(": ") for line in source.splitlines() if line.startswith("# ")]
+    ends = next(value for name, _, value in lines if name == "ends")
+    does = tuple(value for name, _, value in lines if name == "does")
+    return Declared(tuple(ends.split(" | ")), does, ("earns", ": ", "yes") in lines)
+
+
+def rendered(event: Event) -> str:
+    """An event as comments write it: `*` marks an option that was no text."""
+    offered = [shortened(option.text) + "*" * (not option.is_text) for option in event.options]
+    options = ", ".join(counted(offered))
+    asked = f": {options}" if event.kind == "ask" else ""
+    answered = "" if event.answer is None else f" -> {event.answer}"
+    return f"{event.kind} {shortened(event.text)}{asked}{answered}"
+
+
+def shortened(text: str) -> str:
+    return (text if len(text) < 100 else text[:3] + "...").encode("unicode_escape").decode()
+
+
+def counted(texts: Iterable[str]) -> tuple[str, ...]:
+    """Texts, but those that follow each other and are equal only once."""
+    groups = [(text, len(list(group))) for text, group in groupby(texts)]
+    return tuple(text if count == 1 else f"{count} times {text}" for text, count in groups)
+
+
+def done(outcome: Outcome) -> tuple[str, ...]:
+    return counted(map(rendered, outcome.trace))
+
+
+# --- what a program could reach if a wall were missing
+
+
+def processes() -> dict[int, tuple[int, str]]:
+    """The parent and the state of each process, at one moment."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            stat = (folder / "stat").read_text(encoding="ascii", errors="replace")
+            fields = stat.rpartition(")")[2].split()
+            found[int(folder.name)] = (int(fields[1]), fields[0])
+    return found
+
+
+def living_below(pid: int) -> set[int]:
+    """The processes below one that are neither dead nor stopped by a signal."""
+    table = processes()
+    found: set[int] = set()
+    while more := {one for one, (parent, _) in table.items() if parent in {pid, *found}} - found:
+        found |= more
+    return {one for one in found if table[one][1] not in "ZTt"}
+
+
+def carry_the_marker() -> set[int]:
+    """The processes anywhere whose command line carries the marker."""
+    found = set()
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            if MARKER.encode() in (folder / "cmdline").read_bytes():
+                found.add(int(folder.name))
+    return found
+
+
+def descriptors(pid: int) -> dict[str, str]:
+    found = {}
+    for link in list(Path(f"/proc/{pid}/fd").iterdir()):
+        with contextlib.suppress(OSError):
+            found[link.name] = str(link.readlink())
+    return found
+
+
+BYSTANDER = f"""
+import os, signal
+signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+if os.geteuid() == 0:
+    os.setgroups([])
+    os.setresgid({NOBODY}, {NOBODY}, {NOBODY})
+    os.setresuid({NOBODY}, {NOBODY}, {NOBODY})
+os.write(1, b"ready")
+while True:
+    os.write(1, b"%d " % signal.sigwait(signal.valid_signals()))
+"""
+COUNTED = (
+    *(signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM, signal.SIGTERM),
+    *(signal.SIGCONT, signal.SIGVTALRM, signal.SIGPROF, signal.SIGIO, signal.SIGURG, signal.SIGXFSZ),
+)
+PR_SET_CHILD_SUBREAPER = 36
+
+
+@dataclass
+class Reach:
+    """Real things around the engine, and how to see whether one of them was touched."""
+
+    folder: Path
+    lane: Lane
+    bystander: subprocess.Popen[bytes]
+    listeners: dict[str, socket.socket]
+    signals: list[int] = field(default_factory=list)
+
+    @property
+    def told(self) -> IO[bytes]:
+        """Where the bystander tells of signals."""
+        assert self.bystander.stdout is not None
+        return self.bystander.stdout
+
+    def facts(self) -> dict[str, str]:
+        """What stands for each `@NAME@`."""
+        return {
+            "SECRET_FOLDER": str(self.folder / "secret"),
+            "SECRET_FILE": str(self.folder / "secret" / "secret"),
+            "CANARY_FOLDER": str(self.folder / "canary"),
+            "PORT": str(self.listeners["tcp"].getsockname()[1]),
+            "UDP_PORT": str(self.listeners["udp"].getsockname()[1]),
+            "UNIX_SOCKET": str(self.folder / "socket"),
+            "ABSTRACT_SOCKET": MARKER,
+            "MARKER": MARKER,
+            "PARENT_PID": str(os.getpid()),
+            "ZYGOTE_PID": str(self.zygotes()[-1]),
+            "BYSTANDER_PID": str(self.bystander.pid),
+        }
+
+    def filled(self, source: str) -> str:
+        for name, value in self.facts().items():
+            source = source.replace(f"@{name}@", value)
+        return source
+
+    def zygotes(self) -> list[int]:
+        """The processes that fork those of the runs."""
+        return [zygote._process.pid for zygote in self.lane._zygotes.values()]
+
+    def run(self, source: str) -> Outcome:
+        return self.lane.run(source, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
+
+    def files(self) -> dict[str, object]:
+        """All that is below the folder, with contents, rights and times."""
+        found: dict[str, object] = {}
+        for path in [self.folder, *self.folder.rglob("*")]:
+            about = path.lstat()
+            content = path.read_bytes() if path.is_file() else b""
+            found[str(path)] = (about.st_mode, about.st_uid, about.st_nlink, about.st_mtime_ns, content)
+        return found
+
+    def state(self) -> dict[str, object]:
+        """All that must be the same after a run."""
+        spoken_to = {name: listener.fileno() for name, listener in self.listeners.items()}
+        spoken_to["bystander"] = self.told.fileno()
+        ready = select.select(spoken_to.values(), [], [], 0)[0]
+        return {
+            "files": self.files(),
+            "who was spoken to": {name for name, number in spoken_to.items() if number in ready},
+            "signals": list(self.signals),
+            "living processes": living_below(os.getpid()),
+            "processes with the marker": carry_the_marker(),
+            "zygotes": self.zygotes(),
+            "descriptors": descriptors(os.getpid()),
+            "descriptors of the zygotes": list(map(descriptors, self.zygotes())),
+        }
+
+
+@pytest.fixture(scope="module")
+def folder() -> Iterator[Path]:
+    """A folder that everybody may read, with a secret, and a part that everybody may write to."""
+    path = Path(tempfile.mkdtemp(prefix="hostile-"))
+    path.chmod(0o755)
+    for name, rights in (("secret", 0o755), ("canary", 0o777)):
+        (path / name).mkdir()
+        (path / name).chmod(rights)
+    (path / "secret" / "secret").write_text(SECRET, encoding="ascii")
+    (path / "secret" / "hushed.py").write_text(f"SECRET = '{SECRET}'\n", encoding="ascii")
+    with zipfile.ZipFile(path / "secret" / "hushed.zip", "w") as archive:
+        archive.writestr("zipped.py", f"SECRET = '{SECRET}'\n")
+    shutil.copyfile(_ctypes.__file__, path / "secret" / "hushed.so")
+    (path / "canary" / "canary").write_text("sings", encoding="ascii")
+    (path / "canary" / "canary").chmod(0o666)
+    yield path
+    shutil.rmtree(path)
+
+
+@pytest.fixture(scope="module")
+def listeners(folder: Path) -> Iterator[dict[str, socket.socket]]:
+    with contextlib.ExitStack() as stack:
+        found = {}
+        for name, family, kind, address in (
+            ("tcp", socket.AF_INET, socket.SOCK_STREAM, ("127.0.0.1", 0)),
+            ("udp", socket.AF_INET, socket.SOCK_DGRAM, ("127.0.0.1", 0)),
+            ("unix", socket.AF_UNIX, socket.SOCK_STREAM, str(folder / "socket")),
+            ("abstract", socket.AF_UNIX, socket.SOCK_STREAM, "\0" + MARKER),
+        ):
+            listener = stack.enter_context(socket.socket(family, kind))
+            listener.bind(address)
+            if kind == socket.SOCK_STREAM:
+                listener.listen()
+            found[name] = listener
+        (folder / "socket").chmod(0o777)
+        yield found
+
+
+@pytest.fixture(scope="module")
+def bystander() -> Iterator[subprocess.Popen[bytes]]:
+    """A process of the user that programs run as, which tells of every signal."""
+    with subprocess.Popen([sys.executable, "-c", BYSTANDER], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        assert process.stdout.read(5) == b"ready"
+        yield process
+        process.kill()
+
+
+@pytest.fixture(scope="module")
+def reach(
+    folder: Path, bystander: subprocess.Popen[bytes], listeners: dict[str, socket.socket]
+) -> Iterator[Reach]:
+    """All of it; orphans below this process become its children, so that none can hide."""
+    libc = ctypes.CDLL(None)
+    os.environ["SECRET_OF_THE_ENGINE"] = SECRET
+    reach = Reach(folder, Lane(), bystander, listeners)
+    reach.run(HONEST)  # by now all processes are there
+    before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
+    assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
+    yield reach
+    for pid in carry_the_marker():  # a test has failed; nothing of it stays
+        os.kill(pid, signal.SIGKILL)
+    assert libc.prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0) == 0
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    reach.lane.close()
+    del os.environ["SECRET_OF_THE_ENGINE"]
+
+
+@pytest.fixture(scope="module")
+def honest(reach: Reach) -> Outcome:
+    """What an honest program does before any hostile one has run, in a lane of its own."""
+    lane = Lane()
+    try:
+        outcome = lane.run(HONEST, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
+    finally:
+        lane.close()
+    assert outcome.status is Status.FINISHED, outcome
+    assert done(outcome)[:2] == ("goto vault", f"say {PHRASE}")
+    assert judge(outcome, ASKED).satisfied
+    assert reach.run(HONEST) == outcome
+    return outcome
+
+
+# --- the tests
+
+
+@pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
+def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome) -> None:
+    source = reach.filled(path.read_text(encoding="utf-8"))
+    wanted = declared(source)
+    before = reach.state()
+    start = time.monotonic()
+    outcome = reach.run(source)
+    assert time.monotonic() - start < LONGEST
+    after = reach.state()
+    for name, value in before.items():
+        assert after[name] == value, name
+    assert before["who was spoken to"] == set()
+
+    kind = "" if outcome.error is None else f" {outcome.error.kind}"
+    assert f"{outcome.status}{kind}" in wanted.ends, outcome
+    assert done(outcome) == wanted.does
+    assert SECRET not in repr(outcome)
+
+    verdict = judge(outcome, ASKED)
+    was_there = any((e.kind, e.text, e.place) == ("say", PHRASE, "vault") for e in outcome.trace)
+    assert verdict.satisfied is wanted.earns is (was_there and outcome.status is Status.FINISHED)
+    check_record(outcome)
+
+    assert reach.run(HONEST) == honest
+    assert reach.state() == before
+
+
+def check_record(outcome: Outcome) -> None:
+    """Whether an outcome, whatever it holds, is one row of a file, of bounded size and with a sane clock."""
+    data = outcome_data(outcome)
+    line = to_line(data)
+    assert line.count(b"\n") == 1
+    assert json.loads(line) == data
+    assert outcome.error is None or len(outcome.error.kind) + len(outcome.error.message) <= 1100
+    assert outcome.line is None or 0 < outcome.line <= 1_000_000
+    times = [0.0, *(event.time for event in outcome.trace), 3600.0]
+    assert all(map(math.isfinite, times))
+    assert all(one <= other for one, other in pairwise(times))
+
+
+def test_every_program_says_in_one_sentence_what_it_tries() -> None:
+    assert len(PROGRAMS) >= 90
+    for path in PROGRAMS:
+        first = path.read_text(encoding="utf-8").splitlines()[0]
+        assert first.startswith('"""Tries '), path.name
+        assert first.endswith('."""'), path.name
+
+
+DAWDLING = """
+def task_program():
+    frame = sys._getframe()
+    while "ctypes" not in frame.f_globals:
+        frame = frame.f_back
+    ctypes = frame.f_globals["ctypes"]
+    futex, word = ctypes.CDLL(None).syscall, (ctypes.c_int * 1)()
+    a_while = (ctypes.c_long * 2)(0, 300_000_000)
+    while True:
+        futex(FUTEX, word, 0, 0, a_while)
+        sum(range(10**6))
+"""
+
+
+def test_program_that_works_a_little_and_waits_a_lot_is_ended(
+    reach: Reach, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 3.0)
+    start = time.monotonic()
+    outcome = reach.run(DAWDLING.replace("FUTEX", "202" if platform.machine() == "x86_64" else "98"))
+    assert 3.0 < time.monotonic() - start < LONGEST
+    assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
+
+
+# --- that the checks see what they are for
+
+
+@pytest.fixture
+def changed(reach: Reach) -> Callable[[], set[str]]:
+    """Names what has changed since the test began."""
+    before = reach.state()
+    return lambda: {name for name, value in reach.state().items() if value != before[name]}
+
+
+def test_a_written_file_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
+    about = (reach.folder / "canary").stat()
+    (reach.folder / "canary" / "new").touch()
+    assert changed() == {"files"}
+    (reach.folder / "canary" / "new").unlink()
+    os.utime(reach.folder / "canary", ns=(about.st_atime_ns, about.st_mtime_ns))
+    assert changed() == set()
+
+
+@pytest.mark.parametrize("name", ["tcp", "udp", "unix", "abstract"])
+def test_a_connection_would_be_seen(reach: Reach, changed: Callable[[], set[str]], name: str) -> None:
+    listener = reach.listeners[name]
+    with socket.socket(listener.family, listener.type) as caller:
+        caller.connect(listener.getsockname())
+        if name == "udp":
+            caller.send(b"x")
+            assert changed() >= {"who was spoken to"}
+            listener.recv(1)
+        else:
+            assert changed() >= {"who was spoken to"}
+            listener.accept()[0].close()
+    assert changed() == set()
+
+
+def test_a_signal_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
+    os.kill(os.getpid(), signal.SIGUSR1)
+    os.kill(reach.bystander.pid, signal.SIGTERM)
+    select.select([reach.told], [], [], 10)
+    assert changed() == {"signals", "who was spoken to"}
+    assert os.read(reach.told.fileno(), 10) == b"15 "
+    reach.signals.clear()
+    assert changed() == set()
+
+
+def test_a_stopped_zygote_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
+    os.kill(reach.zygotes()[-1], signal.SIGSTOP)
+    os.waitid(os.P_PID, reach.zygotes()[-1], os.WSTOPPED | os.WNOWAIT)
+    assert changed() == {"living processes"}
+    os.kill(reach.zygotes()[-1], signal.SIGCONT)
+    while changed():
+        select.select([], [], [], 0.01)
+
+
+def test_an_orphan_would_be_seen(changed: Callable[[], set[str]]) -> None:
+    orphaning = f"import os, time; os.fork() or (os.setsid(), time.sleep(60), '{MARKER}')"
+    subprocess.run([sys.executable, "-c", orphaning], check=True)
+    assert changed() == {"living processes", "processes with the marker"}
+    (orphan,) = carry_the_marker()
+    os.kill(orphan, signal.SIGKILL)
+    os.waitpid(orphan, 0)
+    assert changed() == set()

@@ -1,0 +1,204 @@
+"""Programs are kept in whoever runs the engine, root or not; and where a wall is missing, one is told."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+NOBODY = 65534
+ROOT = os.geteuid() == 0
+BECOME = ["setpriv", f"--reuid={NOBODY}", f"--regid={NOBODY}", "--clear-groups"]
+
+# --- as root, and as an ordinary user
+
+CHECK = """
+import json, os, sys
+from codebotler.simulator.engine import run
+from codebotler.simulator.rules import Rules
+from codebotler.tracefile import outcome_data
+from codebotler.world import Room, World
+
+world = World((Room("start"),), "start")
+programs = [
+    "import os, signal\\ndef task_program():\\n    " + body.replace("PARENT", str(os.getpid()))
+    for body in json.loads(sys.argv[1])
+]
+outcomes = run([(p, world) for p in programs], workers=1, rules=Rules(literals="as-written"),
+               require_isolation=True)
+print(os.geteuid(), json.dumps([outcome_data(outcome) for outcome in outcomes]))
+"""
+ATTACKS = {
+    "open('SECRET').read()": "PermissionError",
+    "open('FOLDER/new', 'w')": "PermissionError",
+    "os.listdir('FOLDER')": "PermissionError",
+    "import socket; socket.socket()": "PermissionError",
+    "os.fork()": "PermissionError",
+    "os.execv('/bin/true', ['true'])": "PermissionError",
+    "import subprocess; subprocess.run(['true'])": "PermissionError",
+    "import threading; threading.Thread(target=print).start()": "RuntimeError",
+    "os.kill(PARENT, signal.SIGKILL)": "PermissionError",
+    "os.kill(os.getppid(), signal.SIGKILL)": "PermissionError",
+    "os.write(1, b'x')": "PermissionError",
+    "bytearray(10**10)": "MemoryError",
+    "os.abort()": "Crash",
+    "while True: pass": "TimeoutError",
+}
+"""What a program tries, and the kind of error it meets."""
+
+
+@pytest.fixture(scope="module")
+def folder() -> Iterator[Path]:
+    """A folder that everybody may enter and write to, with a file that everybody may read."""
+    path = Path(tempfile.mkdtemp(prefix="iso-", dir="/tmp"))  # short: it must fit where another path stood
+    path.chmod(0o777)
+    (path / "secret").write_text("hush", encoding="ascii")
+    (path / "secret").chmod(0o644)
+    yield path
+    shutil.rmtree(path)
+
+
+@pytest.fixture(scope="module")
+def open_to_all(folder: Path) -> list[str]:
+    """A command that starts Python with this project for every user: as it is installed, else as a copy."""
+    here = [sys.executable, "-B"]
+    if not ROOT or as_user(NOBODY, [*here, "-c", CHECK, "[]"]).returncode == 0:
+        return here
+    python = copied_python(folder / "py")
+    library = folder / "library"
+    library.mkdir()
+    for path in needed():
+        if path.is_dir():
+            shutil.copytree(path, library / path.name)
+        else:
+            shutil.copy2(path, library)
+    return ["env", f"PYTHONPATH={library}", str(python), "-B"]
+
+
+def copied_python(to: Path) -> Path:
+    """A copy of the interpreter and its library, which may stand in the folder of another user."""
+    library = Path(sysconfig.get_path("stdlib"))
+    unneeded = shutil.ignore_patterns("site-packages", "test", "idlelib", "tkinter", "ensurepip", "config-*")
+    shutil.copytree(library, to / "lib" / library.name, ignore=unneeded)
+    program = Path(sys.executable).resolve().read_bytes()
+    if sysconfig.get_config_var("Py_ENABLE_SHARED"):  # the program holds the path of its library's folder
+        there = Path(sysconfig.get_config_var("LIBDIR"))
+        shutil.copy2(there / sysconfig.get_config_var("INSTSONAME"), to / "lib")
+        old = bytes(there)
+        program = program.replace(old + b"\0", bytes(to / "lib").ljust(len(old), b"\0") + b"\0")
+    copy = to / "bin" / library.name
+    copy.parent.mkdir()
+    copy.write_bytes(program)
+    copy.chmod(0o755)
+    return copy
+
+
+def needed() -> list[Path]:
+    """The packages and modules outside the standard library that the engine needs."""
+    listing = (
+        "import sys, codebotler.tracefile, codebotler.simulator.engine\n"
+        "for name, module in list(sys.modules.items()):\n"
+        "    if '.' not in name and getattr(module, '__file__', None): print(module.__file__)"
+    )
+    output = subprocess.check_output([sys.executable, "-c", listing], text=True)
+    standard = Path(sysconfig.get_path("stdlib"))
+    files = [Path(line) for line in output.splitlines()]
+    return [
+        file.parent if file.name == "__init__.py" else file
+        for file in files
+        if "site-packages" in file.parts or standard not in file.parents
+    ]
+
+
+def as_user(user: int, command: list[str]) -> subprocess.CompletedProcess[str]:
+    command = command if user == os.geteuid() else [*BECOME, *command]
+    return subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("user", [0, NOBODY] if ROOT else [os.geteuid()])
+def test_programs_are_kept_in_whoever_runs_the_engine(
+    folder: Path, open_to_all: list[str], user: int
+) -> None:
+    attacks = [
+        body.replace("SECRET", str(folder / "secret")).replace("FOLDER", str(folder)) for body in ATTACKS
+    ]
+    process = as_user(user, [*open_to_all, "-c", CHECK, json.dumps([*attacks, "say('a')"])])
+    assert (process.returncode, process.stderr) == (0, "")
+    ran_as, _, printed = process.stdout.partition(" ")
+    assert int(ran_as) == user
+    *outcomes, honest = json.loads(printed)
+    assert [outcome["error"]["kind"] for outcome in outcomes] == list(ATTACKS.values())
+    assert [outcome["trace"] for outcome in outcomes] == [[]] * len(ATTACKS)
+    assert (honest["status"], honest["trace"]) == ("finished", [["say", "a"]])
+    assert not (folder / "new").exists()
+
+
+# --- without the list of system calls
+
+BELOW_A_FILTER = """
+import ctypes, platform, struct, sys
+from codebotler.simulator.sandbox.walls import ALLOW, DENY, EQUAL, FIRST_ARGUMENT, LOAD, NUMBER, RETURN
+from codebotler.simulator.sandbox.walls import PR_SET_SECCOMP, install, refuse_new_rights
+
+prctl, seccomp = {"x86_64": (157, 317), "aarch64": (167, 277)}[platform.machine()]
+code = [
+    (LOAD, 0, 0, NUMBER),
+    (EQUAL, 4, 0, seccomp),
+    (EQUAL, 0, 2, prctl),
+    (LOAD, 0, 0, FIRST_ARGUMENT),
+    (EQUAL, 1, 0, PR_SET_SECCOMP),
+    (RETURN, 0, 0, ALLOW),
+    (RETURN, 0, 0, DENY),
+]
+instructions = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *line) for line in code))
+header = struct.pack("HxxxxxxP", len(code), ctypes.addressof(instructions))
+refuse_new_rights()
+install(ctypes.create_string_buffer(header))
+"""
+EVALUATE = """
+from roboeval.cli import main
+sys.argv[0] = "roboeval"
+main()
+"""
+MISSING = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
+
+
+def evaluated(*options: str, before: str = "import sys") -> subprocess.CompletedProcess[str]:
+    """`roboeval evaluate` in a process that has done something before."""
+    arguments = ["evaluate", "recorded:careful", "--tasks", "SayGoodDay", "--json", *options]
+    return subprocess.run(
+        [sys.executable, "-c", before + EVALUATE, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+
+
+def test_kernel_that_refuses_a_filter_is_told_of_in_one_line_and_the_verdicts_are_the_same() -> None:
+    below, bare = evaluated(before=BELOW_A_FILTER), evaluated()
+    assert (below.returncode, below.stderr) == (0, MISSING + "\n")
+    assert (bare.returncode, bare.stderr) == (0, "")
+    assert below.stdout == bare.stdout != ""
+
+
+def test_isolation_that_is_required_is_refused_where_the_kernel_refuses_a_filter() -> None:
+    refused = evaluated("--require-isolation", before=BELOW_A_FILTER)
+    assert (refused.returncode, refused.stdout) == (1, "")
+    assert refused.stderr == f"roboeval: {MISSING}\n"
+    assert evaluated("--require-isolation").returncode == 0
+
+
+def test_other_walls_hold_where_the_kernel_refuses_a_filter(folder: Path) -> None:
+    attacks = {f"open('{folder}/secret')": "OSError", "os.fork()": "BlockingIOError", "say('a')": None}
+    check = BELOW_A_FILTER + CHECK.replace("require_isolation=True", "require_isolation=False")
+    process = as_user(os.geteuid(), [sys.executable, "-c", check, json.dumps(list(attacks))])
+    assert (process.returncode, process.stderr) == (0, MISSING + "\n")
+    outcomes = json.loads(process.stdout.partition(" ")[2])
+    assert [(outcome["error"] or {}).get("kind") for outcome in outcomes] == list(attacks.values())

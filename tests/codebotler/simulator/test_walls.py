@@ -1,0 +1,263 @@
+"""Each wall around a child holds by itself, with all others left out; without it, the same deed is done."""
+
+import os
+import platform
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from codebotler.simulator.sandbox import walls
+
+SCRIPT = """
+import ctypes, errno, os, platform, resource, select, signal, socket, tempfile, time
+from codebotler.simulator.sandbox import walls
+os.dup2(1, 3)
+libc = ctypes.CDLL(None, use_errno=True)
+libc.mmap.restype = ctypes.c_ssize_t
+libc.mmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_size_t]
+libc.mprotect.argtypes = [ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int]
+READABLE, WRITABLE, EXECUTABLE, PRIVATE = 1, 2, 4, 0x22
+
+def tell(word):
+    os.write(3, word.encode())
+
+def succeed(result):
+    if result == -1:
+        raise OSError(ctypes.get_errno(), "refused")
+    return result
+
+def only_seccomp():
+    walls.refuse_new_rights()  # an ordinary user may install no list without it
+    walls.install(walls.seccomp_filter(platform.machine()))
+
+def limit(name):
+    walls.set_limit(name, dict(AS=512 * 1024**2, NOFILE=4).get(name, 0))
+
+{before}
+try:
+    {wall}
+    {deed}
+    tell("done")
+except OSError as error:
+    tell(errno.errorcode[error.errno])
+os._exit(0)
+"""
+
+
+def indented(code: str) -> str:
+    return code.strip().replace("\n", "\n    ")
+
+
+def result(wall: str, deed: str, before: str, folder: str = "/") -> str:
+    """What a process says that puts up a wall and then does something; or the signal that ended it."""
+    script = SCRIPT.format(before=before, wall=wall, deed=indented(deed))
+    process = subprocess.run(
+        [sys.executable, "-B", "-c", script],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        check=False,
+        timeout=60,
+    )
+    if process.returncode < 0:
+        return signal.Signals(-process.returncode).name
+    return process.stderr or f"{process.stdout.strip()} {process.returncode or ''}".strip()
+
+
+@dataclass(frozen=True)
+class Deed:
+    """Something a process does, and what it comes to behind one wall.
+
+    Args:
+        wall: puts up the wall.
+        deed: what is done.
+        comes_to: what the process says then: `done`, the name of an error or of the signal that ended it.
+        before: what is done before, with and without the wall.
+        bare: what the deed comes to without the wall.
+    """
+
+    wall: str
+    deed: str
+    comes_to: str
+    before: str = ""
+    bare: str = "done"
+
+
+A_PAGE = "page = succeed(libc.mmap(None, 4096, READABLE | WRITABLE, PRIVATE, -1, 0))"
+A_PIPE = "reader, writer = os.pipe(); os.write(writer, b'x')"
+A_FILE = "file = tempfile.TemporaryFile()"
+NOBODY = "walls.become_nobody()"
+AN_ORPHAN = """
+reader, writer = os.pipe()
+parent = os.getpid()
+if os.fork():
+    os._exit(len(os.read(reader, 1)) - 1)
+"""
+OUTLIVE = "os.write(writer, b'x')\ntime.sleep(0.7)"
+SEEN_BY_OTHERS = (
+    "walls.become_nobody(); walls.prctl(walls.PR_SET_DUMPABLE, 1)"  # a new user is hidden already
+)
+LOOK = """
+target = os.getpid()
+looker = os.fork()
+if looker == 0:
+    try:
+        open(f"/proc/{target}/environ", "rb").read()
+    except OSError as error:
+        os._exit(error.errno)
+    os._exit(0)
+if seen := os.waitstatus_to_exitcode(os.waitpid(looker, 0)[1]):
+    raise OSError(seen, "refused")
+"""
+A_QUEUE = "succeed(libc.mq_open(b'/walls', os.O_CREAT | os.O_RDWR, 0o600, None))\nlibc.mq_unlink(b'/walls')"
+DUMP = """
+dumper = os.fork()
+if dumper == 0:
+    os.abort()
+if not os.WCOREDUMP(os.waitpid(dumper, 0)[1]):
+    raise OSError(errno.EPERM, "refused")
+"""
+
+
+def denied(deed: str, before: str = "") -> Deed:
+    """What the list of system calls refuses."""
+    return Deed("only_seccomp()", deed, "EPERM", before)
+
+
+def allowed(deed: str, before: str = "", comes_to: str = "done") -> Deed:
+    """What the list lets through."""
+    return Deed("only_seccomp()", deed, comes_to, before, bare=comes_to)
+
+
+DEEDS = {
+    "seccomp: socket": denied("socket.socket()"),
+    "seccomp: pair of sockets": denied("socket.socketpair()"),
+    "seccomp: open": denied("os.open('/dev/null', os.O_RDONLY)"),
+    "seccomp: stat": denied("os.stat('/')"),
+    "seccomp: truncate": denied("os.ftruncate(file.fileno(), 0)", A_FILE),
+    "seccomp: fork": denied("os.fork() or os._exit(0)"),
+    "seccomp: exec": denied("os.execv('/bin/sh', ['sh', '-c', 'echo done'])"),
+    "seccomp: ptrace": denied("succeed(libc.ptrace(0, 0, 0, 0))"),
+    "seccomp: kill": denied("os.kill(os.getpid(), 0)"),
+    "seccomp: signal handler": denied("signal.signal(signal.SIGTERM, signal.SIG_IGN)"),
+    "seccomp: timer": denied("signal.setitimer(signal.ITIMER_REAL, 100)"),
+    "seccomp: wait": denied("select.select([], [], [], 0)"),
+    "seccomp: user": denied("os.setuid(os.getuid())"),
+    "seccomp: prctl": denied("walls.hide_memory()"),
+    "seccomp: limit": denied("succeed(libc.setrlimit(4, bytes(16)))"),
+    "seccomp: true chance": denied("os.getrandom(1)"),
+    "seccomp: descriptor": denied("os.dup(3)"),
+    "seccomp: read elsewhere": denied("os.read(reader, 1)", A_PIPE),
+    "seccomp: write elsewhere": denied("os.write(writer, b'x')", A_PIPE),
+    "seccomp: executable memory": denied("succeed(libc.mmap(None, 4096, EXECUTABLE, PRIVATE, -1, 0))"),
+    "seccomp: memory made executable": denied("succeed(libc.mprotect(page, 4096, EXECUTABLE))", A_PAGE),
+    "seccomp: memory": allowed(A_PAGE),
+    "seccomp: memory made read-only": allowed("succeed(libc.mprotect(page, 4096, READABLE))", A_PAGE),
+    "seccomp: read on the channel": allowed("os.read(3, 1)", comes_to="EBADF"),  # which only writes here
+    "seccomp: clock": allowed("time.time()"),
+    "FSIZE": Deed("limit('FSIZE')", "os.write(file.fileno(), b'x')", "EFBIG", A_FILE),
+    "NOFILE": Deed("limit('NOFILE')", "os.open('/dev/null', os.O_RDONLY)", "EMFILE"),
+    "NPROC": Deed("limit('NPROC')", "os.fork() or os._exit(0)", "EAGAIN", NOBODY),
+    "MEMLOCK": Deed(
+        "limit('MEMLOCK')", "succeed(libc.mlock(ctypes.c_void_p(page), 4096))", "EPERM", f"{NOBODY}; {A_PAGE}"
+    ),
+    "MSGQUEUE": Deed("limit('MSGQUEUE')", A_QUEUE, "EMFILE", NOBODY),
+    "AS": Deed("limit('AS')", "succeed(libc.mmap(None, 10**9, READABLE, PRIVATE, -1, 0))", "ENOMEM"),
+    "CPU": Deed("walls.limit_time(1)", "while time.process_time() < 1.5: pass", "SIGXCPU"),
+    "death with the parent": Deed("walls.die_with_parent()", OUTLIVE, "", AN_ORPHAN),
+    "hidden memory": Deed("walls.hide_memory()", LOOK, "EACCES", SEEN_BY_OTHERS),
+}
+
+
+@pytest.mark.parametrize("name", DEEDS)
+def test_wall_holds_by_itself(name: str) -> None:
+    case = DEEDS[name]
+    assert result("pass", case.deed, case.before) == case.bare
+    assert result(case.wall, case.deed, case.before) == case.comes_to
+
+
+# --- what only root has to lose
+
+
+@pytest.fixture(scope="module")
+def folder() -> Iterator[str]:
+    """A folder that everybody may enter, with a file of root's and a program that makes its user root."""
+    path = Path(tempfile.mkdtemp(prefix="walls-"))
+    path.chmod(0o755)
+    (path / "secret").touch(0o600)
+    shutil.copyfile(shutil.which("id") or "", path / "id")
+    (path / "id").chmod(0o4755)
+    yield str(path)
+    shutil.rmtree(path)
+
+
+ROOTS_DEEDS = {
+    "another user reads": Deed(NOBODY, "open('secret')", "EACCES"),
+    "another user kills": Deed(NOBODY, "os.kill(os.getppid(), 0)", "EPERM"),
+    "another user comes back": Deed(NOBODY, "os.setresuid(0, 0, 0)", "EPERM"),
+    "another user keeps a group": Deed(
+        NOBODY,
+        "if 7 in os.getgroups(): tell('a member, ')",
+        "done",
+        "os.setgroups([7])",
+        bare="a member, done",
+    ),
+    "another user joins a group": Deed(NOBODY, "os.setgroups([0])", "EPERM"),
+    "another group comes back": Deed(NOBODY, "os.setresgid(0, 0, 0)", "EPERM"),
+    "no new rights": Deed(
+        "walls.refuse_new_rights()", "os.execv('./id', ['id', '-u'])", str(walls.NOBODY), NOBODY, bare="0"
+    ),
+    "dumps of memory": Deed(
+        "limit('CORE')", DUMP, "EPERM", "resource.setrlimit(resource.RLIMIT_CORE, (-1, -1))"
+    ),
+}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root has these rights to lose")
+@pytest.mark.parametrize("name", ROOTS_DEEDS)
+def test_wall_holds_root_by_itself(folder: str, name: str) -> None:
+    case = ROOTS_DEEDS[name]
+    bare = result("pass", case.deed, case.before, folder)
+    if bare != case.bare and name in ("no new rights", "dumps of memory"):
+        pytest.skip(f"this machine does not allow the deed to anybody ({bare})")
+    assert bare == case.bare
+    assert result(case.wall, case.deed, case.before, folder) == case.comes_to
+
+
+# --- other ways into the kernel
+
+OLD_CALLS = """
+page = succeed(libc.mmap(None, 4096, READABLE | WRITABLE | EXECUTABLE, PRIVATE, -1, 0))
+ctypes.memmove(page, bytes.fromhex("b814000000cd80c3"), 8)  # mov eax, 20; int 0x80; ret
+"""
+
+
+@pytest.mark.skipif(
+    platform.machine() != "x86_64", reason="only this kind of machine has other tables of calls"
+)
+def test_call_by_the_table_of_another_architecture_ends_the_process() -> None:
+    call = "ctypes.CFUNCTYPE(ctypes.c_int)(page)()"
+    if (bare := result("pass", call, OLD_CALLS)) != "done":
+        pytest.skip(f"this kernel has no 32-bit calls ({bare})")
+    assert result("only_seccomp()", call, OLD_CALLS) == "SIGSYS"
+
+
+def test_call_by_an_x32_number_ends_the_process() -> None:
+    call = "libc.syscall(0x40000000 + 39)"
+    assert result("pass", call, "") == "done"
+    assert result("only_seccomp()", call, "") == "SIGSYS"
+
+
+def test_list_of_system_calls_is_known_for_two_kinds_of_machines_only() -> None:
+    assert [walls.seccomp_filter(machine) is not None for machine in ("x86_64", "aarch64", "riscv64")] == [
+        True,
+        True,
+        False,
+    ]

@@ -1,0 +1,8 @@
+"""Tries to take all memory by doubling a text."""
+# ends: python-error MemoryError
+
+
+def task_program():
+    text = "x"
+    for _ in range(60):
+        text += text

@@ -1,0 +1,6 @@
+"""Tries to blow up a text by replacing each character."""
+# ends: python-error MemoryError
+
+
+def task_program():
+    ("x" * 10**6).replace("x", "y" * 10**6)

@@ -1,0 +1,14 @@
+"""Tries to kill the groups of its own and of the engine."""
+# ends: finished
+
+import os
+import signal
+
+
+def task_program():
+    for group in (0, @PARENT_PID@, @ZYGOTE_PID@, @BYSTANDER_PID@):
+        try:
+            os.killpg(group, signal.SIGTERM)
+            say("killed")
+        except PermissionError:
+            pass

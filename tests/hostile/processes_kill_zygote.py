@@ -1,0 +1,9 @@
+"""Tries to kill the process that it was forked from."""
+# ends: python-error PermissionError
+
+import os
+import signal
+
+
+def task_program():
+    os.kill(@ZYGOTE_PID@, signal.SIGKILL)

@@ -1,0 +1,19 @@
+"""Tries to trace and to rewrite other processes."""
+# ends: finished
+# does: say 15 refused
+
+
+def task_program():
+    frame = sys._getframe()
+    while "ctypes" not in frame.f_globals:
+        frame = frame.f_back
+    kernel = frame.f_globals["ctypes"].CDLL(None)
+    attach, seize = 16, 0x4206
+    refused = 0
+    for pid in (@PARENT_PID@, @ZYGOTE_PID@, @BYSTANDER_PID@):
+        refused += kernel.ptrace(attach, pid, 0, 0) == -1
+        refused += kernel.ptrace(seize, pid, 0, 0) == -1
+        refused += kernel.process_vm_readv(pid, bytes(16), 1, bytes(16), 1, 0) == -1
+        refused += kernel.process_vm_writev(pid, bytes(16), 1, bytes(16), 1, 0) == -1
+        refused += kernel.syscall(312, pid, pid, 0, 0, 0) == -1  # kcmp
+    say(f"{refused} refused")

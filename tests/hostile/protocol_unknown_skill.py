@@ -1,0 +1,13 @@
+"""Tries to find skills that nobody listed."""
+# ends: killed Crash
+
+import os
+
+
+def frame(text):
+    data = text.encode()
+    return len(data).to_bytes(4, "big") + data
+
+
+def task_program():
+    os.write(3, frame('["record", ["say", "open sesame"], 0, 1]'))
