@@ -1,10 +1,10 @@
 """How fast is an evaluation from end to end, and how does its memory grow?
 
 The first part judges the two models whose published completions the corpus holds (where CODEBOTLER_CORPUS
-names it; else the recorded models): rows, runs and executed pairs of program and world in a second, from the
-start of the command to its end and without the start of the interpreter. The paper's own code needs 0.354 s
-for a run, one after the other. The second part judges made-up completions of which nine in ten repeat another:
-time, and the largest memory that any of its processes held.
+names it; else the recorded models): rows, runs and executed pairs of program and world in a second, of the
+whole command and of the evaluation alone. The paper's own code needs 0.354 s for a run, one after the other.
+The second part judges made-up completions of which nine in ten repeat another: time, and the largest memory
+that any of its processes held.
 """
 
 import json

@@ -1,5 +1,5 @@
 """Tries to stop the engine's side of the process where it writes to its line."""
-# ends: python-error KeyError
+# ends: python-error PermissionError
 
 
 def profiler(frame, event, argument):

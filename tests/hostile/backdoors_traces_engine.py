@@ -1,6 +1,5 @@
 """Tries to read the engine's variables in a trace function."""
-# ends: finished
-# does: goto vault
+# ends: python-error PermissionError
 
 import re
 

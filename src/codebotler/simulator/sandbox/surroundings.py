@@ -26,9 +26,20 @@ def simulate_surroundings(run: Run) -> None:
     os.environ.clear()
     for module in (os, posix):
         vars(module).update(getpid=lambda: 1, getppid=lambda: 0)
+    forbid_watching()
     for name in ("exit", "quit"):
         setattr(builtins, name, Quitter(name, "Ctrl-D (i.e. EOF)"))
     sys.setrecursionlimit(RECURSION_LIMIT)
+
+
+def forbid_watching() -> None:
+    """Let no program watch its own execution: what it leaves watching would break into ours at its end."""
+
+    def forbidden(*_: object) -> None:
+        raise PermissionError(1, "a program cannot watch its own execution")
+
+    sys.settrace = sys.setprofile = forbidden
+    vars(sys).pop("monitoring", None)  # new in Python 3.12
 
 
 class Nowhere(io.BufferedIOBase):
