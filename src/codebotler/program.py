@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import builtins
 import symtable
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,6 +13,7 @@ from codebotler.skills import SKILLS, Parameter, Skill, SkillTable
 
 TASK = "task_program"
 GIVEN = ("time", "sys")  # modules that every program finds imported
+NOT_IN_A_RUN = frozenset({"help", "copyright", "credits", "license", "WindowsError", "__file__"})
 
 
 @dataclass(frozen=True)
@@ -139,13 +141,26 @@ def _entry_problems(tree: ast.Module, source: str) -> Iterator[Problem]:
 
 
 def _name_problems(tree: ast.Module, skills: SkillTable) -> Iterator[Problem]:
-    for line, name, is_local in undefined_names(tree, skills):
+    for line, name, is_local in [*undefined_names(tree, skills), *_missing_here(tree, skills)]:
         if is_local:
             yield Problem(
                 line, "UnboundLocalError", f"the local variable {name} is used before it has a value"
             )
         else:
             yield Problem(line, "NameError", f"the name {name} is not defined")
+
+
+def _missing_here(tree: ast.Module, skills: SkillTable) -> Iterator[tuple[int, str, bool]]:
+    """What pyflakes takes for defined, and is not: names of a console, and those only declared global."""
+    bound = _names_bound(tree)
+    if "*" in bound:
+        return
+    declared = {name for node in ast.walk(tree) if isinstance(node, ast.Global) for name in node.names}
+    missing = (NOT_IN_A_RUN | (declared - {*dir(builtins), *skills, *GIVEN})) - bound
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(name, ast.Load()) if name in missing:
+                yield node.lineno, name, False
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:

@@ -60,6 +60,9 @@ def test_right_programs_have_no_problems(program: str, fails: str | None) -> Non
             (1, "task_program takes robot and now, but it is called without arguments"),
         ),
         (in_task("say(wish + wish)"), (2, "the name wish is not defined")),
+        (in_task("help()"), (2, "the name help is not defined")),
+        (in_task("say(__file__)"), (2, "the name __file__ is not defined")),
+        (in_task("global n", "say(n)"), (3, "the name n is not defined")),
         (in_task("x += 1"), (2, "the name x is not defined")),
         (
             in_task("say(x)", "x = 'a'") + "\nx = 'b'",
@@ -107,6 +110,8 @@ def test_problem(text: str, expected: tuple[int | None, str]) -> None:
         in_task("ask(options=['a'], question='b', person='c')", "ask('a', 'b', [r for r in 'ab'])"),
         "def go_to(a, b):\n    pass\n" + in_task("go_to(1, 2)"),
         in_task("for say in [print]:", "    say()"),
+        "def help(): pass\n" + in_task("help()", "global say", "say('a')"),
+        "n = 'a'\n" + in_task("global n", "say(n)"),
         in_task("try:", "    x", "except NameError:", "    pass"),
         in_task("x: 'Undefined' = 1", r"say('\d')", "say('a') if 1 is 1 else 0"),
         "from math import *\n" + in_task("say(str(pi))"),
