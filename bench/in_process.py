@@ -178,7 +178,7 @@ class Unwalled(Bare):
         limits = self.limits
         bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
         start = self.robot.rules.clock_starts.timestamp()
-        return self.ended(json.loads(self.execute(told[1:], (*bounds, start))))
+        return self.ended(json.loads(self.execute(told[1:], (*bounds, start), {})))
 
     def ended(self, final: dict[str, Any]) -> Outcome:
         """The outcome of a run that ended like this."""

@@ -17,6 +17,8 @@ OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty
 LAST_LINE = 1_000_000
 LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 WAITS = "it waits for something that can never come"
+Answer: TypeAlias = tuple[str, object, dict[str, Result]]
+STOP: Answer = ("stop", None, {})
 Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 
@@ -61,7 +63,8 @@ class Conversation:
         self._heard = False
         limits = self.limits
         bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
-        child.send((code, described(robot), (*bounds, robot.rules.clock_starts.timestamp())))
+        start = robot.rules.clock_starts.timestamp()
+        child.send((code, described(robot), (*bounds, start), self._known()))
 
     def outcome(self) -> Outcome:
         """Talk to the end.
@@ -105,14 +108,14 @@ class Conversation:
                 return None
         return None
 
-    def _answer(self, name: str, values: list[object], now: float) -> tuple[str, object]:
+    def _answer(self, name: str, values: list[object], now: float) -> Answer:
         if self.ledger.limit is None:
             self._let_time_pass(now)
         if self.ledger.limit is None:
             if name in self.robot.skills:
                 return self._perform(self.robot.skills[name], values)
             self.ledger.limit = self._beyond(name)
-        return ("stop", None)
+        return STOP
 
     def _beyond(self, name: str) -> str:
         """The limit that a request which is no skill tells of; one to sleep has been told by its time."""
@@ -130,7 +133,15 @@ class Conversation:
         if now >= self.robot.now:  # else the program has found the channel, and deceives itself
             self.robot.now = float(now)
 
-    def _perform(self, skill: Skill, values: list[object]) -> tuple[str, object]:
+    def _known(self) -> dict[str, Result]:
+        """What looking shows that takes no argument and leaves no trace, by request: a child need not ask."""
+        return {
+            f'"{skill.name}",[]': self.robot.perform(skill.name, ())
+            for skill in self.robot.skills.values()
+            if skill.name in self.robot.only_looks and not skill.parameters and skill.recording is None
+        }
+
+    def _perform(self, skill: Skill, values: list[object]) -> Answer:
         arguments = _arguments(skill, values)
         self.ledger.calls += 1
         texts = [t for a in arguments for t in ([a] if isinstance(a, str) else [o.text for o in a])]
@@ -142,12 +153,14 @@ class Conversation:
         elif self.ledger.text > self.limits.trace:
             self.ledger.limit = f"texts of more than {self.limits.trace:,} characters in all"
         if self.ledger.limit is not None:
-            return ("stop", None)
+            return STOP
+        acts = skill.name not in self.robot.only_looks
         try:
-            return ("ok", self.robot.perform(skill.name, arguments))
+            result = self.robot.perform(skill.name, arguments)
+            return ("ok", result, self._known() if acts else {})
         except RobotError as error:
             self.errors.append(error)
-            return ("error", [len(self.errors) - 1, error.kind, str(error)])
+            return ("error", (len(self.errors) - 1, error.kind, str(error)), self._known())
 
     def _ended(self, final: dict[str, object]) -> Outcome:
         line = final.get("line")

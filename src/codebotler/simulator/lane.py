@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import zlib
 from collections.abc import Callable
 
@@ -67,6 +68,11 @@ class Lane:
         self._preparer.kill()
         for zygote in list(self._zygotes.values()):
             zygote.kill()
+
+    def stay_on(self, core: int) -> None:
+        """Let the processes run on one core only."""
+        for zygote in self._zygotes.values():
+            os.sched_setaffinity(zygote.pid, {core})
 
     def close(self) -> None:
         """Give back all that the lane holds; nothing may be running."""

@@ -66,6 +66,11 @@ class Zygote:
         self._has_child = True
         return Child(pid, ours, self._end_of_child, closes=self.has_seccomp)
 
+    @property
+    def pid(self) -> int:
+        """Its process id."""
+        return self._process.pid
+
     def kill(self) -> None:
         """End it and with it a run that is still going on."""
         self._process.kill()

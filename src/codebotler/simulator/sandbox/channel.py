@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # functions below look here for `len`, not where a program can write
 
+AT_ONCE = 16_384  # bytes that are read at a time: a larger buffer would touch more of the memory
 TOO_LONG = '["too-long",[],0.0,1]'
 
 
@@ -41,7 +42,7 @@ def receive() -> Any:  # noqa: ANN401 - whatever the engine says
     """Read one frame; without an engine there is no reason to go on."""
     data = b""
     while len(data) < HEADER or len(data) < HEADER + int.from_bytes(data[:HEADER], "big"):
-        piece = read(CHANNEL, 1 << 16)
+        piece = read(CHANNEL, AT_ONCE)
         if not piece:
             _exit(1)
         data += piece

@@ -62,15 +62,19 @@ class Run:
         names.update((name, self.skill(name, parameters, way)) for name, parameters, way in skills)
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
-    def execute(self, code: bytes, limits: tuple[int, float, int, int, int, float]) -> str:
+    def execute(
+        self, code: bytes, limits: tuple[int, float, int, int, int, float], known: dict[str, Any]
+    ) -> str:
         """Run the program to its end and say how it ended.
 
         Args:
             code: marshalled.
             limits: ticks, simulated seconds, skill calls, characters of a text and of all texts; and what the
                 clock shows at the start, in seconds.
+            known: what looking would show at the start, by request.
         """
         self.ticks, self.seconds, self.calls, self.longest, self.room, self.start = limits
+        self.known = known
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
         try:
@@ -206,7 +210,8 @@ class Run:
         if self.spent:
             raise BudgetSpentError
         send(f"[{request},{self.now!r},1]")
-        kind, value = receive()
+        kind, value, known = receive()
+        self.known.update(known)
         if kind == "ok":
             return value
         if kind == "error":

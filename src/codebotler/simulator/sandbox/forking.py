@@ -121,10 +121,10 @@ def child(line: int, run: Run, seccomp: Filter | None, parent: int) -> NoReturn:
         os._exit(1)
     enclose(seccomp)
     steady_heap()
-    code, skills, limits = receive()
+    code, skills, limits, known = receive()
     if skills != run.skills:
         run.provide(skills)
-    send(run.execute(code, limits))
+    send(run.execute(code, limits, known))
     os._exit(0)
 
 

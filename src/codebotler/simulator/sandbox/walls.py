@@ -85,15 +85,16 @@ SIGKILL = 9
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 38
 MACHINE = os.uname().machine
 SECCOMP_MODE_FILTER = 2
-LIBC = ctypes.CDLL(None, use_errno=True)
+LIBC = ctypes.PyDLL(None, use_errno=True)
+if sys.platform == "linux":
+    LIBC.prctl.argtypes = (ctypes.c_int, *(ctypes.c_ulong,) * 4)
 
 
-def prctl(option: int, *values: int) -> None:
+def prctl(option: int, value: int = 0, other: int = 0) -> None:
     """Ask the kernel to change what this process may do; only Linux can be asked."""
     if sys.platform != "linux":
         return
-    arguments = [ctypes.c_ulong(value) for value in (*values, 0, 0, 0, 0)[:4]]
-    if LIBC.prctl(ctypes.c_int(option), *arguments) != 0:
+    if LIBC.prctl(option, value, other, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), f"prctl({option}) failed")
 
 
