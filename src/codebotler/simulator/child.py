@@ -13,10 +13,10 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from codebotler.simulator.sandbox import CPU_SECONDS, HEADER, MAX_FRAME
+from codebotler.simulator.sandbox import CPU_SECONDS, HEADER, MAX_FRAME, MORE, PIECE
 from codebotler.trace import RunError, Status
 
-LONGEST = 120.0  # seconds of waiting for a child in all; nothing that computes takes so long
+LONGEST = 60.0  # seconds of waiting for a child in all; nothing that computes takes so long
 FILTERED, KILLED_BY_FILTER = 2, 3  # what Linux says of a process and its list of system calls
 SILENCE = 1.0  # seconds after which a silent child is looked at
 
@@ -38,13 +38,25 @@ class Child:
         self._patience = LONGEST
 
     def send(self, message: object) -> None:
-        """Send a frame; a child that is gone is noticed when it is listened to.
+        """Send a message in one or more pieces; a child that is gone is noticed when it is listened to.
+
+        Each piece but the last is asked for more. So a child reads pieces of sizes that depend on the message
+        only, and not on how quick it was: what it reads leaves its mark on the heap.
 
         Raises:
+            ProtocolError: the child says something else in between.
             TimeoutError: the child waits for something else than to listen.
         """
         data = marshal.dumps(message)  # type: ignore[arg-type]  # made of texts, numbers and the like
-        rest = memoryview(len(data).to_bytes(HEADER, "big") + data)
+        whole = len(data).to_bytes(HEADER, "big") + data
+        for start in range(0, len(whole), PIECE):
+            if start and (said := self.receive()) != MORE:
+                if said is None:
+                    return
+                raise ProtocolError("it speaks in the middle of a message")
+            self._send_piece(memoryview(whole)[start : start + PIECE])
+
+    def _send_piece(self, rest: memoryview) -> None:
         stuck = Stuck(self.pid)
         self._channel.settimeout(SILENCE)
         while rest:
@@ -102,7 +114,7 @@ class Child:
             self._be_patient(began)
 
     def _be_patient(self, since: float) -> None:
-        self._patience -= time.monotonic() - since
+        self._patience -= min(time.monotonic() - since, SILENCE)  # the rest is this process's own delay
         if self._patience < 0:
             raise TimeoutError
 

@@ -54,9 +54,11 @@ class Conversation:
         child: the fresh child.
         code: the program, as the preparer made it.
         robot: who executes its skills.
+        may_import: whether all that can be imported is there, so that nothing is gained by another run.
     """
 
-    def __init__(self, child: Child, code: bytes, robot: Robot) -> None:
+    def __init__(self, child: Child, code: bytes, robot: Robot, *, may_import: bool) -> None:
+        self._may_import = may_import
         self.child, self.robot, self.limits = child, robot, robot.rules.limits
         self.ledger = Ledger()
         self.errors: list[RobotError] = []
@@ -165,7 +167,7 @@ class Conversation:
     def _ended(self, final: dict[str, object]) -> Outcome:
         line = final.get("line")
         match final:
-            case {"end": "again"}:
+            case {"end": "again"} if not self._may_import:
                 raise ImportsMoreError
             case {"end": "finished"}:
                 return Outcome(Status.FINISHED, self.robot.trace)

@@ -58,7 +58,7 @@ class Lane:
                 outcome = self._try(source, new_robot)
             except LostChildError as error:
                 raise EngineError(f"an isolated process was lost twice: {error}") from None
-        why = "" if outcome.error is None else f" ({outcome.error.kind}: {outcome.error.message})"
+        why = "" if outcome.error is None else f" ({outcome.error.kind}: {outcome.error.message!a})"
         EVENTS.debug("program %08x: %s%s", name, outcome.status.value, why)
         return outcome
 
@@ -99,7 +99,8 @@ class Lane:
             raise LostChildError(str(error)) from None
 
     def _converse(self, role: str, prepared: Prepared, robot: SimulatedRobot) -> Outcome:
-        return Conversation(self._zygote(role).fork(), prepared.code, robot).outcome()
+        child = self._zygote(role).fork()
+        return Conversation(child, prepared.code, robot, may_import=role == LIBRARY_ZYGOTE).outcome()
 
     def _zygote(self, role: str) -> Zygote:
         if role not in self._zygotes:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
 from collections import OrderedDict
 from dataclasses import dataclass
 
 from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
 from codebotler.simulator.isolated import start
-from codebotler.simulator.sandbox import IMPORTING, PREPARER, REFUSED
+from codebotler.simulator.sandbox import IMPORTING, MAX_CODE, PREPARER, REFUSED
 from codebotler.trace import Outcome, RunError, Status
 
 MAX_SOURCE = 5_000_000
-MAX_CODE = 100_000_000
 LONG = 100_000  # characters of a program that is prepared in a process of its own
 SERVES = 500  # programs that one process prepares
 KEPT = 100  # programs whose code is kept
+EXHAUSTED = ("MemoryError", "TimeoutError", "Crash")
+SMALL = 100_000  # bytes of code that is worth keeping
 
 
 @dataclass(frozen=True)
@@ -53,12 +55,15 @@ class Preparer:
         if len(source) > MAX_SOURCE:
             return refused("MemoryError", f"the program is longer than {MAX_SOURCE:,} characters")
         key = source, lowercase
-        if key not in self._kept:
-            self._kept[key] = self._prepare(source, lowercase=lowercase)
+        if key in self._kept:
+            self._kept.move_to_end(key)
+            return self._kept[key]
+        prepared = self._prepare(source, lowercase=lowercase)
+        if len(source) <= SMALL and (isinstance(prepared, Outcome) or len(prepared.code) <= SMALL):
+            self._kept[key] = prepared
             if len(self._kept) > KEPT:
                 self._kept.popitem(last=False)
-        self._kept.move_to_end(key)
-        return self._kept[key]
+        return prepared
 
     def kill(self) -> None:
         """End the process, also in the middle of a program."""
@@ -75,23 +80,30 @@ class Preparer:
     def _prepare(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
         if len(source) > LONG or self._served >= SERVES:
             self.close()
+        served = self._served
         try:
-            return self._ask(source, lowercase=lowercase)
-        except _DiedError as death:
-            if death.served:  # perhaps it had grown tired of earlier programs: a verdict needs a fresh one
-                return self._prepare(source, lowercase=lowercase)
-            return Outcome(death.status, (), death.error)
+            outcome = self._ask_or_die(source, lowercase=lowercase)
+            if served and isinstance(outcome, Outcome) and outcome.error and outcome.error.kind in EXHAUSTED:
+                self.close()  # perhaps earlier programs had exhausted it: a verdict needs a fresh one
+                outcome = self._ask_or_die(source, lowercase=lowercase)
+            return outcome
         finally:
             if len(source) > LONG:
                 self.close()
+
+    def _ask_or_die(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
+        try:
+            return self._ask(source, lowercase=lowercase)
+        except _DiedError as death:
+            return Outcome(death.status, (), death.error)
 
     def _ask(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
         if self._child is None:
             self._child = _started()
         self._child.send((source, lowercase))
-        served, self._served = self._served, self._served + 1
+        self._served += 1
         try:
-            answer = self._child.receive_bytes(MAX_CODE)
+            answer = self._child.receive_bytes(len(IMPORTING) + MAX_CODE)
         except (TimeoutError, ProtocolError):
             answer = None
         if not answer:
@@ -100,7 +112,9 @@ class Preparer:
             status = child.ended()
             if not closed:
                 raise LostChildError("the preparer ended before it was closed")
-            raise _DiedError(served, *cause_of_death(status))
+            if status == -signal.SIGKILL:
+                raise LostChildError("the preparer was killed from outside")
+            raise _DiedError(*cause_of_death(status))
         self._child.rest()
         if answer[:1] == REFUSED:
             return refused(*json.loads(answer[1:]))
@@ -108,8 +122,8 @@ class Preparer:
 
 
 class _DiedError(Exception):
-    def __init__(self, served: int, status: Status, error: RunError) -> None:
-        self.served, self.status, self.error = served, status, error
+    def __init__(self, status: Status, error: RunError) -> None:
+        self.status, self.error = status, error
 
 
 def _started() -> Child:

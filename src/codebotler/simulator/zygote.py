@@ -84,7 +84,7 @@ class Zygote:
 
     def _rehearse(self) -> None:
         """Run an empty program: by then the heap of the zygote, which programs can see, has settled."""
-        Conversation(self.fork(), EMPTY, SimulatedRobot(REHEARSAL)).outcome()
+        Conversation(self.fork(), EMPTY, SimulatedRobot(REHEARSAL), may_import=True).outcome()
 
     def _end_of_child(self) -> int:
         status = self._read_report()

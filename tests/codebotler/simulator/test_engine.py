@@ -372,9 +372,9 @@ def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureF
         "started",
         "finished",
         "started",
-        'robot-error (GoToInvalidLocation: there is no room "x")',
+        "robot-error (GoToInvalidLocation: 'there is no room \"x\"')",
         "started",
-        "killed (Crash: the process ended by itself (exit status 3))",
+        "killed (Crash: 'the process ended by itself (exit status 3)')",
     ]
 
 
@@ -395,3 +395,84 @@ def test_macos_is_less_isolated_and_says_so_with_the_platform_patched(
     ]
     with pytest.raises(EngineError, match="only Linux"):
         list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))
+
+
+# --- what an attack found
+
+
+def large_program(number: int) -> str:
+    """A program whose code does not fit into the buffer of a socket."""
+    functions = "".join(f"say_{i} = lambda a, b: (a + b) * {i}\n" for i in range(2600))
+    return f"{functions}# {number}\ndef task_program(): say(str([id(bytes(60_000 + i)) for i in range(9)]))\n"
+
+
+def test_large_programs_say_the_same_addresses_every_time() -> None:
+    outcomes = run(((large_program(number), WORLD) for number in range(12)), workers=2)
+    assert len({tuple(said(outcome)) for outcome in outcomes}) == 1
+
+
+def test_few_characters_of_much_code_are_refused_and_not_kept() -> None:
+    methods = "".join(f" def f{j}(): 0\n" for j in range(1500))
+    lane = Lane()
+    for number in range(3):
+        source = f"class {'q' * 60_000}{number}:\n{methods}\ndef task_program(): pass\n"
+        error = lane.run(source, lambda: SimulatedRobot(WORLD)).error
+        assert error is not None
+        assert error.kind == "MemoryError"
+    assert sum(len(repr(kept)) for kept in lane._preparer._kept.values()) < 1_000_000
+    lane.close()
+
+
+def test_what_was_prepared_before_changes_no_outcome() -> None:
+    greedy = [f"import {'.'.join(['a'] * parts)}\ndef task_program(): pass\n" for parts in (13_000, 21_342)]
+    filling = [
+        f"class {'q' * 59_992}{i:08}:\n" + "".join(f" __f{j}\n" for j in range(1500)) + "break\n"
+        for i in range(4)
+    ]
+    alone = [next(run([(source, WORLD)], workers=1)) for source in greedy]
+    after = list(run([(source, WORLD) for source in filling + greedy], workers=1))[len(filling) :]
+    assert after == alone
+
+
+def test_a_preparer_that_is_killed_from_outside_is_no_verdict() -> None:
+    lane = Lane()
+
+    def robot() -> SimulatedRobot:
+        return SimulatedRobot(WORLD)
+
+    assert said(lane.run(saying("a"), robot)) == ["a"]
+    assert lane._preparer._child is not None
+    os.kill(lane._preparer._child.pid, signal.SIGKILL)
+    assert said(lane.run(saying("b"), robot)) == ["b"]
+    lane.close()
+
+
+FROM_A_SHELL = """
+from codebotler.simulator import run
+from codebotler.world import Room, World
+program = '''
+import signal
+def f(n): return f(n + 1)
+def task_program():
+    say(str(object()) + str(id([])) + str(signal.getsignal(2)))
+    try: f(0)
+    except RecursionError as error: say(str(error))
+    sum(range(10**12))
+'''
+print(run(program, World((Room("a"),), "a")))
+"""
+
+
+def test_what_a_shell_has_set_changes_no_outcome() -> None:
+    settings = ["true", "trap '' XCPU INT", "ulimit -s 1000000", "ulimit -s unlimited"]
+    told = {
+        subprocess.run(
+            ["bash", "-c", f'{setting}; exec "$0" -c "$1"', sys.executable, FROM_A_SHELL],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for setting in settings
+    }
+    assert len(told) == 1
+    assert "5 seconds of processor time" in told.pop()

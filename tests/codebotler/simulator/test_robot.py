@@ -5,13 +5,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.simulator.robot import Result, RobotError, SimulatedRobot, choose, located
+from codebotler.simulator.robot import Result, RobotError, SimulatedRobot, Thing, _pattern, choose, located
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS
 from codebotler.trace import Event, Option
 from codebotler.world import Person, Room, World
 
 Texts: TypeAlias = tuple[str, ...]
+
+
+def test_a_thing_that_was_put_down_is_found_by_its_name_without_a_regex() -> None:
+    before = _pattern.cache_info()
+    thing = Thing("Mug (of Amy)", is_pattern=False)
+    assert thing.is_meant_by("the mug (OF AMY), please")
+    assert not thing.is_meant_by("the mug of amy")
+    assert not Thing("a" * 5_000 + "b", is_pattern=False).is_meant_by("a" * 10_000)
+    assert _pattern.cache_info() == before
 
 
 def options(*texts: str) -> tuple[Option, ...]:

@@ -246,6 +246,25 @@ WORKS: dict[str, tuple[str, object]] = {
         ),
         ["2.0", "102.0", "105.0", "False", "TrueFalse110.0", "120.0", "True"],
     ),
+    "dates are what they seem": (
+        "import datetime, pickle\nclass D(datetime.datetime): pass\n"
+        + task(
+            "now = datetime.datetime.now()\n"
+            "say(str((isinstance(now, D), isinstance(now, datetime.date))))\n"
+            "say(str(issubclass(D, datetime.datetime)))\n"
+            "say(str(pickle.loads(pickle.dumps(now.date())) == now.date()))\nsay(str(D.now()))"
+        ),
+        ["(False, True)", "True", "True", "2024-01-01 12:00:00"],
+    ),
+    "selectors and executors are there": (
+        "import concurrent.futures, selectors, threading, platform\n"
+        + task(
+            "selectors.SelectSelector().select(2)\nsay(str(time.monotonic()))\n"
+            "concurrent.futures.ThreadPoolExecutor()\nsay(platform.node() + sys.executable)\n"
+            "try:\n    threading.RLock().release()\nexcept RuntimeError as error: say(str(error))"
+        ),
+        ["2.0", "robot", "cannot release un-acquired lock"],
+    ),
     "chance and identities repeat": (
         task(
             "import _random, os, random, threading, uuid\n"

@@ -17,6 +17,9 @@ CHANNEL = 3
 
 HEADER, MAX_FRAME = 4, 1_000_000
 
+PIECE, MORE = 16_384, "more"
+"""Bytes of a message to a child that it gets at once, and what it says when it wants the next."""
+
 MEMORY = 512 * 1024 * 1024
 """Bytes of address space of an isolated process."""
 
@@ -29,6 +32,9 @@ PREPARER, ZYGOTE, LIBRARY_ZYGOTE = "preparer", "zygote", "library-zygote"
 ACTS, TELLS, LOOKS = 0, 1, 2
 """How a skill is called: waiting for its result; without waiting, since there is none and it cannot fail; and
 waiting only until the result is known, which then stays as it is until the robot acts."""
+
+MAX_CODE = 10_000_000
+"""Bytes of a program's compiled code."""
 
 PLAIN, IMPORTING, REFUSED = b"p", b"i", b"-"
 """What the preparer's answer begins with: before the code of a program, before that of one which imports more

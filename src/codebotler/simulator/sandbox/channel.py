@@ -10,7 +10,7 @@ import builtins
 from marshal import loads
 from posix import _exit, read, write
 
-from codebotler.simulator.sandbox import CHANNEL, HEADER, MAX_FRAME
+from codebotler.simulator.sandbox import CHANNEL, HEADER, MAX_FRAME, MORE, PIECE
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # functions below look here for `len`, not where a program can write
 
-AT_ONCE = 16_384  # bytes that are read at a time: a larger buffer would touch more of the memory
 TOO_LONG = '["too-long",[],0.0,1]'
 
 
@@ -39,11 +38,19 @@ def send_bytes(data: bytes) -> None:
 
 
 def receive() -> Any:  # noqa: ANN401 - whatever the engine says
-    """Read one frame; without an engine there is no reason to go on."""
-    data = b""
-    while len(data) < HEADER or len(data) < HEADER + int.from_bytes(data[:HEADER], "big"):
-        piece = read(CHANNEL, AT_ONCE)
-        if not piece:
-            _exit(1)
-        data += piece
-    return loads(data[HEADER:])  # noqa: S302 - written by the engine
+    """Read one message, piece by piece; without an engine there is no reason to go on."""
+    pieces = [read_piece()]
+    missing = HEADER + int.from_bytes(pieces[0][:HEADER], "big") - len(pieces[0])
+    while missing > 0:
+        send(f'"{MORE}"')
+        pieces.append(read_piece())
+        missing -= len(pieces[-1])
+    return loads(b"".join(pieces)[HEADER:])  # noqa: S302 - written by the engine
+
+
+def read_piece() -> bytes:
+    """Read what the engine has sent at once."""
+    piece = read(CHANNEL, PIECE)
+    if not piece:
+        _exit(1)
+    return piece

@@ -13,19 +13,18 @@ import importlib
 import os
 import posix
 import sys
-import time
 
 from codebotler.simulator.sandbox.execution import Run
 from codebotler.simulator.sandbox.locks import simulate_locks
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    import datetime as real  # noqa: ICN001 - the stand-ins bear its usual name
     from typing import Any, Self
 
 LISTED = """
     abc argparse array ast asyncio atexit base64 binascii bisect bz2 calendar cmath codecs collections
-    collections.abc colorsys concurrent.futures contextlib contextvars copy copyreg csv ctypes dataclasses
+    collections.abc colorsys concurrent.futures concurrent.futures.thread contextlib contextvars copy copyreg
+    csv ctypes dataclasses
     datetime decimal difflib dis enum errno fcntl fnmatch fractions functools gc gettext glob graphlib grp
     hashlib heapq hmac html inspect io ipaddress itertools json keyword linecache locale logging lzma marshal
     math numbers operator os os.path pathlib pickle platform posix pprint pwd queue random re reprlib resource
@@ -44,6 +43,7 @@ SOME_VERSIONS_HAVE = ("typing.io", "typing.re")
 
 def load_library(run: Run) -> None:
     """Import all that a program may import, on the run's clock and with chance that repeats."""
+    simulate_select(run)
     simulate_chance()
     simulate_locks(run)
     vars(_thread)["get_native_id"] = lambda: 1
@@ -52,9 +52,10 @@ def load_library(run: Run) -> None:
         importlib.import_module(name)
     for name in (*SOME_VERSIONS_HAVE, "_queue"):
         sys.modules.pop(name, None)
+    from codebotler.simulator.sandbox.dates import simulate_dates  # noqa: PLC0415 - see the module's first lines
+
     simulate_dates()
     simulate_identities()
-    simulate_select(run)
 
 
 def simulate_chance() -> None:
@@ -79,67 +80,38 @@ def simulate_chance() -> None:
     os.urandom = posix.urandom = urandom
 
 
-def simulate_dates() -> None:
-    """Let `datetime` read the time from `time`."""
-    import datetime as real  # noqa: PLC0415, ICN001 - see the module's first lines
-
-    class Stand(type):
-        """The class of a class that takes the place of another: what is one of those is one of these."""
-
-        def __instancecheck__(cls, thing: object) -> bool:
-            return isinstance(thing, cls.__bases__[0])
-
-        def __subclasscheck__(cls, other: type) -> bool:
-            return issubclass(other, cls.__bases__[0])
-
-    class date(real.date, metaclass=Stand):  # noqa: N801 - it takes the place of the real one
-        @classmethod
-        def today(cls) -> date:
-            return cls.fromtimestamp(time.time())
-
-        def __repr__(self) -> str:
-            return f"datetime.{super().__repr__()}"
-
-    class datetime(real.datetime, metaclass=Stand):  # noqa: N801 - the same
-        @classmethod
-        def now(cls, tz: real.tzinfo | None = None) -> datetime:
-            return cls.fromtimestamp(time.time(), tz)
-
-        @classmethod
-        def utcnow(cls) -> datetime:
-            return cls.fromtimestamp(time.time())
-
-        @classmethod
-        def today(cls) -> datetime:
-            return cls.fromtimestamp(time.time())
-
-        def __repr__(self) -> str:
-            return f"datetime.{super().__repr__()}"
-
-    for fake in (date, datetime):
-        fake.__module__, fake.__qualname__ = "datetime", fake.__name__
-        setattr(real, fake.__name__, fake)
-
-
 def simulate_identities() -> None:
-    """Let `uuid` take its time from `time`, and no address of this machine."""
-    import uuid  # noqa: PLC0415 - see the module's first lines
+    """Let `uuid` take its time from `time`, and let neither it nor `platform` tell which machine this is."""
+    import platform  # noqa: PLC0415 - see the module's first lines
+    import uuid  # noqa: PLC0415 - the same
 
+    vars(platform).update(_uname_cache=platform.uname_result("Linux", "robot", "", "", ""))
+    sys.orig_argv, sys.executable = list(sys.argv), ""
     vars(uuid).update(_generate_time_safe=None, _node=1)
 
 
-def simulate_select(run: Run) -> None:
-    """Let a wait for no file be a sleep; a wait for one is forbidden."""
-    import select  # noqa: PLC0415 - see the module's first lines
+class Select:
+    """Takes the place of `select.select`: a wait for no file is a sleep, and one for a file is forbidden.
 
-    def simulated(
-        read: list[object], write: list[object], other: list[object], timeout: float | None = None, /
+    No function, which would become a method of the class in `selectors` that keeps it.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self.run = run
+
+    def __call__(
+        self, read: list[object], write: list[object], other: list[object], timeout: float | None = None, /
     ) -> tuple[list[object], list[object], list[object]]:
         if read or write or other:
             raise PermissionError(1, "Operation not permitted")
         if timeout is None:
-            run.wait_for_ever()
-        run.sleep(timeout)
+            self.run.wait_for_ever()
+        self.run.sleep(timeout)
         return [], [], []
 
-    select.select = simulated  # type: ignore[assignment]  # it need not know any more
+
+def simulate_select(run: Run) -> None:
+    """Let waits cost simulated time."""
+    import select  # noqa: PLC0415 - see the module's first lines
+
+    vars(select)["select"] = Select(run)

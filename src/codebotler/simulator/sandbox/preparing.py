@@ -11,9 +11,9 @@ import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: nothing can 
 from _json import encode_basestring_ascii as quoted
 from marshal import dumps
 
-from codebotler.simulator.sandbox import CHANNEL, IMPORTING, PLAIN, REFUSED
+from codebotler.simulator.sandbox import CHANNEL, IMPORTING, MAX_CODE, PLAIN, REFUSED
 from codebotler.simulator.sandbox.channel import receive, send_bytes
-from codebotler.simulator.sandbox.ticks import prepared
+from codebotler.simulator.sandbox.ticks import TOO_LARGE, prepared
 from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
 
 DOOR = 4
@@ -39,9 +39,12 @@ def answer(source: str, *, lowercase: bool) -> bytes:
     """A byte that says what follows; then the code, or why there is none, as JSON."""
     try:
         code, imports = prepared(source, lowercase=lowercase)
+        data = dumps(code, WITHOUT_REFERENCES)
+        if len(data) > MAX_CODE:
+            raise MemoryError(TOO_LARGE)  # noqa: TRY301 - the same as if the compiler had
     except Exception as error:  # noqa: BLE001 - the compiler has many ways to refuse a program
         line = error.lineno if isinstance(error, SyntaxError) else None
         message = error.msg if isinstance(error, SyntaxError) else str(error)
         kind = quoted(type(error).__name__)
         return REFUSED + f"[{kind},{quoted(message[:1000])},{'null' if line is None else line}]".encode()
-    return (PLAIN if imports <= ALWAYS_THERE else IMPORTING) + dumps(code, WITHOUT_REFERENCES)
+    return (PLAIN if imports <= ALWAYS_THERE else IMPORTING) + data

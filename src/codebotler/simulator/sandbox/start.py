@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 FIRST = 4
+STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
 
@@ -44,6 +45,7 @@ def start_again(descriptors: list[int]) -> NoReturn:
     """
     from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - the second start, which is forked, has no use for it
 
+    forget_the_shell()
     end = FIRST + len(descriptors)
     copies = [fcntl(descriptor, F_DUPFD, end) for descriptor in descriptors]
     for number, copy in enumerate(copies, FIRST):
@@ -52,6 +54,18 @@ def start_again(descriptors: list[int]) -> NoReturn:
     if sys.platform == "linux":
         ctypes.CDLL(None).personality(ctypes.c_ulong(ADDR_NO_RANDOMIZE))
     os.execv(sys.executable, sys.orig_argv[: -len(descriptors)])  # noqa: S606 - the same program again
+
+
+def forget_the_shell() -> None:
+    """Undo what a shell may have set and a process inherits: ignored signals, the size of the stack."""
+    import _signal  # type: ignore[import-not-found] # noqa: PLC0415 - the second start has no use for it
+    from resource import RLIMIT_STACK, getrlimit, setrlimit  # noqa: PLC0415 - the same
+
+    for number in _signal.valid_signals() - {_signal.SIGKILL, _signal.SIGSTOP}:
+        _signal.signal(number, _signal.SIG_DFL)
+    _signal.pthread_sigmask(_signal.SIG_SETMASK, ())
+    _, hard = getrlimit(RLIMIT_STACK)
+    setrlimit(RLIMIT_STACK, (STACK if hard < 0 else min(STACK, hard), hard))
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 PROGRAM = "<program>"
 TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"  # names that no source text can spell
 TASK = "task_program"
+TOO_LARGE = "the program is too large, or nested too deeply"
 DEEPEST = 250
 MOST_BLOCKS = 20
 BLOCKS = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
@@ -40,7 +41,7 @@ def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset
             note_entries(node)
         return compile(tree, PROGRAM, "exec", dont_inherit=True), imports
     except (RecursionError, MemoryError):
-        raise MemoryError("the program is too large, or nested too deeply") from None
+        raise MemoryError(TOO_LARGE) from None
 
 
 def walk(tree: ast.AST) -> Iterator[ast.AST]:
