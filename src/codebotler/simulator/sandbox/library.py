@@ -102,6 +102,7 @@ class Select:
     def __call__(
         self, read: list[object], write: list[object], other: list[object], timeout: float | None = None, /
     ) -> tuple[list[object], list[object], list[object]]:
+        """Wait, for so many seconds or for ever."""
         if read or write or other:
             raise PermissionError(1, "Operation not permitted")
         if timeout is None:
