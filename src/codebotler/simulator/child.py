@@ -8,6 +8,7 @@ import marshal
 import os
 import signal
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -18,7 +19,7 @@ from codebotler.trace import RunError, Status
 
 LONGEST = 60.0  # seconds of waiting for a child in all; nothing that computes takes so long
 FILTERED, KILLED_BY_FILTER = 2, 3  # what Linux says of a process and its list of system calls
-SILENCE = 1.0  # seconds after which a silent child is looked at
+SILENCE = 1  # seconds after which a silent child is looked at
 
 
 class Child:
@@ -33,6 +34,8 @@ class Child:
 
     def __init__(self, pid: int, channel: socket.socket, wait: Callable[[], int], *, closes: bool) -> None:
         self.pid, self._channel, self._wait = pid, channel, wait
+        for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call less than settimeout
+            channel.setsockopt(socket.SOL_SOCKET, direction, struct.pack("ll", SILENCE, 0))
         self._closes = closes
         self._buffer = bytearray()
         self._patience = LONGEST
@@ -58,12 +61,11 @@ class Child:
 
     def _send_piece(self, rest: memoryview) -> None:
         stuck = Stuck(self.pid)
-        self._channel.settimeout(SILENCE)
         while rest:
             began = time.monotonic()
             try:
                 rest = rest[self._channel.send(rest) :]
-            except TimeoutError:
+            except BlockingIOError:  # nothing for so long
                 stuck.check()
             except OSError:
                 return
@@ -90,7 +92,6 @@ class Child:
             TimeoutError: the child waits for something that will never come.
         """
         stuck = Stuck(self.pid)
-        self._channel.settimeout(SILENCE)
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
@@ -103,7 +104,7 @@ class Child:
             began = time.monotonic()
             try:
                 piece = self._channel.recv(1 << 16)
-            except TimeoutError:
+            except BlockingIOError:  # nothing for so long
                 stuck.check()
             except OSError:
                 return None

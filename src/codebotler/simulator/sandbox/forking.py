@@ -134,7 +134,7 @@ def steady_heap() -> None:
 
 
 KEPT: list[object] = []
-SIZES, EACH = range(0, 144, 16), 3
+SIZES, EACH = range(0, 96, 16), 3
 
 
 def report(number: int) -> None:
