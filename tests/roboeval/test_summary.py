@@ -7,54 +7,15 @@ import re
 import weakref
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
-from rich.console import Console, RenderableType
 
 from codebotler.badinput import BadInput
-from codebotler.simulator.rules import Rules
 from roboeval.evaluation import Scope
-from roboeval.suite import Suite, Task
 from roboeval.summary import render, summary, summary_data
 from roboeval.taxonomy import CATEGORIES, PYTHON_KINDS, ROBOT_KINDS
-
-TASK = Task(
-    name="Visit",
-    summary="Visit Alice.",
-    abilities=(),
-    prompts=("Visit Alice.", "Go to Alice."),
-    facts=(),
-    checks=(),
-    scenarios=(),
-    ablation=None,
-    accepted=(),
-    path=Path("Visit.yaml"),
-)
-SUITE = Suite("small", 1, "", Rules(), {"Visit": TASK, "Wait": replace(TASK, name="Wait")}, "0")
-
-
-def row(
-    prompt: int, index: int, failure: tuple[str, str] | None = None, *, task: str = "Visit"
-) -> dict[str, Any]:
-    why = failure and {"class": failure[0], "kind": failure[1], "world": 0, "check": None}
-    return {"task": task, "prompt": prompt, "index": index, "passed": not why, "failure": why, "verdicts": []}
-
-
-ROWS = [
-    row(0, 0),
-    row(0, 1, ("PythonError", "NameError")),
-    row(1, 0, ("PythonError", "MemoryError")),
-    row(1, 1, ("TaskCompletionError", "Location")),
-]
-
-
-def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False) -> str:
-    console = Console(width=width, force_terminal=colour, color_system="standard" if colour else None)
-    with console.capture() as captured:
-        console.print(renderable)
-    return captured.get()
+from small_run import ROWS, SUITE, TASK, printed, row
 
 
 def test_a_summary_counts_tasks_prompts_and_failures() -> None:

@@ -2,59 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
-
 import pytest
-from rich.console import Console, RenderableType
 
 from codebotler.badinput import BadInput
-from codebotler.simulator.rules import Rules
 from roboeval import tables
 from roboeval.records import Completion
-from roboeval.suite import Suite, Task
 from roboeval.summary import render, summary
 from roboeval.tables import Selection, parse_selection, visible
-
-HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800\n"
-SHOWN = r"[red]x[/red]\x1b[2J\x07\u202e\ud800\n"
-
-TASK = Task(
-    name="Visit",
-    summary="Visit Alice.",
-    abilities=(),
-    prompts=("Visit Alice.", "Go to Alice."),
-    facts=(),
-    checks=(),
-    scenarios=(),
-    ablation=None,
-    accepted=(),
-    path=Path("Visit.yaml"),
-)
-SUITE = Suite("small", 1, "", Rules(), {"Visit": TASK, "Wait": replace(TASK, name="Wait")}, "0")
-
-
-def row(
-    prompt: int, index: int, failure: tuple[str, str] | None = None, *, task: str = "Visit"
-) -> dict[str, Any]:
-    why = failure and {"class": failure[0], "kind": failure[1], "world": 0, "check": None}
-    return {"task": task, "prompt": prompt, "index": index, "passed": not why, "failure": why, "verdicts": []}
-
-
-ROWS = [
-    row(0, 0),
-    row(0, 1, ("PythonError", "NameError")),
-    row(1, 0, ("PythonError", "MemoryError")),
-    row(1, 1, ("TaskCompletionError", "Location")),
-]
-
-
-def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False) -> str:
-    console = Console(width=width, force_terminal=colour, color_system="standard" if colour else None)
-    with console.capture() as captured:
-        console.print(renderable)
-    return captured.get()
+from small_run import HOSTILE, ROWS, SHOWN, SUITE, printed, row
 
 
 def test_a_task_is_shown_prompt_by_prompt() -> None:
