@@ -13,7 +13,7 @@ import time
 import types
 from functools import lru_cache
 from pathlib import Path
-from typing import IO, Any, Protocol, Self
+from typing import IO, Any, Protocol, Self, TypeAlias
 
 from codebotler.simulator.conversation import described
 from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
@@ -29,6 +29,7 @@ CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
 DEEPER = 500  # a robot that is called as a function takes more of the stack than one that is asked by socket
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has
+Execution: TypeAlias = tuple[bytes, tuple[int, float, int, int, int, float], dict[str, Any]]
 ORDINARY = Path(__file__).with_name("ordinary_process.py")
 
 
@@ -169,8 +170,8 @@ class Unwalled(Bare):
             return f"texts of more than {self.limits.trace:,} characters in all"
         return None
 
-    def outcome(self, source: str) -> Outcome:
-        """Run a program and say how it ended."""
+    def prepare(self, source: str) -> Outcome | Execution:
+        """What to execute; or the outcome of what is no program."""
         told = answer(source, lowercase=self.robot.rules.literals == "lowercase")
         if told[:1] == REFUSED:
             kind, message, line = json.loads(told[1:])
@@ -178,7 +179,7 @@ class Unwalled(Bare):
         limits = self.limits
         bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
         start = self.robot.rules.clock_starts.timestamp()
-        return self.ended(json.loads(self.execute(told[1:], (*bounds, start), {})))
+        return told[1:], (*bounds, start), {}
 
     def ended(self, final: dict[str, Any]) -> Outcome:
         """The outcome of a run that ended like this."""
@@ -279,6 +280,8 @@ def child(stand_in: StandIn, source: str, robot: SimulatedRobot, output: IO[byte
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     sys.setrecursionlimit(RECURSION_LIMIT)
     run = stand_in.run = Unwalled(robot)
-    output.write(pickle.dumps(run.outcome(source)))
+    what = run.prepare(source)
+    outcome = what if isinstance(what, Outcome) else run.ended(json.loads(run.execute(*what)))
+    output.write(pickle.dumps(outcome))
     output.flush()
     os._exit(0)
