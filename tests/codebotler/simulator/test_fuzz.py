@@ -35,6 +35,20 @@ FUZZ = settings(
 )
 RULES = Rules(limits=Limits(ticks=2_000, calls=60))
 
+DEEP = """
+deepest = 0
+
+def deeper(n):
+    global deepest
+    deepest = n
+    deeper(n + 1)
+
+def task_program():
+    try:
+        deeper(0)
+    except RecursionError:
+        say(str(deepest))
+"""
 AMY = Person("amy", ("yes", "no", "hello|kitchen", ".*"))
 BOB = Person(".*", ("no", "yes"))
 NEVER = Person("x")
@@ -123,6 +137,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     @FUZZ
     @given(programs(), st.sampled_from(WORLDS))
     @example("def task_program():\n    say(undefined_name)\n", WORLDS[0])
+    @example(DEEP, WORLDS[0])
     def check(source: str, world: World) -> None:
         note(source)
         outcome = seen[source, world] = outcome_of(lanes, source, world)
