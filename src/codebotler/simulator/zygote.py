@@ -8,10 +8,9 @@ import socket
 import sys
 
 from codebotler.simulator.child import Child, LostChildError
-from codebotler.simulator.conversation import Conversation, Description, described
+from codebotler.simulator.conversation import Conversation, described
 from codebotler.simulator.isolated import start
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox import ZYGOTE
 from codebotler.world import Room, World
 
 NUMBER = 8  # bytes of a number that it reports
@@ -25,20 +24,19 @@ class Zygote:
 
     Args:
         role: of the two kinds of zygotes.
-        skills: what its children are most often asked to provide.
 
     Raises:
         LostChildError: it does not start.
     """
 
-    def __init__(self, role: str = ZYGOTE, skills: Description = ()) -> None:
+    def __init__(self, role: str) -> None:
         self._report, report = os.pipe()
         door, self._door = socket.socketpair()
         with door:
             self._process = start(role, door.fileno(), report)
         os.close(report)
         self._has_child = False
-        self._door.sendall(marshal.dumps(skills or described(SimulatedRobot(REHEARSAL))))
+        self._door.sendall(marshal.dumps(described(SimulatedRobot(REHEARSAL))))
         try:
             self.has_seccomp = self._read_report() == 1
             for _ in range(REHEARSALS):

@@ -29,6 +29,12 @@ CPU_SECONDS = 5
 PREPARER, ZYGOTE, LIBRARY_ZYGOTE = "preparer", "zygote", "library-zygote"
 """The roles: who compiles programs, who forks runs, and who forks runs that import something."""
 
+PROGRAM = "<program>"
+"""The file that a program's code says it comes from."""
+
+TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"
+"""Names of what counts in a program's code; no source text can spell them."""
+
 ACTS, TELLS, LOOKS = 0, 1, 2
 """How a skill is called: waiting for its result; without waiting, since there is none and it cannot fail; and
 waiting only until the result is known, which then stays as it is until the robot acts."""

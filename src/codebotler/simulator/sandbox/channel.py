@@ -16,7 +16,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # functions below look here for `len`, not where a program can write
+# Functions below look here for `len` and the like, and not where a program can write.
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]
 
 TOO_LONG = '["too-long",[],0.0,1]'
 

@@ -10,7 +10,7 @@ from _json import encode_basestring_ascii as quoted
 from marshal import loads
 from sys import setrecursionlimit
 
-from codebotler.simulator.sandbox import ACTS, LOOKS, TELLS
+from codebotler.simulator.sandbox import ACTS, ENTER, ENTRY, LOOKS, PROGRAM, TELLS, TICK
 from codebotler.simulator.sandbox.channel import receive, send
 
 TYPE_CHECKING = False
@@ -20,11 +20,8 @@ if TYPE_CHECKING:
 
     Skills: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 
-__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # functions below look here for `len`, not where a program can write
-
-# The names and the file that `ticks` gives a program; what parses it is too large to be here.
-PROGRAM = "<program>"
-TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"
+# Functions below look here for `len` and the like, and not where a program can write.
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]
 
 # Python 3.11 counts calls into C as well: with two more, a function can call itself as often as under 3.12.
 RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1002

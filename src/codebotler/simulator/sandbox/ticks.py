@@ -6,8 +6,8 @@ import ast
 import types
 from collections.abc import Iterator
 
-PROGRAM = "<program>"
-TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"  # names that no source text can spell
+from codebotler.simulator.sandbox import ENTER, ENTRY, PROGRAM, TICK
+
 TASK = "task_program"
 TOO_LARGE = "the program is too large, or nested too deeply"
 DEEPEST = 250
