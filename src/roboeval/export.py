@@ -114,9 +114,9 @@ def write(frame: pl.DataFrame, path: Path, kind: str) -> None:
     else:
         frame.write_parquet(content)
     if path.exists() and not path.is_file():  # such as /dev/stdout, which nothing may take the place of
-        path.write_bytes(content.getbuffer())
+        path.write_bytes(content.getvalue())
     else:
-        write_whole(path.resolve() if path.is_symlink() else path, content.getbuffer())
+        write_whole(path.resolve() if path.is_symlink() else path, content.getvalue())
 
 
 def _harmless(frame: pl.DataFrame) -> pl.DataFrame:

@@ -29,7 +29,10 @@ ENVIRONMENT = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
 
 
 def roboeval(*arguments: str | Path, cwd: Path | None = None, before: str = "", after: str = "") -> Ended:
-    """Run a command, with something of bash before and after it."""
+    """Run a command, with something of bash before and after it.
+
+    How far it has come, which it tells after a while on a slow machine, is left out.
+    """
     words = [sys.executable, "-m", "roboeval.cli", *map(str, arguments)]
     ended = subprocess.run(
         ["bash", "-c", f"{before} {shlex.join(words)} {after}"],
@@ -39,7 +42,8 @@ def roboeval(*arguments: str | Path, cwd: Path | None = None, before: str = "", 
         cwd=cwd,
         env=ENVIRONMENT,
     )
-    return Ended(ended.returncode, ended.stdout, ended.stderr)
+    err = re.sub(r"^[a-z]+: [\d,]+( of [\d,]+)?\n", "", ended.stderr, flags=re.MULTILINE)
+    return Ended(ended.returncode, ended.stdout, err)
 
 
 def row(index: int = 0, program: object = GREETS, task: str = "SayGoodDay", prompt: object = 0) -> str:

@@ -135,7 +135,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     seen: dict[tuple[str, World], Outcome] = {}
 
     @FUZZ
-    @given(programs(), st.sampled_from(WORLDS))
+    @given(programs(deep=False), st.sampled_from(WORLDS))
     @example("def task_program():\n    say(undefined_name)\n", WORLDS[0])
     @example(DEEP, WORLDS[0])
     def check(source: str, world: World) -> None:
@@ -153,6 +153,20 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     for status in (Status.PYTHON_ERROR, Status.ROBOT_ERROR, Status.TIMEOUT):
         assert count[status] >= len(seen) / 60, count
     assert sum(map(len, (outcome.trace for outcome in seen.values()))) >= 2 * len(seen)
+
+
+def test_recursion_through_anything_ends_alike_in_every_run(lanes: Lanes, other_lanes: Lanes) -> None:
+    """How deep it goes is Python's own, and differs by where the interpreter has started."""
+
+    @settings(FUZZ, max_examples=EXAMPLES // 4)
+    @given(programs(), st.sampled_from(WORLDS))
+    def check(source: str, world: World) -> None:
+        note(source)
+        outcome = outcome_of(lanes, source, world)
+        assert outcome.status is not Status.KILLED
+        assert all_of(outcome_of(other_lanes, source, world)) == all_of(outcome)
+
+    check()
 
 
 def test_broken_texts_end_alike_in_every_run_and_break_nothing(lanes: Lanes, other_lanes: Lanes) -> None:
