@@ -98,12 +98,13 @@ class Reused(Bare):
         if isinstance(code, BaseException):
             return
         self.robot, self.now, self.spent, self.entered = SimulatedRobot(world), 0.0, False, False
+        self.codes.clear()
         self.calls = self.limits.calls
         self.count_anew()
         namespace = self.provided.copy()
         try:
             exec(code, namespace)
-            if not self.entered:
+            if not self.has_entered(namespace.get("task_program")):
                 exec("task_program()", namespace)
         except BaseException:  # noqa: BLE001 - however a program ends, its time was measured
             return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import sys
 from typing import Annotated, Any, NoReturn
@@ -41,6 +42,8 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     if sys.platform == "win32":
         print(f"{name}: {ON_WINDOWS}", file=sys.stderr)
         raise SystemExit(1)
+    if isinstance(sys.stdout, io.TextIOWrapper):  # what a terminal cannot show must not end a command
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         status = app(standalone_mode=False, prog_name=name)
         sys.stdout.flush()

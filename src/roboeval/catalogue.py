@@ -74,8 +74,13 @@ def _room(world: World, index: int) -> Text:
     return Text(f"{room.name}: {', '.join(there) or 'nobody and nothing'}")
 
 
-def suite_data(suite: Suite) -> dict[str, Any]:
-    """A suite for machines."""
+def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
+    """A suite for machines.
+
+    Args:
+        suite: to be told.
+        only: the name of a task; all by default.
+    """
     return {
         "suite": suite.name,
         "version": suite.version,
@@ -90,6 +95,7 @@ def suite_data(suite: Suite) -> dict[str, Any]:
                 "ablation": task.ablation is not None,
             }
             for task in suite.tasks.values()
+            if only in {None, task.name}
         ],
     }
 

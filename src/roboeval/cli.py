@@ -151,6 +151,10 @@ def show(
             stale=evaluation.stale,
         )
     else:
+        if k:
+            fail(f"--k is about a whole run; leave {selection} out, or --k")
+        if ablation:
+            note("ablation: only common sense was required")
         selected = selection.rows(watched(evaluation.rows(), "reading", evaluation.scope.total))
         if json:
             print_json(view_data(selection, selected, evaluation.judged(), judged_by, ablated=ablation))
@@ -183,11 +187,13 @@ def tasks(
         return
     known = load(suite)
     if lint:
+        if json:
+            fail("--lint prints for people only; leave --json out")
         lint_tasks(known, task)
+    elif json:
+        print_json(suite_data(known, None if task is None else known.task(task).name))
     elif task is not None:
         print_rich(task_view(known.task(task)))
-    elif json:
-        print_json(suite_data(known))
     else:
         print_rich(suite_view(known))
 

@@ -244,7 +244,7 @@ def evaluate_run(
             for path in (run.rows(key), run.programs(key), run.head(key)):
                 path.unlink(missing_ok=True)
         about = {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
-        _go_on_or_refuse(run.head(key), about)
+        _go_on_or_refuse(run.head(key), about, run.rows(key))
         with (
             contextlib.closing(Appender(run.programs(key))) as programs,
             contextlib.closing(Appender(run.rows(key))) as rows,
@@ -300,8 +300,12 @@ def _judged(
     programs.cut(HASH_LINE * count)
 
 
-def _go_on_or_refuse(path: Path, about: dict[str, Any]) -> None:
+def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> None:
     if not path.exists():
+        if rows.exists() and rows.stat().st_size:
+            raise BadInput(
+                "is missing, so that nobody knows by what the rows were judged; --redo starts over", file=path
+            )
         write_whole(path, to_text(about))
         return
     was = load_head(path)
@@ -330,6 +334,8 @@ def load_head(path: Path) -> dict[str, Any]:
     """
     try:
         data = json.loads(read_text(path))
+    except BadInput:
+        raise
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):

@@ -368,3 +368,11 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     run.keep(open_source(str(path), paper))
     assert [c.model_dump(exclude_unset=True) for c in read_completions(run.completions)] == [row]
     assert Completion.model_validate(row).key == ("SayGoodDay", 0, 0)
+
+
+def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", ["def task_program(): pass\n"])
+    judged(run, paper)
+    run.head("paper").unlink()
+    with pytest.raises(BadInput, match="nobody knows by what the rows were judged; --redo starts over"):
+        judged(run, paper)

@@ -74,6 +74,14 @@ WORKS: dict[str, tuple[str, object]] = {
     "5 two own calls are two": (task("say('a')") + "task_program()\ntask_program()\n", ["a", "a"]),
     "5 own call of a lambda": ("task_program = lambda: say('a')\ntask_program()\n", ["a"]),
     "5 own call of another function": ("def main(): say('a')\ntask_program = main\ntask_program()\n", ["a"]),
+    "5 own call by the other name": ("def main(): say('a')\ntask_program = main\nmain()\n", ["a"]),
+    "5 own call of what is assigned in it": ("(task_program := lambda: say('a'))()\n", ["a"]),
+    "5 another function was called": ("def main(): say('b')\nmain()\n" + task("say('a')"), ["b", "a"]),
+    "clocks are no methods": (
+        "class Timer:\n    clock, doze = time.monotonic, time.sleep\n"
+        + task("timer = Timer()\ntimer.doze(2)\nsay(str(timer.clock()))"),
+        ["2.0"],
+    ),
     "5 own call of a partial": (
         "import functools\ntask_program = functools.partial(say, 'a')\ntask_program()\n",
         ["a"],

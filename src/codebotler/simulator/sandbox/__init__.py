@@ -32,7 +32,7 @@ PREPARER, ZYGOTE, LIBRARY_ZYGOTE = "preparer", "zygote", "library-zygote"
 PROGRAM = "<program>"
 """The file that a program's code says it comes from."""
 
-TICK, ENTRY, ENTER = "<tick>", "<entry>", "<enter>"
+TICK, ENTRY, ENTER, BY_NAME = "<tick>", "<entry>", "<enter>", "<by-name>"
 """Names of what counts in a program's code; no source text can spell them."""
 
 ACTS, TELLS, LOOKS = 0, 1, 2

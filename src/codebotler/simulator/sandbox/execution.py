@@ -8,9 +8,10 @@ import sys
 import types
 from _json import encode_basestring_ascii as quoted
 from marshal import loads
+from sys import _getframe as getframe
 from sys import setrecursionlimit
 
-from codebotler.simulator.sandbox import ACTS, ENTER, ENTRY, LOOKS, PROGRAM, TELLS, TICK
+from codebotler.simulator.sandbox import ACTS, BY_NAME, ENTER, ENTRY, LOOKS, PROGRAM, TELLS, TICK
 from codebotler.simulator.sandbox.channel import receive, send
 
 TYPE_CHECKING = False
@@ -38,6 +39,7 @@ class Run:
         self.skills: Skills = ()
         self.now = 0.0
         self.spent = self.entered = False
+        self.codes: set[types.CodeType] = set()
         self.ticks = self.calls = self.room = 0
         self.start = self.seconds = 0.0
         self.longest = 0
@@ -45,8 +47,8 @@ class Run:
         self.namespace = types.ModuleType("__main__")
         # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
         tick = self.ticker()
-        for name, function in ((TICK, tick), (ENTRY, lambda: tick()), (ENTER, self.enter)):  # noqa: PLW0108
-            setattr(builtins, name, function)
+        counters = {TICK: tick, ENTRY: lambda: tick(), ENTER: self.enter, BY_NAME: self.start_task}  # noqa: PLW0108
+        vars(builtins).update(counters)
 
     def provide(self, skills: Skills) -> None:
         """Give the program what it can use without an import: the skills, and `sys` and `time`.
@@ -76,7 +78,7 @@ class Run:
         sys.modules["__main__"] = self.namespace
         try:
             exec(loads(code), names)  # noqa: S102, S302 - this is what the sandbox is for
-            if not self.entered:
+            if not self.has_entered(names.get("task_program")):
                 exec("task_program()", names)  # noqa: S102 - the same
         except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
             setrecursionlimit(RECURSION_LIMIT + HEADROOM)
@@ -105,8 +107,19 @@ class Run:
         return f'{{"end":"python-error","kind":{quoted(name)},"message":{quoted(message)},{where}}}'
 
     def enter(self) -> None:
-        """Note that the program has started `task_program` by itself."""
+        """Note that the program has entered a function of its module."""
+        if not self.entered:
+            code = getframe(1).f_code
+            self.codes.add(code)
+            self.entered = code.co_name == "task_program"
+
+    def start_task(self) -> None:
+        """Note that the program calls `task_program` by its name."""
         self.entered = True
+
+    def has_entered(self, task: object) -> bool:
+        """Whether the program has run its task by itself, by whatever name."""
+        return self.entered or (type(task) is types.FunctionType and task.__code__ in self.codes)
 
     def ticker(self) -> Callable[[], None]:
         """The function that counts ticks and, once they are spent, raises each time it is called."""

@@ -56,6 +56,7 @@ def load_library(run: Run) -> None:
 
     simulate_dates()
     simulate_identities()
+    hide_folders()
 
 
 def simulate_chance() -> None:
@@ -88,6 +89,15 @@ def simulate_identities() -> None:
     vars(platform).update(_uname_cache=platform.uname_result("Linux", "robot", "", "", ""))
     sys.orig_argv, sys.executable = list(sys.argv), ""
     vars(uuid).update(_generate_time_safe=None, _node=1)
+
+
+def hide_folders() -> None:
+    """Let modules name no folder of this machine: messages of errors would say it."""
+    for name, module in list(sys.modules.items()):
+        if getattr(module, "__file__", None):
+            module.__file__ = f"{name}.py"
+            if module.__spec__ is not None:
+                module.__spec__.origin = module.__file__
 
 
 class Select:

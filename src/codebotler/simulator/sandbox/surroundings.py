@@ -8,6 +8,7 @@ import os
 import posix
 import sys
 import time
+import types
 from _sitebuiltins import Quitter
 
 from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, Run
@@ -25,7 +26,11 @@ def simulate_surroundings(run: Run) -> None:
     sys.argv = ["program"]
     os.environ.clear()
     for module in (os, posix):
-        vars(module).update(getpid=lambda: 1, getppid=lambda: 0)
+        vars(module).update(
+            getpid=staticmethod(lambda: 1),
+            getppid=staticmethod(lambda: 0),
+            times=staticmethod(lambda: os.times_result((run.now, 0.0, 0.0, 0.0, run.now))),
+        )
     forbid_watching()
     for name in ("exit", "quit"):
         setattr(builtins, name, Quitter(name, "Ctrl-D (i.e. EOF)"))
@@ -73,6 +78,10 @@ def simulate_time(run: Run) -> None:
     time.ctime = lambda *seconds: asctime(time.localtime(*seconds))
     time.clock_gettime = lambda clock: time.time() if clock == time.CLOCK_REALTIME else run.now
     time.clock_gettime_ns = lambda clock: int(time.clock_gettime(clock) * 1e9)
+    for name, function in vars(time).items():
+        if isinstance(function, types.FunctionType):  # which would become a method of a class that keeps it
+            function.__name__ = function.__qualname__ = name
+            setattr(time, name, staticmethod(function))
 
 
 def since_start(run: Run) -> Any:  # noqa: ANN401 - a function

@@ -6,7 +6,7 @@ import ast
 import types
 from collections.abc import Iterator
 
-from codebotler.simulator.sandbox import ENTER, ENTRY, PROGRAM, TICK
+from codebotler.simulator.sandbox import BY_NAME, ENTER, ENTRY, PROGRAM, TICK
 
 TASK = "task_program"
 TOO_LARGE = "the program is too large, or nested too deeply"
@@ -108,17 +108,20 @@ def add_ticks(node: ast.AST) -> None:
             tick = call(TICK, node.iter).value
             node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), tick), node.iter))
         case ast.Call(func=ast.Name(id=name)) if name == TASK:
-            enter = call(ENTER, node.func).value
-            node.func = ast.copy_location(ast.BoolOp(ast.Or(), [enter, node.func]), node.func)
+            start = call(BY_NAME, node.func).value
+            node.func = ast.copy_location(ast.BoolOp(ast.Or(), [start, node.func]), node.func)
 
 
 def note_entries(statement: ast.stmt) -> None:
-    """Let each function of the module that bears the task's name note that it was entered, however called."""
+    """Let each function of the module note that it was entered: any may be the task, by whatever name."""
     waiting: list[ast.AST] = [statement]
     while waiting:
         node = waiting.pop()
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == TASK:
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             insert_head(node, ENTER)
+        elif isinstance(node, ast.Lambda):
+            enter = call(ENTER, node.body).value
+            node.body = ast.copy_location(ast.BoolOp(ast.Or(), [enter, node.body]), node.body)
         if not isinstance(node, SCOPES):
             waiting.extend(ast.iter_child_nodes(node))
 
