@@ -14,7 +14,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.world import Room, World
 
 NUMBER = 8  # bytes of a number that it reports
-REHEARSALS = 4
+REHEARSALS = 8
 REHEARSAL = World((Room("room"),), "room")
 EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"))
 
