@@ -8,7 +8,7 @@ import sys
 from typing import cast
 
 from codebotler.simulator.sandbox.execution import Run
-from codebotler.simulator.sandbox.library import load_library
+from codebotler.simulator.sandbox.stdlib import load_stdlib
 from codebotler.simulator.sandbox.surroundings import simulate_surroundings
 
 
@@ -44,7 +44,7 @@ def main() -> None:
     run = cast("Run", current)
     limit = sys.getrecursionlimit()
     simulate_surroundings(run)
-    load_library(run)
+    load_stdlib(run)
     sys.setrecursionlimit(limit)
 
     import in_process  # noqa: PLC0415 - only now

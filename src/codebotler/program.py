@@ -166,8 +166,8 @@ def _missing_here(tree: ast.Module, skills: SkillTable) -> Iterator[tuple[int, s
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
     """The line and name of each use of an undefined name, and whether it is a local one used too early."""
     # Imported where it is used: it takes a tenth of a second, which every command line would pay.
-    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415
-    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415
+    from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - see above
+    from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - the same
 
     # Names in annotations that are texts are never looked up when a program runs.
     spelled = {(n.lineno, n.col_offset) for n in ast.walk(tree) if isinstance(n, ast.Name)}

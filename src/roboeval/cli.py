@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import typer
 
 from codebotler import __version__
 from codebotler.cli import STOPPED, obey
+from roboeval.terminal import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from roboeval.evaluation import Evaluation, Scope
     from roboeval.records import Key
     from roboeval.suite import Suite
-
-Item = TypeVar("Item")
-
-QUIET_S = 2.0  # for so long does a command say nothing at first; lines of a long one come more seldom
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -73,7 +66,8 @@ def evaluate(
     """Say of every completion whether it does what was asked."""
     from roboeval.evaluate import evaluate as judge_all
     from roboeval.evaluation import Scope
-    from roboeval.run import Run, evaluate_run, open_source, tasks_to_judge
+    from roboeval.resume import evaluate_run
+    from roboeval.run import Run, open_source, tasks_to_judge
 
     refuse_what_comes_later(worlds, engine)
     judged_by = load(suite)
@@ -90,25 +84,11 @@ def evaluate(
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
             run.keep(opened)
-        at_once = workers or cores()
+        how = How(ablated=ablation, workers=workers or cores(), require_isolation=require_isolation)
         rows = (
-            judge_all(
-                opened.of(wanted),
-                judged_by,
-                ablated=ablation,
-                workers=at_once,
-                require_isolation=require_isolation,
-            )
+            judge_all(opened.of(wanted), judged_by, **how)
             if run is None
-            else evaluate_run(
-                run,
-                judged_by,
-                ablated=ablation,
-                tasks=wanted,
-                redo=redo,
-                workers=at_once,
-                require_isolation=require_isolation,
-            )
+            else evaluate_run(run, judged_by, tasks=wanted, redo=redo, **how)
         )
         counted = watched(tally.of(rows), "judging", scope.total)
         print_summary(counted, judged_by, scope, title=source, ablated=ablation, as_json=json)
@@ -157,7 +137,8 @@ def show(
             note("ablation: only common sense was required")
         selected = selection.rows(watched(evaluation.rows(), "reading", evaluation.scope.total))
         if json:
-            print_json(view_data(selection, selected, evaluation.judged(), judged_by, ablated=ablation))
+            data = view_data(selection, selected, evaluation.judged(), judged_by, ablated=ablation)
+            print_json({**data, "ablation": ablation})
         else:
             print_rich(view(selection, selected, evaluation.judged(), judged_by, ablated=ablation))
     again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite, ablated=ablation)
@@ -201,16 +182,19 @@ def tasks(
 @app.command()
 def export(
     run: Annotated[Path, typer.Argument(help="A run.")],
-    format: Annotated[str, typer.Option(help="csv or parquet.")] = "csv",  # noqa: A002 - the option's name
+    format: Annotated[  # noqa: A002 - the option's name
+        str | None, typer.Option(help="csv or parquet; by default what --out ends in, or else csv.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="The file; by default beside the verdicts.")] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
 ) -> None:
     """Write a run's verdicts as one flat table."""
     from codebotler.badinput import BadInput
-    from roboeval.export import table, write
+    from roboeval.export import kind_of, table, write
     from roboeval.run import Run, evaluation_key
 
+    kind = format or kind_of(out)
     judged_by = load(suite)
     evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
     frame = table(watched(evaluation.rows(), "reading", evaluation.scope.total), evaluation.judged())
@@ -219,8 +203,8 @@ def export(
         raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
     if (unfinished := evaluation.unfinished()) is not None:
         note(f"{unfinished}, and only these are in the table; `{again}` goes on")
-    path = out or Run(run).rows(evaluation_key(judged_by, ablated=ablation)).with_suffix(f".{format}")
-    write(frame, path, format)
+    path = out or Run(run).rows(evaluation_key(judged_by, ablated=ablation)).with_suffix(f".{kind}")
+    write(frame, path, kind)
     note(f"the table is in {path}")
 
 
@@ -294,6 +278,14 @@ def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) 
     return evaluation
 
 
+class How(TypedDict):
+    """How completions are judged."""
+
+    ablated: bool
+    workers: int
+    require_isolation: bool
+
+
 class Tally:
     """Passes rows on, and remembers what there is to say at the end."""
 
@@ -352,60 +344,9 @@ def lint_tasks(suite: Suite, task: str | None) -> None:
         raise SystemExit(1)
 
 
-def print_rich(what: RenderableType) -> None:
-    """Draw on the terminal, or plainly into a pipe."""
-    from rich.console import Console
-
-    console = Console()
-    if console.is_terminal:
-        console.print(what)
-        return
-    with console.capture() as drawn:
-        console.print(what)
-    print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
-
-
-def print_json(data: object) -> None:
-    """Print for machines."""
-    import json
-
-    print(json.dumps(data, indent=2))
-
-
-def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:
-    """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    of_all = "" if total is None else f" of {total:,}"
-    started = monotonic()
-    next_line = started + QUIET_S
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        job = progress.add_task(doing, total=total)
-        for done, item in enumerate(items, 1):
-            progress.update(job, completed=done)
-            if not console.is_terminal and monotonic() >= next_line:
-                note(f"{doing}: {done:,}{of_all}")
-                next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
-            yield item
-
-
 def cores() -> int:
     """How many programs to run at the same time."""
     return os.cpu_count() or 1
-
-
-def note(sentence: str) -> None:
-    """Say something beside the results."""
-    print(sentence, file=sys.stderr)
-
-
-def fail(sentence: str) -> NoReturn:
-    """End with a sentence about what the user asked for."""
-    note(f"roboeval: {sentence}")
-    raise SystemExit(2)
 
 
 def main() -> None:

@@ -89,6 +89,12 @@ def _storable(text: str | None) -> str | None:
     return None if text is None else text.encode(errors="backslashreplace").decode()
 
 
+def kind_of(path: Path | None) -> str:
+    """The format that a file's name asks for; csv if it asks for none."""
+    ending = "" if path is None else path.suffix.removeprefix(".").lower()
+    return ending if ending in FORMATS else FORMATS[0]
+
+
 def write(frame: pl.DataFrame, path: Path, kind: str) -> None:
     """Write a table to a file; the same table gives the same bytes.
 

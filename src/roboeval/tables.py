@@ -65,7 +65,7 @@ def parse_selection(text: str | None, suite: Suite) -> Selection:
     if not text:
         return Selection()
     name, *numbers = text.removesuffix("/").split("/")
-    if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004
+    if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
         raise BadInput(f'"{visible(text)}" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX')
     if name not in suite.tasks:
         name = next((task for task in suite.tasks if task.lower() == name.lower()), name)

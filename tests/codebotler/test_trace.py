@@ -28,9 +28,9 @@ def test_events_differ_in_options_answer_look_and_kind(other: Event) -> None:
 
 def test_events_and_outcomes_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
-        Event("say", "a").text = "b"  # type: ignore[misc]
+        Event("say", "a").text = "b"  # type: ignore[misc]  # that it fails is the point
     with pytest.raises(FrozenInstanceError):
-        Outcome(Status.FINISHED, ()).line = 3  # type: ignore[misc]
+        Outcome(Status.FINISHED, ()).line = 3  # type: ignore[misc]  # the same
 
 
 def test_outcomes_are_equal_by_all_that_they_hold() -> None:

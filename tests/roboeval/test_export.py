@@ -11,7 +11,7 @@ import polars as pl
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.export import COLUMNS, table, write
+from roboeval.export import COLUMNS, kind_of, table, write
 from roboeval.records import Completion
 
 PROGRAM = "def task_program():\n    go_to('x')\n"
@@ -146,3 +146,9 @@ def test_a_wrong_format_or_place_is_explained(tmp_path: Path) -> None:
         write(table([], []), tmp_path / "t", "xlsx")
     with pytest.raises(BadInput, match=r"no: there is no such folder$"):
         write(table([], []), tmp_path / "no" / "t.csv", "csv")
+
+
+def test_a_name_says_the_format_where_nothing_else_does() -> None:
+    names = (None, "x", "x.txt", "x.csv", "x.PARQUET", "dir.parquet/x")
+    kinds = [kind_of(None if name is None else Path(name)) for name in names]
+    assert kinds == ["csv", "csv", "csv", "csv", "parquet", "csv"]

@@ -15,7 +15,8 @@ import pytest
 
 from codebotler.badinput import BadInput
 from roboeval.records import Completion, read_completions, read_rows, recorded_completions, to_line
-from roboeval.run import Run, Source, evaluate_run, open_source, tasks_to_judge
+from roboeval.resume import evaluate_run
+from roboeval.run import Run, Source, open_source, tasks_to_judge
 from roboeval.suite import Suite
 
 GREETS = 'def task_program():\n    say("good day")\n'
@@ -92,7 +93,7 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
         run = a_run(tmp_path / f"run{workers}", programs)
         script = (
             "import sys, pathlib\n"
-            "from roboeval.run import Run, evaluate_run\n"
+            "from roboeval.resume import evaluate_run\nfrom roboeval.run import Run\n"
             "from roboeval.suite import load_suite\n"
             f"run = Run(pathlib.Path({str(run.path)!r}))\n"
             "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, "
@@ -114,7 +115,7 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     run = careful_run(tmp_path / "killed", paper)
     script = (
         "import pathlib\n"
-        "from roboeval.run import Run, evaluate_run\n"
+        "from roboeval.resume import evaluate_run\nfrom roboeval.run import Run\n"
         "from roboeval.suite import load_suite\n"
         f"run = Run(pathlib.Path({str(run.path)!r}))\n"
         "print('on', flush=True)\n"
@@ -345,7 +346,7 @@ def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> Non
     run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
     script = (
         "import pathlib, resource, signal\n"
-        "from roboeval.run import Run, evaluate_run\n"
+        "from roboeval.resume import evaluate_run\nfrom roboeval.run import Run\n"
         "from roboeval.suite import load_suite\n"
         f"run = Run(pathlib.Path({str(run.path)!r}))\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"

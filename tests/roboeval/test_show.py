@@ -67,14 +67,14 @@ FINE = Outcome(Status.FINISHED, (GOTO, HELLO))
 MUTE = Outcome(Status.FINISHED, (GOTO, Event("goto", "lab"), HELLO))
 
 
-def completion(index: int = 0, program: str = "x = 1\ny = 2\n", **fields: Any) -> Completion:  # noqa: ANN401
+def completion(index: int = 0, program: str = "x = 1\ny = 2\n", **fields: Any) -> Completion:  # noqa: ANN401 - any field
     return Completion(task="Visit", prompt=0, index=index, program=program, **fields)
 
 
 def row(written: Completion, *outcomes: Outcome, ablated: bool = False) -> dict[str, Any]:
     scenarios = TASK.judged_in(ablated=ablated)
     verdicts = [judge(o, s) for o, s in zip(outcomes, scenarios, strict=False)]
-    return json.loads(json.dumps(evaluation(written, judgement(verdicts))))  # type: ignore[no-any-return]
+    return json.loads(json.dumps(evaluation(written, judgement(verdicts))))  # type: ignore[no-any-return]  # JSON
 
 
 def failed(status: Status, kind: str, message: str, *events: Event, line: int | None = None) -> Outcome:

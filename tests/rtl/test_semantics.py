@@ -339,7 +339,7 @@ def test_a_question_without_options_matches_no_options() -> None:
         ('words(r"(x)\\1", r"(y)\\1")', "yyxx", True),
     ],
 )
-def test_texts(text: str, actual: str, matches: bool) -> None:  # noqa: FBT001
+def test_texts(text: str, actual: str, matches: bool) -> None:  # noqa: FBT001 - a row of a table
     assert holds(parse(f"tr.Exists(say({text}))"), (say(actual),)) is matches
 
 
@@ -362,7 +362,7 @@ NO_FORMULA = (
         ([say("to the lobby")], True, False),
     ],
 )
-def test_the_example_of_the_paper(events: list[Event], when_yes: bool, when_no: bool) -> None:  # noqa: FBT001
+def test_the_example_of_the_paper(events: list[Event], when_yes: bool, when_no: bool) -> None:  # noqa: FBT001 - a row of a table
     assert holds(parse(YES_FORMULA), tuple(events)) is when_yes
     assert holds(parse(NO_FORMULA), tuple(events)) is when_no
 

@@ -6,20 +6,16 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
-from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or, Stay
-from codebotler.rtl.semantics import CannotJudge, at_place, cut, first, first_stay, holds, matches
+from codebotler.rtl.absence import Absence, Reason, seen, steps_of
+from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or
+from codebotler.rtl.semantics import CannotJudge, at_place, cut, first, holds, matches
 from codebotler.rtl.window import Window
 from codebotler.rtl.wording import (
     did,
     happened,
     is_any,
-    lacking,
     listed,
-    missing,
     offered,
-    pastimes,
-    room,
-    room_name,
     shortened,
     times,
 )
@@ -27,11 +23,9 @@ from codebotler.rtl.wording import (
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from codebotler.rtl.formula import Element, Formula, Test
-    from codebotler.rtl.wording import Deed
+    from codebotler.rtl.formula import Formula, Test
     from codebotler.trace import Trace
 
-_MOST = 5
 _ROBOT = "the robot "
 
 
@@ -68,27 +62,10 @@ def explain(formula: Formula, trace: Trace) -> Explanation | None:
     return Explanation(reason.clause, reason.event, " ".join((reason.told + reason.detail).split()))
 
 
-@dataclass(frozen=True)
-class _Reason:
-    """Why a formula fails.
-
-    Args:
-        clause: the smallest part of the formula, or its negation, that makes it fail.
-        event: what makes it fail.
-        told: what is or is not so.
-        detail: what comes nearest to it, or what there is to see, from a colon on.
-    """
-
-    clause: Formula
-    event: int | None
-    told: str
-    detail: str = ""
-
-
-def _unjudged(formula: Formula, trace: Trace, error: CannotJudge) -> _Reason:
+def _unjudged(formula: Formula, trace: Trace, error: CannotJudge) -> Reason:
     option = f"option {error.number + 1} of the question at step {error.event + 1}"
     told = f"{option} is no text but {shortened(error.option.text)}, so what was required cannot be judged"
-    return _Reason(_unjudged_part(formula, trace), error.event, told)
+    return Reason(_unjudged_part(formula, trace), error.event, told)
 
 
 def _unjudged_part(formula: Formula, trace: Trace) -> Formula:
@@ -107,7 +84,7 @@ def _unjudged_part(formula: Formula, trace: Trace) -> Formula:
     return formula
 
 
-def _why_false(formula: Formula, trace: Trace) -> _Reason:
+def _why_false(formula: Formula, trace: Trace) -> Reason:
     match formula:
         case And(parts):
             return _why_false(next(part for part in parts if not holds(part, trace)), trace)
@@ -115,13 +92,15 @@ def _why_false(formula: Formula, trace: Trace) -> _Reason:
             return _why_none(formula, parts, trace)
         case Not(part):
             return _why_true(part, trace)
+        case Count(element, 0):
+            return replace(_presence(Exists(element, formula.cuts), trace), clause=formula)
         case _:
-            return _Absence(formula, (formula.element,), trace).explain()
+            return Absence(formula, (formula.element,), trace).explain()
 
 
-def _why_none(formula: Or, parts: tuple[Formula, ...], trace: Trace) -> _Reason:
+def _why_none(formula: Or, parts: tuple[Formula, ...], trace: Trace) -> Reason:
     if test := _one_test(parts):
-        reason = _Absence(test, tuple(_test(part).element for part in parts), trace).explain()
+        reason = Absence(test, tuple(_test(part).element for part in parts), trace).explain()
         return replace(reason, clause=formula)
     reasons = [_why_false(part, trace) for part in _alternatives(parts)]
     likeliest = next((reason for reason in reasons if reason.event is not None), reasons[0])
@@ -130,7 +109,7 @@ def _why_none(formula: Or, parts: tuple[Formula, ...], trace: Trace) -> _Reason:
         told = f"one of two things had to be so, but {other.told}, and {_again(likeliest.told)}"
     else:
         told = f"one of {len(reasons)} things had to be so, but none is; for one, {likeliest.told}"
-    return _Reason(formula, likeliest.event, told, likeliest.detail)
+    return Reason(formula, likeliest.event, told, likeliest.detail)
 
 
 def _alternatives(parts: tuple[Formula, ...]) -> Iterator[Formula]:
@@ -168,170 +147,30 @@ def _test(formula: Formula) -> Test:
     return formula
 
 
-class _Absence:
-    """Why a test fails: what it asks for has not happened.
-
-    Args:
-        test: the test.
-        deed: what it asks for, instead of its own element.
-        trace: what the robot did.
-    """
-
-    def __init__(self, test: Test, deed: Deed, trace: Trace) -> None:
-        self.test, self.deed, self.trace = test, deed, trace
-        self.window = Window(test.cuts, trace)
-        self.where = self.window.told()
-
-    def explain(self) -> _Reason:
-        match self.test:
-            case Exists():
-                return self.nowhere()
-            case ActAtFirst(place):
-                stay = first_stay(self.test.stay, self.trace, self.window.span)
-                return self.not_there([*range(*stay)], place, self.test.stay) if stay else self.never_went()
-            case ActAtSome(place):
-                at = [*at_place(self.test.stay, self.trace, self.window.span)]
-                arrived = first(self.test.stay.arrival, self.trace, self.window.span) is not None
-                return self.not_there(at, place, self.test.stay) if arrived else self.never_went()
-            case Count(_, number):
-                return self.miscounted(number, "")
-            case AtLeast(_, number):
-                return self.miscounted(number, "at least ")
-        assert_never(self.test)
-
-    def nowhere(self) -> _Reason:
-        if not self.trace:
-            return self.because(
-                f"the robot did nothing at all, so it never {did(self.deed, 'past', never=True)}"
-            )
-        event, detail = self.instead(range(*self.window.span))
-        never = f"never {did(self.deed, 'past', never=True)}{self.where}"
-        return self.because(self.robot() + never, event, detail)
-
-    def never_went(self) -> _Reason:
-        assert isinstance(self.test, ActAtFirst | ActAtSome)
-        arrival = self.test.stay.arrival
-        if not self.trace:
-            return self.because(f"the robot did nothing at all, so it {self.never_arrived()}")
-        _, detail = _Absence(Exists(arrival, self.test.cuts), (arrival,), self.trace).instead(
-            range(*self.window.span)
-        )
-        never = f"{self.never_arrived()}{self.window.told_until()}, where it was to "
-        never += did(self.deed, "base")
-        return self.because(self.window.told_after() + self.robot() + never, detail=detail)
-
-    def robot(self) -> str:
-        """The subject, after what should have begun the part of the trace but never happened."""
-        never = self.window.never_began()
-        said_anyway = isinstance(self.test, ActAtFirst | ActAtSome) and never == self.never_arrived()
-        needed = never and not self.window.told_after() and not said_anyway
-        return f"the robot {never}; it " if needed else "the robot "
-
-    def never_arrived(self) -> str:
-        assert isinstance(self.test, ActAtFirst | ActAtSome)
-        return f"never {did((self.test.stay.arrival,), 'past', never=True)}"
-
-    def not_there(self, stay: list[int], place: str, moves: Stay) -> _Reason:
-        span = self.window.span
-        arrivals = [at for at in range(*span) if matches(moves.arrival, self.trace, at)]
-        inside = set(stay)
-        outside = [at for at in arrivals if at not in inside]
-        if isinstance(self.test, ActAtFirst):
-            there = "there" if len(outside) == 1 else "during that stay"
-            went = f"went to {room_name(self.trace[arrivals[0]].text)} at step {arrivals[0] + 1}"
-        else:
-            there = "there"
-            went = f"went to {room(place)} at {_steps(outside)}"
-        event, detail = self.instead(stay)
-        if not detail:
-            only = pastimes(self.trace[at] for at in stay)
-            detail = f": it only {only}" if only else ": it did nothing there"
-        failed = f"did not {did(self.deed, 'base', never=True)} {there}"
-        told = f"{self.window.told_after()}the robot {went} but {failed}{self.window.told_until()}"
-        return self.because(told, arrivals[0] if event is None else event, detail)
-
-    def miscounted(self, number: int, least: str) -> _Reason:
-        found = [at for at in range(*self.window.span) if _seen(self.deed[0], self.trace, at)]
-        if not found:
-            never = self.nowhere()
-            often = "" if number == 1 else f", but it should have {least}{times(number)}"
-            return replace(never, told=never.told + often)
-        if number == 0:
-            return replace(_presence(Exists(self.deed[0], self.test.cuts), self.trace), clause=self.test)
-        told = f"the robot {did(self.deed, 'past')} {times(len(found))} ({_steps(found)}){self.where}"
-        event = found[number] if len(found) > number else None
-        return self.because(f"{told} instead of {least}{times(number)}", event)
-
-    def instead(self, here: Sequence[int]) -> tuple[int | None, str]:
-        """The nearest thing that the robot did: elsewhere, or here in other words."""
-        done = _where(self.deed, self.trace)
-        if done:
-            return done[0], f": it did so only {self.placed(done)}"
-        if self.deed[0].kind == "goto":
-            return None, self.went(here)
-        near = max(
-            (at for at in here if self.trace[at].kind == self.deed[0].kind), key=self.likeness, default=None
-        )
-        if near is None:
-            return None, ""
-        event = self.trace[near]
-        return near, f": it {happened(event, 'past')} at step {near + 1}, {lacking(self.deed, event)}"
-
-    def went(self, here: Sequence[int]) -> str:
-        rooms = dict.fromkeys(self.trace[at].text for at in here if self.trace[at].kind == "goto")
-        if not rooms:
-            told = is_any(self.deed[0].text) or any(event.kind == "goto" for event in self.trace)
-            return "" if told else ": it went nowhere"
-        names = [room_name(name) for name in rooms]
-        shown = names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST:,} more"]
-        return f": it only went to {listed(shown)}"
-
-    def placed(self, done: list[int]) -> str:
-        at = done[0]
-        steps = _steps(done)
-        if at < self.window.span[0] and done[-1] < self.window.span[0]:
-            return f"at {steps}, too early"
-        if at >= self.window.span[1]:
-            return f"at {steps}, too late"
-        visit = next((i for i in range(at - 1, -1, -1) if self.trace[i].kind == "goto"), None)
-        if len(done) > 1 or self.deed[0].kind == "goto":
-            return f"at {steps}"
-        if visit is None:
-            return f"at {steps}, before going anywhere"
-        return f"at {steps}, after {happened(self.trace[visit], 'ing')} at step {visit + 1}"
-
-    def likeness(self, at: int) -> tuple[int, int]:
-        event = self.trace[at]
-        return -max(missing(element.text, event.text) for element in self.deed), -at
-
-    def because(self, told: str, event: int | None = None, detail: str = "") -> _Reason:
-        return _Reason(self.test, event, told, detail)
-
-
-def _why_true(formula: Formula, trace: Trace) -> _Reason:  # noqa: PLR0911 - one for each kind of formula
+def _why_true(formula: Formula, trace: Trace) -> Reason:  # noqa: PLR0911 - one for each kind of formula
     match formula:
         case And(parts):
             facts = [_fact(part, trace) for part in parts]
             both = "both" if len(facts) == 2 else "all"  # noqa: PLR2004 - that is what both means
             event = next((fact.event for fact in reversed(facts) if fact.event is not None), None)
-            return _Reason(Not(formula), event, f"the robot {_joined(facts)}, which must not {both} be so")
+            return Reason(Not(formula), event, f"the robot {_joined(facts)}, which must not {both} be so")
         case Or(parts):
             return _why_true(next(part for part in parts if holds(part, trace)), trace)
         case Not(part):
             return _why_false(part, trace)
         case Count(element, 0):
-            absence = _Absence(Exists(element, formula.cuts), (element,), trace).explain()
+            absence = Absence(Exists(element, formula.cuts), (element,), trace).explain()
             return replace(absence, clause=Not(formula))
         case AtLeast(_, 0):
             sentence = "anything happens at least 0 times, so this can never be satisfied"
-            return _Reason(Not(formula), None, sentence)
+            return Reason(Not(formula), None, sentence)
         case AtLeast(element, 1):
             return replace(_presence(Exists(element, formula.cuts), trace), clause=Not(formula))
         case _:
             return _presence(formula, trace)
 
 
-def _presence(test: Test, trace: Trace) -> _Reason:
+def _presence(test: Test, trace: Trace) -> Reason:
     window = Window(test.cuts, trace)
     fact = _fact(test, trace)
     assert fact.event is not None
@@ -340,16 +179,16 @@ def _presence(test: Test, trace: Trace) -> _Reason:
     if isinstance(test, Count | AtLeast):
         limit = "not be exactly" if isinstance(test, Count) else "be less than"
         told = f"{fact.told}{fact.where}, but it must {limit} {times(test.number)}{since}"
-        return _Reason(Not(test), fact.event, f"the robot {told}")
+        return Reason(Not(test), fact.event, f"the robot {told}")
     told_anyway = any(at is None and one.name.startswith("Before") for one, at in window.made)
     duties = f", which it must not do{window.duties()}{'' if told_anyway else since}"
     visit = "" if isinstance(test, Exists) else fact.where
     event = trace[fact.event]
     spoken = test.element.kind in {"say", "ask"}
     if not spoken or (is_any(test.element.text) and test.element.options is None):
-        return _Reason(Not(test), fact.event, f"the robot {fact.told}{visit}{duties}")
+        return Reason(Not(test), fact.event, f"the robot {fact.told}{visit}{duties}")
     told = f"{did((test.element,), 'past')} at step {fact.event + 1}{visit}{duties}"
-    return _Reason(Not(test), fact.event, f"the robot {told}", f": it {offered(event)}")
+    return Reason(Not(test), fact.event, f"the robot {told}", f": it {offered(event)}")
 
 
 @dataclass(frozen=True)
@@ -427,26 +266,8 @@ def _deed_at_place(test: ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
 
 def _counted(test: Count | AtLeast, trace: Trace) -> _Fact:
     window = Window(test.cuts, trace)
-    found = [at for at in range(*window.span) if _seen(test.element, trace, at)]
+    found = [at for at in range(*window.span) if seen(test.element, trace, at)]
     if not found:
         return _Fact(None, f"never {did((test.element,), 'past', never=True)}", window.told())
-    told = f"{did((test.element,), 'past')} {times(len(found))} ({_steps(found)})"
+    told = f"{did((test.element,), 'past')} {times(len(found))} ({steps_of(found)})"
     return _Fact(found[min(max(test.number, 1), len(found)) - 1], told, window.told())
-
-
-def _seen(element: Element, trace: Trace, at: int) -> bool:
-    try:
-        return matches(element, trace, at)
-    except CannotJudge:
-        return False
-
-
-def _where(deed: Deed, trace: Trace) -> list[int]:
-    return [at for at in range(len(trace)) if any(_seen(element, trace, at) for element in deed)]
-
-
-def _steps(found: list[int]) -> str:
-    numbers = [str(at + 1) for at in found]
-    if len(numbers) > _MOST:
-        numbers[_MOST:] = [f"{len(numbers) - _MOST:,} more"]
-    return f"step {numbers[0]}" if len(numbers) == 1 else f"steps {listed(numbers)}"

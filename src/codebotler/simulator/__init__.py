@@ -21,8 +21,8 @@ def run(program: str, world: World) -> Outcome:
     Raises:
         EngineError: no isolated process could be started.
     """
-    # Only now: the closed processes import this package, and must stay small.
-    from codebotler.simulator.engine import run as run_pairs  # noqa: PLC0415
+    # The closed processes import this package, and must stay small.
+    from codebotler.simulator.engine import run as run_pairs  # noqa: PLC0415 - so only now
 
     (outcome,) = run_pairs([(program, world)], workers=1)
     return outcome

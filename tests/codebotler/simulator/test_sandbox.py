@@ -273,6 +273,16 @@ WORKS: dict[str, tuple[str, object]] = {
         ),
         ["2.0", "robot", "cannot release un-acquired lock"],
     ),
+    "no folder of the machine is told": (
+        "import json, traceback\n"
+        + task(
+            "told = ''\ndef choose(): from random import choise\n"
+            "for act in (lambda: json.loads('{'), lambda: go_to('x'), choose):\n"
+            "    try: act()\n    except Exception: told += traceback.format_exc()\n"
+            "say(str(('decoder.py' in told, 'choise' in told, '/' in told)))"
+        ),
+        ["(True, True, False)"],
+    ),
     "chance and identities repeat": (
         task(
             "import _random, os, random, threading, uuid\n"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Skills: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 
 # Functions below look here for `len` and the like, and not where a program can write.
-__builtins__ = dict(vars(builtins))  # type: ignore[assignment]
+__builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
 
 # Python 3.11 counts calls into C as well: with two more, a function can call itself as often as under 3.12.
 RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1002
@@ -47,7 +47,7 @@ class Run:
         self.namespace = types.ModuleType("__main__")
         # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
         tick = self.ticker()
-        counters = {TICK: tick, ENTRY: lambda: tick(), ENTER: self.enter, BY_NAME: self.start_task}  # noqa: PLW0108
+        counters = {TICK: tick, ENTRY: lambda: tick(), ENTER: self.enter, BY_NAME: self.start_task}  # noqa: PLW0108 - see above
         vars(builtins).update(counters)
 
     def provide(self, skills: Skills) -> None:
@@ -158,7 +158,7 @@ class Run:
 
     def perform(
         self, name: str, parameters: list[tuple[str, type]], way: int, values: tuple[Any, ...]
-    ) -> Any:  # noqa: ANN401
+    ) -> Any:  # noqa: ANN401 - what a skill returns
         """Carry out a skill; texts must be `str` and options a `list`, exactly."""
         for (parameter, kind), value in zip(parameters, values, strict=True):
             given: type = type(value)

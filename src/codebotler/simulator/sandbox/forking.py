@@ -37,9 +37,9 @@ def serve(root: str, *, library: bool) -> None:
     simulate_surroundings(run)
     run.provide(loads(door.recv(1 << 16)))  # noqa: S302 - from the engine
     if library:
-        from codebotler.simulator.sandbox.library import load_library  # noqa: PLC0415 - it is large
+        from codebotler.simulator.sandbox.stdlib import load_stdlib  # noqa: PLC0415 - it is large
 
-        load_library(run)
+        load_stdlib(run)
     sys.path.remove(root)
     sys.pycache_prefix = None
     for name in [name for name in sys.modules if name.partition(".")[0] == "codebotler"]:

@@ -41,7 +41,7 @@ CODECS = """
 SOME_VERSIONS_HAVE = ("typing.io", "typing.re")
 
 
-def load_library(run: Run) -> None:
+def load_stdlib(run: Run) -> None:
     """Import all that a program may import, on the run's clock and with chance that repeats."""
     simulate_select(run)
     simulate_chance()
@@ -98,6 +98,14 @@ def hide_folders() -> None:
             module.__file__ = f"{name}.py"
             if module.__spec__ is not None:
                 module.__spec__.origin = module.__file__
+    import traceback  # noqa: PLC0415 - see the module's first lines
+
+    summarise = traceback.FrameSummary.__init__
+
+    def without_folder(self: traceback.FrameSummary, filename: str, *more: Any, **others: Any) -> None:  # noqa: ANN401 - as theirs
+        summarise(self, filename.rpartition("/")[2], *more, **others)
+
+    traceback.FrameSummary.__init__ = without_folder  # type: ignore[method-assign]  # that is the point
 
 
 class Select:

@@ -1,0 +1,129 @@
+"""Judges a run's completions, going on where an earlier evaluation stopped, and only if it judged alike."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections import deque
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from codebotler.badinput import BadInput
+from roboeval.evaluate import evaluate, head
+from roboeval.records import HASH_LINE, Appender, Completion, length_before, name_of, read_judged, to_line
+from roboeval.run import Run, evaluation_key, load_head, to_text, write_whole
+from roboeval.suite import Suite
+
+
+def evaluate_run(
+    run: Run,
+    suite: Suite,
+    *,
+    ablated: bool,
+    tasks: frozenset[str] | None,
+    redo: bool,
+    workers: int,
+    require_isolation: bool = False,
+) -> Iterator[dict[str, Any]]:
+    """Judge a run's completions, going on where an earlier evaluation stopped; yields all rows in order.
+
+    Args:
+        run: whose folder gets the rows.
+        suite: by which to judge.
+        ablated: whether to require common sense only.
+        tasks: which tasks to judge; all by default.
+        redo: whether to start over.
+        workers: how many programs are run at the same time.
+        require_isolation: whether to refuse where a wall around programs is missing.
+
+    Raises:
+        BadInput: the run is being written, or was judged otherwise or holds other completions than it did.
+    """
+    key = evaluation_key(suite, ablated=ablated)
+    with run.writing():
+        run.rows(key).parent.mkdir(exist_ok=True)
+        if redo:
+            for path in (run.rows(key), run.programs(key), run.head(key)):
+                path.unlink(missing_ok=True)
+        about = {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
+        _go_on_or_refuse(run.head(key), about, run.rows(key))
+        with (
+            contextlib.closing(Appender(run.programs(key))) as programs,
+            contextlib.closing(Appender(run.rows(key))) as rows,
+        ):
+            completions = run.source(suite).of(tasks)
+            yield from _judged(rows, programs, completions)
+            hashes: deque[str] = deque()
+            for row in evaluate(
+                _noting(hashes, completions),
+                suite,
+                ablated=ablated,
+                workers=workers,
+                require_isolation=require_isolation,
+            ):
+                # The hash comes first: a crash in between leaves one too many, and no row without one.
+                programs.append(f"{hashes.popleft()}\n".encode())
+                rows.append(to_line(row))
+                yield row
+
+
+def _noting(hashes: deque[str], completions: Iterator[Completion]) -> Iterator[Completion]:
+    for completion in completions:
+        hashes.append(completion.program_sha256)
+        yield completion
+
+
+def _judged(
+    rows: Appender, programs: Appender, completions: Iterator[Completion]
+) -> Iterator[dict[str, Any]]:
+    """The rows that are there; afterwards both files end where to go on."""
+    count = 0
+    for number, row, judged in read_judged(rows.path, programs.path):
+        if judged is None:  # the machine lost its power before the hash was on the disk
+            rows.cut(length_before(rows.path, number))
+            break
+        found = row["task"], row["prompt"], row["index"]
+        completion = next(completions, None)
+        if completion is None or completion.key != found:
+            expected = "nothing more" if completion is None else name_of(completion.key)
+            raise BadInput(
+                f"judges {name_of(found)} where the completions have {expected}; --redo starts over",
+                file=rows.path,
+                line=number,
+            )
+        if completion.program_sha256 != judged:
+            raise BadInput(
+                f"the program of {name_of(found)} has changed since it was judged; --redo starts over",
+                file=rows.path,
+                line=number,
+            )
+        count += 1
+        yield row
+    programs.cut(HASH_LINE * count)
+
+
+def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> None:
+    if not path.exists():
+        if rows.exists() and rows.stat().st_size:
+            raise BadInput(
+                "is missing, so that nobody knows by what the rows were judged; --redo starts over", file=path
+            )
+        write_whole(path, to_text(about))
+        return
+    was = load_head(path)
+    changed = [name for name in about if was.get(name) != about[name]]
+    if changed:
+        name = {"digest": "content of the suite", "codebotler": "version of this tool"}.get(
+            changed[0], changed[0]
+        )
+        then, now = _brief(was.get(changed[0])), _brief(about[changed[0]])
+        raise BadInput(f"was judged with another {name} ({then}, now {now}); --redo starts over", file=path)
+
+
+LONGEST = 60  # characters of a value that a sentence can bear
+
+
+def _brief(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= LONGEST else text[:LONGEST] + "..."

@@ -1,0 +1,66 @@
+"""What commands say: tables, JSON, progress, and sentences beside them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+from time import monotonic
+from typing import TYPE_CHECKING, NoReturn, TypeVar
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+Item = TypeVar("Item")
+
+QUIET_S = 2.0  # for so long does a command say nothing at first; lines of a long one come more seldom
+
+
+def print_rich(what: RenderableType) -> None:
+    """Draw on the terminal, or plainly into a pipe."""
+    from rich.console import Console
+
+    console = Console()
+    if console.is_terminal:
+        console.print(what)
+        return
+    with console.capture() as drawn:
+        console.print(what)
+    print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
+
+
+def print_json(data: object) -> None:
+    """Print for machines."""
+    import json
+
+    print(json.dumps(data, indent=2))
+
+
+def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:
+    """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    of_all = "" if total is None else f" of {total:,}"
+    started = monotonic()
+    next_line = started + QUIET_S
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        job = progress.add_task(doing, total=total)
+        for done, item in enumerate(items, 1):
+            progress.update(job, completed=done)
+            if not console.is_terminal and monotonic() >= next_line:
+                note(f"{doing}: {done:,}{of_all}")
+                next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
+            yield item
+
+
+def note(sentence: str) -> None:
+    """Say something beside the results."""
+    print(sentence, file=sys.stderr)
+
+
+def fail(sentence: str) -> NoReturn:
+    """End with a sentence about what the user asked for."""
+    note(f"roboeval: {sentence}")
+    raise SystemExit(2)
