@@ -265,13 +265,14 @@ WORKS: dict[str, tuple[str, object]] = {
         ["(False, True)", "True", "True", "2024-01-01 12:00:00"],
     ),
     "selectors and executors are there": (
-        "import concurrent.futures, selectors, threading, platform\n"
+        "import concurrent.futures, selectors, threading, platform, os\n"
         + task(
             "selectors.SelectSelector().select(2)\nsay(str(time.monotonic()))\n"
             "concurrent.futures.ThreadPoolExecutor()\nsay(platform.node() + sys.executable)\n"
+            "say(f'{os.cpu_count()} {os.sched_getaffinity(0)}')\n"
             "try:\n    threading.RLock().release()\nexcept RuntimeError as error: say(str(error))"
         ),
-        ["2.0", "robot", "cannot release un-acquired lock"],
+        ["2.0", "robot", "1 {0}", "cannot release un-acquired lock"],
     ),
     "no folder of the machine is told": (
         "import json, traceback\n"

@@ -29,6 +29,8 @@ def simulate_surroundings(run: Run) -> None:
         vars(module).update(
             getpid=staticmethod(lambda: 1),
             getppid=staticmethod(lambda: 0),
+            cpu_count=staticmethod(lambda: 1),
+            sched_getaffinity=staticmethod(lambda process, /: {0}),  # noqa: ARG005 - as theirs
             times=staticmethod(lambda: os.times_result((run.now, 0.0, 0.0, 0.0, run.now))),
         )
     forbid_watching()
