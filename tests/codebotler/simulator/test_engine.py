@@ -174,6 +174,20 @@ def test_outcome_depends_neither_on_workers_nor_on_the_start_nor_on_what_ran_bef
     assert len(said(first[0])) == 14
 
 
+ADDRESSES = """
+def task_program():  # NUMBER
+    say(str([id(bytes(size)) for size in range(0, 700, 16)]))
+    say(str([id(new) for new in ([], {}, {1}, object(), 1.5e3, task_program.__get__(1), [i for i in range(50)])]))
+"""
+
+
+@pytest.mark.parametrize("imports", ["", "import json\n"])
+def test_addresses_are_the_same_in_the_first_run_and_long_after(imports: str) -> None:
+    programs = [(imports + ADDRESSES.replace("NUMBER", str(number)), WORLD) for number in range(150)]
+    outcomes = run(programs, workers=1)
+    assert len({tuple(said(outcome)) for outcome in outcomes}) == 1
+
+
 # --- nothing is left
 
 

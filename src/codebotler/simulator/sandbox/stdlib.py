@@ -47,6 +47,7 @@ def load_stdlib(run: Run) -> None:
     simulate_chance()
     simulate_locks(run)
     vars(_thread)["get_native_id"] = lambda: 1
+    forget_forks()
     sys.modules["_queue"] = None  # type: ignore[assignment]  # `queue` then takes its own, with simulated locks
     for name in [*LISTED, "_strptime", *(f"encodings.{codec}" for codec in CODECS)]:
         importlib.import_module(name)
@@ -79,6 +80,15 @@ def simulate_chance() -> None:
         return source.getrandbits(8 * size).to_bytes(size, "big") if size else b""
 
     os.urandom = posix.urandom = urandom
+
+
+def forget_forks() -> None:
+    """Let no module do anything around a fork, which a program knows nothing of.
+
+    Whatever runs in the zygote once for each run is adapted by the interpreter after some dozens of them, and
+    from then on leaves another heap behind.
+    """
+    os.register_at_fork = posix.register_at_fork = lambda **_: None
 
 
 def simulate_identities() -> None:
