@@ -177,7 +177,8 @@ def test_outcome_depends_neither_on_workers_nor_on_the_start_nor_on_what_ran_bef
 ADDRESSES = """
 def task_program():  # NUMBER
     say(str([id(bytes(size)) for size in range(0, 700, 16)]))
-    say(str([id(new) for new in ([], {}, {1}, object(), 1.5e3, task_program.__get__(1), [i for i in range(50)])]))
+    new = [], {}, {1}, object(), 1.5e3, task_program.__get__(1), [i for i in range(50)]
+    say(str(list(map(id, new))))
 """
 
 
