@@ -12,6 +12,7 @@ import struct
 import threading
 import time
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 
 from codebotler.simulator.sandbox import CPU_SECONDS, HEADER, MAX_FRAME, MORE, PIECE
@@ -20,25 +21,41 @@ from codebotler.trace import RunError, Status
 LONGEST = 60.0  # seconds of waiting for a child in all; nothing that computes takes so long
 FILTERED, KILLED_BY_FILTER = 2, 3  # what Linux says of a process and its list of system calls
 SILENCE = 1  # seconds after which a silent child is looked at
+SILENCE_FOR_KERNEL = struct.pack("ll", SILENCE, 0)
 
 
 class Child:
     """One isolated process, seen from outside.
 
     Args:
-        pid: its process id, which stays its own until the next run.
+        find_pid: tells its process id, which stays its own until the next run.
         channel: the socket to it.
         wait: waits for its end and returns its exit status, or minus the signal.
         closes: whether closing its walls can be seen from outside, which takes seccomp.
     """
 
-    def __init__(self, pid: int, channel: socket.socket, wait: Callable[[], int], *, closes: bool) -> None:
-        self.pid, self._channel, self._wait = pid, channel, wait
+    def __init__(
+        self, find_pid: Callable[[], int], channel: socket.socket, wait: Callable[[], int], *, closes: bool
+    ) -> None:
+        self._find_pid, self._channel, self._wait = find_pid, channel, wait
         for direction in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):  # one system call less than settimeout
-            channel.setsockopt(socket.SOL_SOCKET, direction, struct.pack("ll", SILENCE, 0))
+            channel.setsockopt(socket.SOL_SOCKET, direction, SILENCE_FOR_KERNEL)
         self._closes = closes
         self._buffer = bytearray()
         self._patience = LONGEST
+
+    @cached_property
+    def pid(self) -> int:
+        """Its process id.
+
+        Raises:
+            LostChildError: it has none.
+        """
+        try:
+            return self._find_pid()
+        except LostChildError:
+            self.hang_up()
+            raise
 
     def send(self, message: object) -> None:
         """Send a message in one or more pieces; a child that is gone is noticed when it is listened to.
@@ -60,12 +77,13 @@ class Child:
             self._send_piece(memoryview(whole)[start : start + PIECE])
 
     def _send_piece(self, rest: memoryview) -> None:
-        stuck = Stuck(self.pid)
+        stuck: Stuck | None = None
         while rest:
             began = time.monotonic()
             try:
                 rest = rest[self._channel.send(rest) :]
             except BlockingIOError:  # nothing for so long
+                stuck = stuck or Stuck(self.pid)
                 stuck.check()
             except OSError:
                 return
@@ -91,7 +109,7 @@ class Child:
             ProtocolError: it is longer.
             TimeoutError: the child waits for something that will never come.
         """
-        stuck = Stuck(self.pid)
+        stuck: Stuck | None = None
         while True:
             if len(self._buffer) >= HEADER:
                 end = HEADER + int.from_bytes(self._buffer[:HEADER], "big")
@@ -105,6 +123,7 @@ class Child:
             try:
                 piece = self._channel.recv(1 << 16)
             except BlockingIOError:  # nothing for so long
+                stuck = stuck or Stuck(self.pid)
                 stuck.check()
             except OSError:
                 return None
@@ -124,13 +143,22 @@ class Child:
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, signal.SIGKILL)
 
+    def leave(self) -> None:
+        """End it, if it has not ended, and do not wait for that."""
+        self.kill()
+        self.hang_up()
+
     def end(self) -> int:
         """End it, if it has not ended, and return its exit status, or minus the signal."""
         self.kill()
         try:
             return self._wait()
         finally:
-            self._channel.close()
+            self.hang_up()
+
+    def hang_up(self) -> None:
+        """Say no more and hear no more."""
+        self._channel.close()
 
     def rest(self) -> None:
         """Wait anew: what it was asked has been answered."""
@@ -178,7 +206,7 @@ def cause_of_death(status: int) -> tuple[Status, RunError]:
 
 def _parsed(frame: bytes) -> object:
     try:
-        message: object = json.loads(frame)
+        message: object = json.loads(str(frame, "ascii"))
     except (ValueError, RecursionError):
         message = None
     if message is None:

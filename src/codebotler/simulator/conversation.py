@@ -63,6 +63,12 @@ class Conversation:
         self.ledger = Ledger()
         self.errors: list[RobotError] = []
         self._heard = False
+        self._skills = {skill.name: skill for skill in robot.skills.rows}
+        self._glances = [
+            (f'"{skill.name}",[]', skill.name)
+            for skill in robot.skills.rows
+            if skill.name in robot.only_looks and not skill.parameters and skill.recording is None
+        ]
         limits = self.limits
         bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
         start = robot.rules.clock_starts.timestamp()
@@ -76,7 +82,7 @@ class Conversation:
             LostChildError: the child ended before its walls were closed.
         """
         try:
-            final = self._talk()
+            final = self.talk()
         except TimeoutError:
             self.ledger.limit = WAITS
             final = None
@@ -86,13 +92,21 @@ class Conversation:
         except BaseException:
             self.child.end()
             raise
-        status = self.child.end() if final or self.ledger.limit else self.child.ended()
+        if final is None and self.ledger.limit is None:
+            return self._died(self.child.ended())
+        self.child.leave()
         if self.ledger.limit is not None:
             line = final.get("line") if final else None
             return self._outcome(Status.TIMEOUT, "TimeoutError", self.ledger.limit, line)
-        return self._died(status) if final is None else self._ended(final)
+        return self._ended(final or {})
 
-    def _talk(self) -> dict[str, object] | None:
+    def talk(self) -> dict[str, object] | None:
+        """Answer what the child asks until it says how it ended; None if it does not say so.
+
+        Raises:
+            ProtocolError: it says what no child says.
+            TimeoutError: it waits for something that will never come.
+        """
         overrun = 0
         while (message := self.child.receive()) is not None:
             self._heard = True
@@ -114,8 +128,8 @@ class Conversation:
         if self.ledger.limit is None:
             self._let_time_pass(now)
         if self.ledger.limit is None:
-            if name in self.robot.skills:
-                return self._perform(self.robot.skills[name], values)
+            if name in self._skills:
+                return self._perform(self._skills[name], values)
             self.ledger.limit = self._beyond(name)
         return STOP
 
@@ -137,11 +151,7 @@ class Conversation:
 
     def _known(self) -> dict[str, Result]:
         """What looking shows that takes no argument and leaves no trace, by request: a child need not ask."""
-        return {
-            f'"{skill.name}",[]': self.robot.perform(skill.name, ())
-            for skill in self.robot.skills.values()
-            if skill.name in self.robot.only_looks and not skill.parameters and skill.recording is None
-        }
+        return {request: self.robot.perform(name, ()) for request, name in self._glances}
 
     def _perform(self, skill: Skill, values: list[object]) -> Answer:
         arguments = _arguments(skill, values)
@@ -203,7 +213,7 @@ def described(robot: Robot) -> Description:
             tuple((p.name, p.type.__name__) for p in skill.parameters),
             TELLS if skill.name in robot.never_fails else LOOKS if skill.name in robot.only_looks else ACTS,
         )
-        for skill in robot.skills.values()
+        for skill in robot.skills.rows
     )
 
 

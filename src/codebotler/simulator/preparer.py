@@ -130,7 +130,7 @@ def _started() -> Child:
     ours, theirs = socket.socketpair()
     with theirs:
         process = start(PREPARER, theirs.fileno())
-    return Child(process.pid, ours, process.wait, closes=False)
+    return Child(lambda: process.pid, ours, process.wait, closes=False)
 
 
 def refused(kind: str, message: str, line: int | None = None) -> Outcome:

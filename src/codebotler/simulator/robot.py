@@ -95,13 +95,15 @@ class SimulatedRobot:
         """
         return self.behaviours[skill](self, *arguments)
 
-    def record(self, kind: str, text: str, options: tuple[Option, ...] = ()) -> None:
+    def record(
+        self, kind: str, text: str, options: tuple[Option, ...] = (), *, found: bool | None = None
+    ) -> None:
         """Add an event that happens here and now; the text loses the spaces at its ends."""
-        self.events.append(Event(kind, text.strip(), options, place=self.room, time=self.now))
+        self.events.append(Event(kind, text.strip(), options, None, found, self.room, self.now))
 
-    def amend(self, *, answer: str | None = None, found: bool | None = None) -> None:
-        """Add to the last event what came of it."""
-        self.events[-1] = replace(self.events[-1], answer=answer, found=found)
+    def amend(self, answer: str) -> None:
+        """Add to the last event what was answered."""
+        self.events[-1] = replace(self.events[-1], answer=answer)
 
 
 def found_in(label: str, request: str) -> bool:
@@ -140,10 +142,9 @@ def resolve_room(rooms: Sequence[str], request: str) -> str | None:
 
 def is_in_room(robot: SimulatedRobot, entity: str) -> bool:
     """Look for an object, else for a person; in the paper's suite people answer to any name."""
-    robot.record("check", entity)
     seen = any(thing.is_meant_by(entity) for thing in robot.things[robot.room])
     seen = seen or bool(robot.answers[robot.room])
-    robot.amend(found=seen)
+    robot.record("check", entity, found=seen)
     return seen
 
 
@@ -168,7 +169,7 @@ def ask(robot: SimulatedRobot, _person: str, question: str, options: tuple[Optio
         raise RobotError(
             "AskInvalidOptions", f'none of the options ({offered}) fits the answer to "{question}"'
         )
-    robot.amend(answer=options[chosen].text)
+    robot.amend(options[chosen].text)
     return chosen
 
 

@@ -11,11 +11,46 @@ from codebotler.simulator.child import Child, LostChildError
 from codebotler.simulator.conversation import Conversation, described
 from codebotler.simulator.isolated import start
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.world import Room, World
+from codebotler.simulator.sandbox.ticks import prepared
+from codebotler.world import Person, Room, World
 
 NUMBER = 8  # bytes of a number that it reports
-REHEARSALS = 8
-REHEARSAL = World((Room("room"),), "room")
+LESSONS, REHEARSALS = 20, 8
+STAGE = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
+PLAY = marshal.dumps(
+    prepared(
+        """
+def find(thing, rooms):
+    for number, room in enumerate(sorted(rooms)):
+        go_to(room)
+        if is_in_room(thing):
+            return [room, number + 1]
+    return None
+
+def task_program():
+    start = get_current_location()
+    rooms = [room for room in get_all_rooms() if room != start and "all" not in room]
+    found = find("mug", rooms)
+    if found is not None and len(found) > 0:
+        pick("mug")
+        answer = ask("", "Is it yours, " + found[0] + "?", ["Yes", "No"])
+        counts = {"yes": 0}
+        counts[answer.lower()] = counts.get("yes", 0) + 1
+        time.sleep(1)
+        place("mug")
+    try:
+        go_to("nowhere")
+    except Exception as error:
+        say(str(error))
+    go_to(start)
+    message = f"{', '.join(rooms)}: {counts['yes']} of {len(rooms)}"
+    while not message.endswith("."):
+        message += "."
+    say(message)
+""",
+        lowercase=False,
+    )[0]
+)
 EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"))
 
 
@@ -35,9 +70,11 @@ class Zygote:
         with door:
             self._process = start(role, door.fileno(), report)
         os.close(report)
-        self._has_child = False
-        self._door.sendall(marshal.dumps(described(SimulatedRobot(REHEARSAL))))
+        self._end_is_unread = False
         try:
+            self._door.sendall(marshal.dumps((described(SimulatedRobot(STAGE)), LESSONS)))
+            for _ in range(self._read_report()):
+                self._teach()
             self.has_seccomp = self._read_report() == 1
             for _ in range(REHEARSALS):
                 self._rehearse()
@@ -51,18 +88,11 @@ class Zygote:
         Raises:
             LostChildError: the zygote has ended.
         """
-        if self._has_child:
-            self._read_report()  # how the last one ended
-        ours, theirs = socket.socketpair()
         try:
-            with theirs:
-                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
-            pid = self._read_report()
-        except (LostChildError, OSError):
-            ours.close()
+            ours = self._ask_for_line()
+        except OSError:
             raise LostChildError("the zygote has ended") from None
-        self._has_child = True
-        return Child(pid, ours, self._end_of_child, closes=self.has_seccomp)
+        return Child(self._pid_of_child, ours, self._end_of_child, closes=self.has_seccomp)
 
     @property
     def pid(self) -> int:
@@ -80,14 +110,35 @@ class Zygote:
         os.close(self._report)
         self._door.close()
 
+    def _teach(self) -> None:
+        """Let the zygote itself run a program, so that its children have less to learn."""
+        child = Child(lambda: self.pid, self._ask_for_line(), self._process.wait, closes=False)
+        Conversation(child, PLAY, SimulatedRobot(STAGE), may_import=True).talk()
+        child.hang_up()
+
     def _rehearse(self) -> None:
         """Run an empty program: by then the heap of the zygote, which programs can see, has settled."""
-        Conversation(self.fork(), EMPTY, SimulatedRobot(REHEARSAL), may_import=True).outcome()
+        Conversation(self.fork(), EMPTY, SimulatedRobot(STAGE), may_import=True).outcome()
+
+    def _ask_for_line(self) -> socket.socket:
+        ours, theirs = socket.socketpair()
+        try:
+            with theirs:
+                socket.send_fds(self._door, [b"x"], [theirs.fileno()])
+        except OSError:
+            ours.close()
+            raise
+        return ours
+
+    def _pid_of_child(self) -> int:
+        if self._end_is_unread:
+            self._end_of_child()  # of the last one, which nobody waited for
+        self._end_is_unread = True
+        return self._read_report()
 
     def _end_of_child(self) -> int:
-        status = self._read_report()
-        self._has_child = False
-        return status
+        self._end_is_unread = False
+        return self._read_report()
 
     def _read_report(self) -> int:
         data = os.read(self._report, NUMBER)

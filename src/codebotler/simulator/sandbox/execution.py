@@ -85,6 +85,21 @@ class Run:
             return self.ended_by(error)
         return '{"end":"timeout","line":null}' if self.spent else '{"end":"finished"}'
 
+    def forget(self, names: dict[str, Any]) -> None:
+        """Be as before the run of a program.
+
+        Args:
+            names: what the program could use then.
+        """
+        self.now = 0.0
+        self.spent = self.entered = False
+        self.codes.clear()
+        self.known = {}
+        self.count_anew()
+        provided = vars(self.namespace)
+        provided.clear()
+        provided.update(names)
+
     def ended_by(self, error: BaseException) -> str:
         """Describe what ended the program; the exception's class may be the program's own."""
         kind, line = type(error), last_line(error)

@@ -35,7 +35,8 @@ def serve(root: str, *, library: bool) -> None:
     door = socket(fileno=DOOR)
     run = Run()
     simulate_surroundings(run)
-    run.provide(loads(door.recv(1 << 16)))  # noqa: S302 - from the engine
+    skills, rehearsals = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
+    run.provide(skills)
     if library:
         from codebotler.simulator.sandbox.stdlib import load_stdlib  # noqa: PLC0415 - it is large
 
@@ -47,11 +48,30 @@ def serve(root: str, *, library: bool) -> None:
     sys.meta_path[:] = [NothingMore() if library else MoreInTheLibrary()]
     give_up_rights()
     seccomp = usable_filter()
+    rehearse(run, door, rehearsals)
     gc.collect()
     gc.freeze()
     report(0 if seccomp is None else 1)
     while one_run(door, run, seccomp):
         pass
+
+
+def rehearse(run: Run, door: socket, times: int) -> None:
+    """Run a program of the engine's own here, and not in a child, as often as the interpreter learns from it.
+
+    What it learns, such as where it found an attribute, is written to memory that children then need not
+    copy.
+    """
+    report(times)
+    names = vars(run.namespace).copy()
+    for _ in range(times):
+        line = asked_for(door)
+        os.dup2(line, CHANNEL)
+        if line != CHANNEL:
+            os.close(line)
+        play(run)
+        run.forget(names)
+    os.close(CHANNEL)
 
 
 class NothingMore:
@@ -120,21 +140,16 @@ def child(line: int, run: Run, seccomp: Filter | None, parent: int) -> NoReturn:
     if getppid() != parent:  # it died before that: no signal will come
         os._exit(1)
     enclose(seccomp)
-    steady_heap()
+    play(run)
+    os._exit(0)
+
+
+def play(run: Run) -> None:
+    """Run the program that the engine sends, and say how it ended."""
     code, skills, limits, known = receive()
     if skills != run.skills:
         run.provide(skills)
     send(run.execute(code, limits, known))
-    os._exit(0)
-
-
-def steady_heap() -> None:
-    """Use up what the zygote has freed, in an order that differs between forks: addresses would show it."""
-    KEPT.append([[bytes(size), object()] for size in SIZES for _ in range(EACH)])
-
-
-KEPT: list[object] = []
-SIZES, EACH = range(0, 479, 16), 4  # bytes, of which an object has 33 more: all sizes up to 512
 
 
 def report(number: int) -> None:
