@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from json.encoder import encode_basestring_ascii as quoted
 from typing import Protocol, TypeAlias
 
 from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
@@ -32,6 +33,8 @@ class Robot(Protocol):
     """What the program's clock shows, in seconds since the start."""
     never_fails: frozenset[str]
     """Skills that return nothing and cannot fail, so that a program need not wait for them."""
+    surely: tuple[tuple[str, str], ...]
+    """Skills and their only arguments that return nothing and succeed whatever happens, in the same way."""
     only_looks: frozenset[str]
     """Skills that change nothing, and whose result stays the same until another skill is executed."""
 
@@ -72,7 +75,8 @@ class Conversation:
         limits = self.limits
         bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
         start = robot.rules.clock_starts.timestamp()
-        child.send((code, described(robot), (*bounds, start), self._known()))
+        sure = tuple(f'"{name}",[{quoted(argument)}]' for name, argument in robot.surely)
+        child.send((code, described(robot), (*bounds, start), sure, self._known()))
 
     def outcome(self) -> Outcome:
         """Talk to the end.

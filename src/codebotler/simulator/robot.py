@@ -67,7 +67,8 @@ class SimulatedRobot:
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
         self.never_fails = frozenset(name for name, does in self.behaviours.items() if does is say)
         self.only_looks = frozenset(name for name, does in self.behaviours.items() if does in LOOKING)
-        self.rooms = [room.name for room in world.rooms]
+        self.rooms = tuple(room.name for room in world.rooms)
+        self.surely = sure_drives(self.rooms) if self.behaviours.get("go_to") is go_to else ()
         self.room = world.robot
         self.things = {room.name: [Thing(label) for label in room.objects] for room in world.rooms}
         self.answers = {room.name: [list(person.answers) for person in room.people] for room in world.rooms}
@@ -133,6 +134,12 @@ def go_to(robot: SimulatedRobot, location: str) -> None:
     if room is None:
         raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
     robot.room = room
+
+
+@lru_cache(maxsize=4096)
+def sure_drives(rooms: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """The drives that succeed whatever happens: to each room by its name, unless it is an odd regex."""
+    return tuple(("go_to", room) for room in rooms if resolve_room(rooms, room) is not None)
 
 
 def resolve_room(rooms: Sequence[str], request: str) -> str | None:

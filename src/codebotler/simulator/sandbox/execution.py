@@ -43,6 +43,7 @@ class Run:
         self.ticks = self.calls = self.room = 0
         self.start = self.seconds = 0.0
         self.longest = 0
+        self.sure: tuple[str, ...] = ()
         self.known: dict[str, Any] = {}
         self.namespace = types.ModuleType("__main__")
         # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
@@ -62,7 +63,11 @@ class Run:
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
     def execute(
-        self, code: bytes, limits: tuple[int, float, int, int, int, float], known: dict[str, Any]
+        self,
+        code: bytes,
+        limits: tuple[int, float, int, int, int, float],
+        sure: tuple[str, ...],
+        known: dict[str, Any],
     ) -> str:
         """Run the program to its end and say how it ended.
 
@@ -70,10 +75,11 @@ class Run:
             code: marshalled.
             limits: ticks, simulated seconds, skill calls, characters of a text and of all texts; and what the
                 clock shows at the start, in seconds.
+            sure: requests of which nothing can come back, whenever they are made.
             known: what looking would show at the start, by request.
         """
         self.ticks, self.seconds, self.calls, self.longest, self.room, self.start = limits
-        self.known = known
+        self.sure, self.known = sure, known
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
         try:
@@ -198,15 +204,15 @@ class Run:
         """Ask for a skill, and wait for the answer only where it is not known before."""
         self.calls -= 1
         self.room -= len(request)
-        if way != ACTS and self.calls >= 0 and self.room > 0 and len(request) <= self.longest:
-            if way == TELLS:
+        if way == ACTS:
+            self.known.clear()
+        if self.calls >= 0 and self.room > 0 and len(request) <= self.longest:
+            if way == TELLS or (way == ACTS and request in self.sure):
                 return self.tell(request)
             if request in self.known:
                 self.tell(request)
                 known = self.known[request]
                 return known.copy() if type(known) is list else known
-        if way == ACTS:
-            self.known.clear()
         result = self.request(request)
         if way == LOOKS:
             self.known[request] = result.copy() if type(result) is list else result

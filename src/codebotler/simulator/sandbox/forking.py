@@ -103,7 +103,9 @@ def one_run(door: socket, run: Run, seccomp: Filter | None) -> bool:
     pid = os.fork()
     if pid == 0:
         try:
-            child(line, run, seccomp, parent)
+            go_behind_walls(line, seccomp, parent)
+            play(run)
+            os._exit(0)
         finally:
             os._exit(1)
     os.close(line)
@@ -132,24 +134,22 @@ def end_of(pid: int) -> int:
     return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
 
 
-def child(line: int, run: Run, seccomp: Filter | None, parent: int) -> NoReturn:
-    """Be the child of one run: take the channel, close the walls, run the program, say how it ended."""
+def go_behind_walls(line: int, seccomp: Filter | None, parent: int) -> None:
+    """Be the child of one run: take the channel and close the walls."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
     if getppid() != parent:  # it died before that: no signal will come
         os._exit(1)
     enclose(seccomp)
-    play(run)
-    os._exit(0)
 
 
 def play(run: Run) -> None:
     """Run the program that the engine sends, and say how it ended."""
-    code, skills, limits, known = receive()
+    code, skills, limits, sure, known = receive()
     if skills != run.skills:
         run.provide(skills)
-    send(run.execute(code, limits, known))
+    send(run.execute(code, limits, sure, known))
 
 
 def report(number: int) -> None:
