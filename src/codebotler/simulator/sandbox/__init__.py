@@ -6,9 +6,6 @@ of it runs under a bare interpreter and imports as little as it can, since every
 library makes each fork dearer.
 """
 
-START = __file__.rpartition("/")[0] + "/start.py"
-"""The script that the engine starts, with the name of a role and the descriptors for it."""
-
 FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
 """The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings."""
 

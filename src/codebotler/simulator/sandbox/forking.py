@@ -21,15 +21,14 @@ if TYPE_CHECKING:
 
     from codebotler.simulator.sandbox.walls import Filter
 
-DOOR, REPORT = 4, 5
+DOOR, REPORT = 5, 6
 DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
 
 
-def serve(root: str, *, library: bool) -> None:
+def serve(*, library: bool) -> None:
     """Serve runs, one at a time, until the engine closes its end.
 
     Args:
-        root: the folder from which our own modules were imported; programs do not find it.
         library: whether programs are to find the standard library.
     """
     door = socket(fileno=DOOR)
@@ -41,7 +40,6 @@ def serve(root: str, *, library: bool) -> None:
         from codebotler.simulator.sandbox.stdlib import load_stdlib  # noqa: PLC0415 - it is large
 
         load_stdlib(run)
-    sys.path.remove(root)
     sys.pycache_prefix = None
     for name in [name for name in sys.modules if name.partition(".")[0] == "codebotler"]:
         del sys.modules[name]

@@ -16,7 +16,7 @@ from codebotler.simulator.sandbox.channel import receive, send_bytes
 from codebotler.simulator.sandbox.ticks import TOO_LARGE, prepared
 from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
 
-DOOR = 4
+DOOR = 5
 ALWAYS_THERE = frozenset({"sys", "time", "__future__"})
 REHEARSAL = "def task_program():\n    for room in get_all_rooms():\n        say(f'in {room}')\n"
 WITHOUT_REFERENCES = 2  # later versions of the format depend on what else this process holds

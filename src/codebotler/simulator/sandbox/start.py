@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import sys
+from _frozen_importlib import ModuleSpec
+from marshal import loads
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    import types
     from typing import NoReturn
 
 FIRST = 4
+CODES = FIRST  # the descriptor of a file with the code of our own modules
 STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
@@ -24,9 +27,10 @@ def main(role: str, descriptors: list[str]) -> None:
     """
     if descriptors:
         start_again(list(map(int, descriptors)))
-    root = __file__.rsplit("/codebotler/", 1)[0]
-    sys.path.append(root)
-    sys.pycache_prefix = os.devnull  # bytecode, there in one start and not in the next, would move the heap
+    # Bytecode, there in one start and not in the next, would move the heap of a zygote.
+    sys.pycache_prefix = os.devnull
+    sys.meta_path.insert(0, Given(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
+    os.close(CODES)
     if role == "preparer":
         from codebotler.simulator.sandbox import preparing  # noqa: PLC0415 - only now it can be found
 
@@ -34,7 +38,32 @@ def main(role: str, descriptors: list[str]) -> None:
     else:
         from codebotler.simulator.sandbox import forking  # noqa: PLC0415 - the same
 
-        forking.serve(root, library=role == "library-zygote")
+        forking.serve(library=role == "library-zygote")
+
+
+class Given:
+    """Finds modules whose code the engine has compiled: a compiler would leave a zygote twice as large.
+
+    Args:
+        codes: marshalled code, by the name of the module.
+    """
+
+    def __init__(self, codes: dict[str, bytes]) -> None:
+        self.codes = codes
+
+    def find_spec(self, name: str, *_: object) -> ModuleSpec | None:
+        """What the import system wants to know of a module."""
+        if name not in self.codes:
+            return None
+        is_package = any(other.startswith(name + ".") for other in self.codes)
+        return ModuleSpec(name, self, is_package=is_package)  # type: ignore[arg-type]  # it has what is needed
+
+    def create_module(self, _: ModuleSpec) -> None:
+        """Make an ordinary module."""
+
+    def exec_module(self, module: types.ModuleType) -> None:
+        """Run its code."""
+        exec(loads(self.codes[module.__name__]), vars(module))  # noqa: S102, S302 - from the engine
 
 
 def start_again(descriptors: list[int]) -> NoReturn:
@@ -43,7 +72,8 @@ def start_again(descriptors: list[int]) -> NoReturn:
     A program may say an address. It must be the same in every start, and even the lengths of arguments and
     the numbers of descriptors would move it.
     """
-    from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - the second start, which is forked, has no use for it
+    import ctypes  # noqa: PLC0415 - it is large, and the second start has no use for it
+    from fcntl import F_DUPFD, fcntl  # noqa: PLC0415 - the same
 
     forget_the_shell()
     end = FIRST + len(descriptors)

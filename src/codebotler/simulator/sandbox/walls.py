@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
+import _ctypes
 import os
 import resource
 import sys
@@ -13,7 +13,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    Filter: TypeAlias = ctypes.Array[ctypes.c_char]
+    Filter: TypeAlias = tuple[bytes, bytes]
+    """What the kernel is given, and what that points to."""
 
 
 def give_up_rights() -> None:
@@ -77,7 +78,7 @@ def refuse_new_rights() -> None:
 
 def install(seccomp: Filter) -> None:
     """Ask nothing more of the kernel than the list allows."""
-    prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, ctypes.addressof(seccomp))
+    prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, seccomp[0])
 
 
 NOBODY = 65534
@@ -85,17 +86,15 @@ SIGKILL = 9
 PR_SET_PDEATHSIG, PR_SET_DUMPABLE, PR_SET_SECCOMP, PR_SET_NO_NEW_PRIVS = 1, 4, 22, 38
 MACHINE = os.uname().machine
 SECCOMP_MODE_FILTER = 2
-LIBC = ctypes.PyDLL(None, use_errno=True)
-if sys.platform == "linux":
-    LIBC.prctl.argtypes = (ctypes.c_int, *(ctypes.c_ulong,) * 4)
+LIBC = _ctypes.dlopen(None, 0)  # type: ignore[arg-type]  # of `ctypes`, which would make each fork dearer
 
 
-def prctl(option: int, value: int = 0, other: int = 0) -> None:
+def prctl(option: int, value: int = 0, other: int | bytes = 0) -> None:
     """Ask the kernel to change what this process may do; only Linux can be asked."""
     if sys.platform != "linux":
         return
-    if LIBC.prctl(option, value, other, 0, 0) != 0:
-        raise OSError(ctypes.get_errno(), f"prctl({option}) failed")
+    if _ctypes.call_function(_ctypes.dlsym(LIBC, "prctl"), (option, value, other, 0, 0)) != 0:
+        raise OSError(f"prctl({option}) failed")
 
 
 SYSCALLS = {
@@ -146,12 +145,14 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
         body = [(LOAD, 0, 0, argument), test, (RETURN, 0, 0, ALLOW), (RETURN, 0, 0, DENY)]
         code += [(EQUAL, 0, len(body), numbers[name]), *body]
     code.append((RETURN, 0, 0, DENY))
-    instructions = ctypes.create_string_buffer(b"".join(map(instruction, code)))
-    header = ctypes.create_string_buffer(
-        len(code).to_bytes(8, sys.byteorder) + ctypes.addressof(instructions).to_bytes(8, sys.byteorder)
-    )
-    header.instructions = instructions  # type: ignore[attr-defined]  # keeps them alive
-    return header
+    instructions = b"".join(map(instruction, code))
+    length, address = (number.to_bytes(8, sys.byteorder) for number in (len(code), address_of(instructions)))
+    return length + address, instructions
+
+
+def address_of(data: bytes) -> int:
+    """Where the bytes lie: behind the head of their object."""
+    return id(data) + bytes.__basicsize__ - 1
 
 
 def instruction(line: tuple[int, int, int, int]) -> bytes:
