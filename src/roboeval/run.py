@@ -59,6 +59,8 @@ def open_source(text: str, suite: Suite) -> Source:
     Raises:
         BadInput: there is no such thing.
     """
+    if not text:
+        raise BadInput("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
     if text.partition(":")[0] == "recorded" and not path.exists():
         return Source(lambda: recorded_completions(text, suite))

@@ -69,6 +69,11 @@ def test_a_missing_file(tmp_path: Path) -> None:
     )
 
 
+def test_an_empty_name() -> None:
+    for verb in (("evaluate",), ("import", "--out", "run")):
+        assert refused(*verb, "") == "nothing is named; name a run, a .jsonl, or a folder or zip of .py"
+
+
 def test_an_empty_file(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("")
     assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl: there is no completion in it"
