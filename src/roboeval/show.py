@@ -279,7 +279,9 @@ def completion_view(
     """What `completion_data` says, for a person."""
     data = completion_data(row, completion, suite, ablated=ablated)
     lines = {world["line"] for world in data["worlds"] if not world["satisfied"]}
-    parts: list[RenderableType] = [_completion_head(data), Text(), *_program(data["program"], lines)]
+    parts: list[RenderableType] = [_completion_head(data)]
+    if data["program"] is not None:
+        parts += [Text(), *_program(data["program"], lines)]
     for number, world in enumerate(data["worlds"], 1):
         parts += [Text(), *_world(world, f"World {number} of {len(data['worlds'])}: ")]
     return Group(*parts)
@@ -291,13 +293,13 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     head.append_text(Text("passed", "green") if why is None else kind_of(why))
     if data["model"] is not None:
         head.append(f"\nwritten by {visible(data['model'])}{by_hand([data['model']])}", "dim")
+    if data["program"] is None:
+        return head.append(f"\n{GONE}", "yellow")
     told = NOT_RECORDED if data["instruction"] is None else visible(data["instruction"])
     return head.append(f"\n{told}", "italic")
 
 
-def _program(program: str | None, marked: set[int | None]) -> list[RenderableType]:
-    if program is None:
-        return [Text(GONE, "yellow")]
+def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     source = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
     syntax = Syntax(

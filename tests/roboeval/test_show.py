@@ -178,9 +178,20 @@ def test_lines_keep_their_numbers_whatever_ends_them() -> None:
 @pytest.mark.parametrize("written", [None, completion(program="")])
 def test_what_was_not_recorded_is_said_and_not_taken_from_the_suite(written: Completion | None) -> None:
     text = printed(completion_view(row(completion(), FINE), written, SUITE))
-    assert "instruction not recorded" in text
+    assert ("instruction not recorded" in text) == (written is not None)
     assert "Visit Amy." not in text
     assert ("the program that was judged no longer stands in this run" in text) == (written is None)
+
+
+def test_of_a_prompt_it_is_said_what_is_gone_and_what_was_not_recorded() -> None:
+    gone, unknown = "the programs that were judged no longer stand in this run", "instruction not recorded"
+    for written, told, untold in ([], gone, unknown), (THREE[:1], unknown, gone):
+        for text in (
+            printed(task_view(ROWS, written, SUITE, "Visit")),
+            printed(prompt_view(ROWS, written, SUITE, "Visit", 0)),
+        ):
+            assert told in text
+            assert untold not in text
 
 
 def test_a_completion_as_data_holds_every_step() -> None:
