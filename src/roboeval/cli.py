@@ -115,8 +115,8 @@ def show(
     from roboeval.tables import parse_selection
 
     judged_by = load(suite)
-    selection = parse_selection(what, judged_by)
     evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
+    selection = parse_selection(what, judged_by)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
         rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
@@ -270,9 +270,19 @@ def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) 
     if not folder.completions.is_file():
         raise BadInput("is no run: it holds no completions.jsonl", file=run)
     if not folder.rows(key).is_file():
+        others = folder.judged_by()
+        if others and suite.name not in others:
+            judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
+            raise BadInput(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run)
         again = command("evaluate", run, suite=suite_name, ablated=ablated)
         raise BadInput(f"has not been judged; `{again}` does it", file=run)
     evaluation = Evaluation(folder, key)
+    if not folder.programs(key).is_file():
+        again = command("evaluate", run, *options_of(evaluation, suite), suite=suite_name, ablated=ablated)
+        raise BadInput(
+            f"is missing, so that nobody knows which programs were judged; `{again}` judges them again",
+            file=folder.programs(key),
+        )
     if evaluation.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     return evaluation

@@ -61,12 +61,6 @@ class Evaluation:
 
     def __init__(self, run: Run, key: str) -> None:
         self.run, self.key = run, key
-        if not run.programs(key).is_file():
-            raise BadInput(
-                "is missing, so that nobody knows which programs were judged; "
-                f"`roboeval evaluate {run.path}` judges them again",
-                file=run.programs(key),
-            )
         self.head = load_head(run.head(key))
         tasks = self.head.get("tasks")
         if tasks is not None and not (isinstance(tasks, list) and all(isinstance(t, str) for t in tasks)):

@@ -354,6 +354,22 @@ def test_a_run_that_was_not_judged(tmp_path: Path) -> None:
     assert refused("show", "nothing", cwd=tmp_path) == "nothing: is no run: it holds no completions.jsonl"
 
 
+def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
+    roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
+    (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", "--suite", "mine", cwd=tmp_path).status == 0
+    for asked in (("export", "run"), ("show", "run", "--ablation"), ("show", "run", "MakeTea")):
+        sentence = refused(*asked, cwd=tmp_path)
+        assert sentence == 'run: was judged by the suite "mine", not by "paper"; name it with --suite'
+    (tmp_path / "run" / "evaluations" / "mine.sha256").unlink()
+    sentence = refused("show", "run", "--suite", "mine", cwd=tmp_path)
+    assert sentence.startswith(
+        "run/evaluations/mine.sha256: is missing, so that nobody knows which programs were"
+    )
+    assert pasted(sentence, tmp_path).status == 0
+    assert roboeval("show", "run", "--suite", "mine", cwd=tmp_path).status == 0
+
+
 # --- what it is for
 
 
