@@ -215,12 +215,14 @@ def import_(
     suite: SuiteOption = "paper",
 ) -> None:
     """Make a run of completions from elsewhere."""
+    from roboeval.records import how_many
     from roboeval.run import Run, open_source
 
     known = load(suite)
     count = Run(out).keep(open_source(path, known))
     again = command("evaluate", out, suite=suite)
-    note(f"{count:,} completions are in {out}; `{again}` judges them")
+    they = ("is", "it") if count == 1 else ("are", "them")
+    note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
 
 
 def refuse_what_comes_later(worlds: int | None, engine: str) -> None:

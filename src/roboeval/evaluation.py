@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from codebotler.badinput import BadInput
-from roboeval.records import Completion, Key, name_of, read_judged
+from roboeval.records import Completion, Key, how_many, name_of, read_judged
 from roboeval.run import Run, load_head
 
 
@@ -109,4 +109,4 @@ class Evaluation:
     def unfinished(self) -> str | None:
         """What is to be said if there is more to judge than the rows that were read."""
         total = self.scope.total
-        return None if self.count >= total else f"{self.count:,} of {total:,} completions judged"
+        return None if self.count >= total else f"{self.count:,} of {how_many(total)} judged"

@@ -260,17 +260,18 @@ def _told(program: Mapping[str, Any]) -> Text:
         often.append(f"{GONE}\n", "yellow")
     if program["passed"]:
         return often.append("passed", "green")
-    text = Text.assemble(often, kind_of(program["failure"]), f' in "{visible(program["world"])}"\n')
+    text = Text.assemble(often, kind_of(program["failure"]), f' in "{visible(program["world"])}"')
     if program["explanation"] is None:
-        return text.append(_error_sentence(program))
-    return text.append(
-        f"{visible(program['failure']['check'])}: {shortened(program['explanation'], EXPLANATION)}"
-    )
+        why = _error_sentence(program)
+    else:
+        why = f"{visible(program['failure']['check'])}: {shortened(program['explanation'], EXPLANATION)}"
+    return text.append(f"\n{why}" if why else "")
 
 
 def _error_sentence(verdict: Mapping[str, Any]) -> str:
-    where = "" if verdict["line"] is None else f"line {verdict['line']}: "
-    return where + shortened(verdict["error"]["message"])
+    """Where an error arose and what it says, of which either may be unknown."""
+    where = "" if verdict["line"] is None else f"line {verdict['line']}"
+    return ": ".join(filter(None, [where, shortened(verdict["error"]["message"])]))
 
 
 def completion_view(
@@ -335,4 +336,5 @@ def _ending(world: Mapping[str, Any]) -> Text:
     if world["error"] is None:
         return text
     allowed = " (allowed here)" if world["satisfied"] else ""
-    return text.append(f"{allowed}: {visible(world['error']['kind'])}, {_error_sentence(world)}")
+    told = ", ".join(filter(None, [visible(world["error"]["kind"]), _error_sentence(world)]))
+    return text.append(f"{allowed}: {told}")

@@ -16,6 +16,7 @@ from rich.text import Text
 from codebotler.badinput import BadInput
 from roboeval.evaluation import Scope
 from roboeval.metrics import Estimate, PromptScore, TaskScore, overall, score_by_prompt
+from roboeval.records import how_many
 from roboeval.suite import Suite
 from roboeval.tables import Row, by_hand, grid, visible
 from roboeval.taxonomy import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, ROBOT_KINDS, TASK
@@ -116,7 +117,7 @@ def summary(
     scored = {score.task: score for score in score_by_prompt(results())}
     scope = scope or Scope(judged)
     if not judged:
-        raise BadInput(f"0 of {scope.total:,} completions judged, so there is nothing to count")
+        raise BadInput(f"0 of {how_many(scope.total)} judged, so there is nothing to count")
     tasks = tuple(scored[name] for name in dict.fromkeys([*suite.tasks, *scored]) if name in scored)
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
@@ -164,10 +165,10 @@ def render(summary: Summary, *, title: str) -> RenderableType:
     n, failed = _judged(summary.prompts), sum(each.count for each in summary.failures)
     parts: list[RenderableType] = [head]
     if n != summary.scope.total:
-        parts.append(Text(f"{n:,} of {summary.scope.total:,} completions judged", style="yellow"))
+        parts.append(Text(f"{n:,} of {how_many(summary.scope.total)} judged", style="yellow"))
     parts += [Text(), _task_table(summary), Text(), *_overall(summary), *_missed(summary.missing)]
     if failed:
-        told = f"{failed:,} of {n:,} completions failed ({failed / n:.1%}); shares are of all completions:"
+        told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all completions:"
         tables = Columns([_failure_table(each) for each in summary.failures], padding=(1, 3))
         parts += [Text(), Text(told), Text(), tables]
     return Group(*parts)

@@ -190,7 +190,7 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
     (folder / "SayGoodDay_0_0.py").write_text(
         f"completion = open({str(marker)!r}, 'w').write('x') and 'program'\n"
     )
-    assert "cannot be read as assignments of texts" in refused("evaluate", folder)
+    assert "line 1: `completion` is no plain text; write the text out" in refused("evaluate", folder)
     assert not marker.exists()
 
 
@@ -431,7 +431,8 @@ def test_commands_in_sentences_can_be_pasted(tmp_path: Path) -> None:
 
 def test_commands_in_sentences_say_what_was_ablated(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
-    roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
+    imported = roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
+    assert "1 completion is in run" in imported.err
     unjudged = refused("show", "run", "--ablation", cwd=tmp_path)
     assert unjudged == "run: has not been judged; `roboeval evaluate run --ablation` does it"
     judged = pasted(unjudged, tmp_path)

@@ -168,6 +168,15 @@ def test_the_line_of_an_error_is_marked_and_that_of_an_allowed_timeout_is_not() 
     assert "satisfied, timeout (allowed here): TimeoutError, line 1: 1,000 skill calls" in text
 
 
+def test_an_error_without_a_message_is_told_by_its_kind_and_line() -> None:
+    for line, where in ((2, ", line 2"), (None, "")):
+        full = row(completion(), failed(Status.KILLED, "MemoryError", "", line=line))
+        text = printed(completion_view(full, completion(), SUITE))
+        assert f"\nnot satisfied, killed: MemoryError{where}\n" in text
+        text = printed(prompt_view([full], [completion()], SUITE, "Visit", 0))
+        assert text.endswith('MemoryError in "amy is in"' + ("\n     line 2" if line else ""))
+
+
 def test_lines_keep_their_numbers_whatever_ends_them() -> None:
     written = completion(program="\n\r\n\rx = (\n\n\n")
     text = printed(completion_view(row(written, LOST), written, SUITE))

@@ -115,6 +115,13 @@ def test_rows_are_counted_and_not_kept() -> None:
     assert summary(rows(), SUITE).prompts[0].n == 100
 
 
+def test_one_is_one() -> None:
+    one = row(0, 0, ("PythonError", "NameError"))
+    assert "1 of 1 completion failed" in printed(render(summary([one], SUITE), title="x"))
+    with pytest.raises(BadInput, match=r"^0 of 1 completion judged, so there is nothing to count$"):
+        summary([], SUITE, scope=Scope({"Visit": 1}))
+
+
 def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:
     text = printed(render(summary([row(0, 0)], SUITE), title="x"))
     assert "interval" not in text
