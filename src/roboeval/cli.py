@@ -153,6 +153,9 @@ def tasks(
     task: Annotated[str | None, typer.Argument(help="Show this task.")] = None,
     suite: SuiteOption = "paper",
     lint: Annotated[bool, typer.Option("--lint", help="Look for faults; status 1 if there are any.")] = False,
+    accepted: Annotated[
+        bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
+    ] = False,
     new: Annotated[
         str | None, typer.Option(help="Start a task of this name in the folder of --suite.")
     ] = None,
@@ -166,11 +169,13 @@ def tasks(
             fail("name the folder of your own suite with --suite; the suite of the paper stays as it is")
         note(f"fill in {new_task(Path(suite), new)}; `roboeval tasks {new} --suite {suite}` shows it")
         return
+    if accepted and not lint:
+        fail("--accepted is about what --lint finds; add --lint")
     known = load(suite)
     if lint:
         if json:
             fail("--lint prints for people only; leave --json out")
-        lint_tasks(known, task)
+        lint_tasks(known, task, accepted=accepted)
     elif json:
         print_json(suite_data(known, None if task is None else known.task(task).name))
     elif task is not None:
@@ -344,14 +349,14 @@ def print_summary(
         print_rich(render(counted, title=title))
 
 
-def lint_tasks(suite: Suite, task: str | None) -> None:
+def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     """Print what the linter finds in all tasks or one; status 1 if anything is open."""
     from roboeval.lint import lint, render
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     linted = (lint(one, suite) for one in wanted)
     findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
-    print(render(findings))
+    print(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)
 

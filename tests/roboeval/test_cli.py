@@ -577,6 +577,18 @@ def test_tasks_are_listed_and_shown() -> None:
     assert refused("tasks", "Nonsense").startswith('the suite "paper" has no task "Nonsense"')
 
 
+def test_accepted_findings_are_shown_with_their_reasons() -> None:
+    linted = roboeval("tasks", "HalloweenShopping", "--lint")
+    assert linted.status == 0
+    assert re.fullmatch(
+        r"nothing was found but 1 finding that the task files accept; --accepted tells why\n", linted.out
+    )
+    shown = roboeval("tasks", "HalloweenShopping", "--lint", "--accepted")
+    assert shown.status == 0
+    assert re.search(r"HalloweenShopping.yaml:\d+: accepted: .* \[same-worlds: 4 and 5\]: \w+", shown.out)
+    assert refused("tasks", "--accepted") == "--accepted is about what --lint finds; add --lint"
+
+
 def test_help_costs_little() -> None:
     script = (
         "import resource, subprocess, sys\n"
