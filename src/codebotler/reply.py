@@ -16,6 +16,9 @@ from codebotler.skills import SKILLS
 def program_of(reply: str) -> Program:
     """The program that a model means by a whole reply.
 
+    Of several versions between fences, the last one that is complete is meant; what a model thinks aloud,
+    between `<think>` and `</think>`, is left out.
+
     Whole lines are kept or dropped, and a reply that was cut off stays cut off: only what is plainly no
     code, and a next example that a base model ran on into, is left out.
 
@@ -25,6 +28,8 @@ def program_of(reply: str) -> Program:
     lines = re.split(r"\r\n|\r|\n", reply)
     if _is_plain(lines):
         return Program(_text(lines))
+    reply = _THOUGHT.sub("", reply)
+    lines = re.split(r"\r\n|\r|\n", reply)
     blocks = tuple(_blocks(lines))
     chosen = _choose(blocks)
     if chosen is None:
@@ -53,6 +58,12 @@ class _Block:
 
 
 _ENTRY = re.compile(rf"(?:async\s+)?def\s+{TASK}\b|{TASK}\s*=(?!=)")
+_THOUGHT = re.compile(
+    r"""(?msx)
+      ^[ \t]* <think(?:ing)?> .*? (?: </think(?:ing)?> [ \t]*[\r\n]* | \Z)
+    | \A .*? </think(?:ing)?> [ \t]*[\r\n]*                 # the prompt began the thought
+    """
+)
 _FENCE = re.compile(r"(?P<indent>\s*)(?P<marks>`{3,}|~{3,})[^`]*$")
 _CODE = re.compile(
     r"""\s*(?:
@@ -197,11 +208,16 @@ def _without_next_example(lines: Sequence[str]) -> Sequence[str]:
 
 
 def _choose(blocks: Sequence[_Block]) -> _Block | None:
-    """The block that is the program: the first that defines it, or else one that could be meant as it."""
-    for block in blocks:
-        goes_on_from_prompt = block is blocks[0] and not block.fenced
-        if block.defines_task and (goes_on_from_prompt or not block.headless):
-            return block
+    """The block that is the program: one that defines it, or else one that could be meant as it.
+
+    Of several, an unfenced one at the start goes on from the prompt; else the last complete one is meant.
+    """
+    versions = [block for block in blocks if block.defines_task and not block.headless]
+    if blocks and not blocks[0].fenced and blocks[0].defines_task:
+        return blocks[0]
+    if versions:
+        whole = [block for block in versions if block.fenced and _tree_is_fine(block.lines)]
+        return [versions[0], *whole][-1]
     for block in blocks:
         if block.headless and any(_CODE.match(line) for line in block.lines[1:]):
             return block

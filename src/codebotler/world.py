@@ -175,6 +175,11 @@ class WorldFile(_Form):
             _regex(name, file, (*at, "rooms", index))
             if name in names[:index]:
                 raise file.wrong(f'the room "{name}" stands here twice; remove one', *at, "rooms", index)
+            room = self.rooms[index]
+            if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
+                point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
+                sentence = f'the robot would stand at {point}, outside of the footprint of "{name}"; move one'
+                raise file.wrong(sentence, *at, "rooms", index, "stand_at")
         self._check_places(file, at, names)
         return World(
             rooms=tuple(
@@ -213,6 +218,19 @@ class WorldFile(_Form):
                 _regex(person.name, file, (*here, "name"))
                 for number, answer in enumerate(person.answers):
                     _regex(answer, file, (*here, "answers", number))
+
+
+def _is_within(point: Point, corners: list[Point]) -> bool:
+    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
+    x, y = point
+    odd = False
+    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        is_beside = min(x1, x2) <= x <= max(x1, x2) and min(y1, y2) <= y <= max(y1, y2)
+        if is_beside and (x2 - x1) * (y - y1) == (y2 - y1) * (x - x1):
+            return True
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            odd = not odd
+    return odd
 
 
 def _regex(text: str, file: YamlFile, place: Place) -> None:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -45,7 +47,7 @@ def task_view(task: Task) -> RenderableType:
     return Group(*parts)
 
 
-def _section(title: str, lines: list[Text]) -> list[RenderableType]:
+def _section(title: str, lines: Sequence[RenderableType]) -> list[RenderableType]:
     return [Text(), Text(title, "bold"), *(Padding(line, (0, 0, 0, 2)) for line in lines)]
 
 
@@ -53,18 +55,39 @@ def _fact(fact: str, *, commonsense: bool) -> Text:
     return Text(f"{fact}{' (common sense: no prompt says it)' if commonsense else ''}")
 
 
-def _check(task: Task, index: int) -> Text:
+def _check(task: Task, index: int) -> RenderableType:
     check = task.checks[index]
     head = check.name + (f"({', '.join(check.parameters)})" if check.parameters else "")
-    return Text.assemble((head, "bold"), f"  {check.category}\n  ", (" ".join(check.rtl.split()), "dim"))
+    formula = _Formula(" ".join(check.rtl.split()), "dim")
+    return Group(Text.assemble((head, "bold"), f"  {check.category}"), Padding(formula, (0, 0, 0, 2)))
 
 
-def _world_lines(scenario: Scenario) -> list[Text]:
+@dataclass(frozen=True)
+class _Formula:
+    """A formula that is broken into lines where no text of it is torn."""
+
+    text: str
+    style: str = ""
+
+    def __rich_console__(self, _: Console, options: ConsoleOptions) -> Iterator[Text]:
+        line = ""
+        for part in _UNTORN.findall(self.text):
+            if line and len((line + part).rstrip()) > options.max_width:
+                yield Text(line.rstrip(), self.style)
+                line = ""
+            line += part
+        yield Text(line, self.style)
+
+
+_UNTORN = re.compile(r"""(?:r?"(?:\\.|[^"\\])*"|r?'(?:\\.|[^'\\])*'|[^\s"'(]+|\S)[(),]*\s*""")
+
+
+def _world_lines(scenario: Scenario) -> list[RenderableType]:
     world = scenario.world
-    lines = [_room(world, index) for index in range(len(world.rooms))]
+    lines: list[RenderableType] = [_room(world, index) for index in range(len(world.rooms))]
     if world.may_wait_forever:
         lines.append(Text("a program may wait here for ever", "italic"))
-    return [*lines, *(Text(f"requires {requirement.text}") for requirement in scenario.require)]
+    return [*lines, *(_Formula(f"requires {requirement.text}") for requirement in scenario.require)]
 
 
 def _room(world: World, index: int) -> Text:

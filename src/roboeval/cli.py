@@ -115,8 +115,8 @@ def show(
     from roboeval.tables import parse_selection
 
     judged_by = load(suite)
-    selection = parse_selection(what, judged_by)
     evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
+    selection = parse_selection(what, judged_by)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
         rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
@@ -153,6 +153,9 @@ def tasks(
     task: Annotated[str | None, typer.Argument(help="Show this task.")] = None,
     suite: SuiteOption = "paper",
     lint: Annotated[bool, typer.Option("--lint", help="Look for faults; status 1 if there are any.")] = False,
+    accepted: Annotated[
+        bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
+    ] = False,
     new: Annotated[
         str | None, typer.Option(help="Start a task of this name in the folder of --suite.")
     ] = None,
@@ -166,11 +169,13 @@ def tasks(
             fail("name the folder of your own suite with --suite; the suite of the paper stays as it is")
         note(f"fill in {new_task(Path(suite), new)}; `roboeval tasks {new} --suite {suite}` shows it")
         return
+    if accepted and not lint:
+        fail("--accepted is about what --lint finds; add --lint")
     known = load(suite)
     if lint:
         if json:
             fail("--lint prints for people only; leave --json out")
-        lint_tasks(known, task)
+        lint_tasks(known, task, accepted=accepted)
     elif json:
         print_json(suite_data(known, None if task is None else known.task(task).name))
     elif task is not None:
@@ -215,12 +220,14 @@ def import_(
     suite: SuiteOption = "paper",
 ) -> None:
     """Make a run of completions from elsewhere."""
+    from roboeval.records import how_many
     from roboeval.run import Run, open_source
 
     known = load(suite)
     count = Run(out).keep(open_source(path, known))
     again = command("evaluate", out, suite=suite)
-    note(f"{count:,} completions are in {out}; `{again}` judges them")
+    they = ("is", "it") if count == 1 else ("are", "them")
+    note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
 
 
 def refuse_what_comes_later(worlds: int | None, engine: str) -> None:
@@ -270,9 +277,19 @@ def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) 
     if not folder.completions.is_file():
         raise BadInput("is no run: it holds no completions.jsonl", file=run)
     if not folder.rows(key).is_file():
+        others = folder.judged_by()
+        if others and suite.name not in others:
+            judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
+            raise BadInput(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run)
         again = command("evaluate", run, suite=suite_name, ablated=ablated)
         raise BadInput(f"has not been judged; `{again}` does it", file=run)
     evaluation = Evaluation(folder, key)
+    if not folder.programs(key).is_file():
+        again = command("evaluate", run, *options_of(evaluation, suite), suite=suite_name, ablated=ablated)
+        raise BadInput(
+            f"is missing, so that nobody knows which programs were judged; `{again}` judges them again",
+            file=folder.programs(key),
+        )
     if evaluation.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     return evaluation
@@ -332,14 +349,14 @@ def print_summary(
         print_rich(render(counted, title=title))
 
 
-def lint_tasks(suite: Suite, task: str | None) -> None:
+def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     """Print what the linter finds in all tasks or one; status 1 if anything is open."""
     from roboeval.lint import lint, render
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     linted = (lint(one, suite) for one in wanted)
     findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
-    print(render(findings))
+    print(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)
 

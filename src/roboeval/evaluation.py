@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from codebotler.badinput import BadInput
-from roboeval.records import Completion, Key, name_of, read_judged
+from roboeval.records import Completion, Key, how_many, name_of, read_judged
 from roboeval.run import Run, load_head
 
 
@@ -61,12 +61,6 @@ class Evaluation:
 
     def __init__(self, run: Run, key: str) -> None:
         self.run, self.key = run, key
-        if not run.programs(key).is_file():
-            raise BadInput(
-                "is missing, so that nobody knows which programs were judged; "
-                f"`roboeval evaluate {run.path}` judges them again",
-                file=run.programs(key),
-            )
         self.head = load_head(run.head(key))
         tasks = self.head.get("tasks")
         if tasks is not None and not (isinstance(tasks, list) and all(isinstance(t, str) for t in tasks)):
@@ -115,4 +109,4 @@ class Evaluation:
     def unfinished(self) -> str | None:
         """What is to be said if there is more to judge than the rows that were read."""
         total = self.scope.total
-        return None if self.count >= total else f"{self.count:,} of {total:,} completions judged"
+        return None if self.count >= total else f"{self.count:,} of {how_many(total)} judged"

@@ -23,7 +23,7 @@ from codebotler.simulator.robot import resolve_room
 from roboeval.evaluate import judge
 from roboeval.names import absent_names
 from roboeval.satisfiability import Reasoner, Undecided, elements
-from roboeval.suite import Requirement, Scenario, Suite, Task
+from roboeval.suite import Check, Requirement, Scenario, Suite, Task
 from roboeval.taxonomy import Verdict
 from roboeval.witnesses import can_match, representative_texts, samples
 
@@ -72,7 +72,8 @@ class Finding:
         """As a line for a reader, with the path as seen from the current folder."""
         here = Path.cwd()
         path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
-        return f"{path}:{self.line or 1}: warning: {self.message} [{self.name}]"
+        what, why = ("warning", "") if self.accepted is None else ("accepted", f": {self.accepted}")
+        return f"{path}:{self.line or 1}: {what}: {self.message} [{self.name}]{why}"
 
 
 def lint_suite(suite: Suite, *, workers: int = 1) -> list[Finding]:
@@ -105,7 +106,7 @@ def lint(task: Task, suite: Suite, *, verdicts: Sequence[Verdicts] | None = None
     """
     if verdicts is None:
         verdicts = judged([task], suite)[task.name]
-    places = [_Place(task, where, scenario) for where, scenario in _scenarios(task)]
+    places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
     found = [
         *_unused(task),
         *_untripped(task, verdicts),
@@ -118,19 +119,21 @@ def lint(task: Task, suite: Suite, *, verdicts: Sequence[Verdicts] | None = None
     return [*(replace(one, accepted=reasons.get(one.name)) for one in ordered), *_stale(ordered, task)]
 
 
-def render(findings: Iterable[Finding]) -> str:
-    """Findings as lines for a reader, the accepted ones only counted.
+def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
+    """Findings as lines for a reader, and that there is none.
 
     Args:
         findings: what was found.
+        accepted: whether to tell also the accepted ones, with their reasons, rather than only count them.
     """
     every = [*findings]
-    lines = [one.told() for one in every if one.accepted is None]
-    if accepted := len(every) - len(lines):
-        lines.append(
-            f"{accepted} {'finding is' if accepted == 1 else 'findings are'} accepted by the task files"
-        )
-    return "\n".join(lines)
+    lines = [one.told() for one in every if accepted or one.accepted is None]
+    if hidden := len(every) - len(lines):
+        number = "1 finding" if hidden == 1 else f"{hidden} findings"
+        more = f"{number} more {'is' if hidden == 1 else 'are'} accepted by the task files"
+        none = f"nothing was found but {number} that the task files accept"
+        lines.append(f"{more if lines else none}; --accepted tells why")
+    return "\n".join(lines) or "nothing was found"
 
 
 def judged(tasks: Iterable[Task], suite: Suite, *, workers: int = 1) -> Mapping[str, list[Verdicts]]:
@@ -181,15 +184,19 @@ def recorded_programs(task: Task) -> list[str]:
 # --- the task as a whole
 
 
-def _scenarios(task: Task) -> Iterator[tuple[str, Scenario]]:
+def _scenarios(task: Task) -> Iterator[tuple[str, int, Scenario]]:
     for number, scenario in enumerate(task.scenarios, 1):
-        yield f"world {number}", scenario
+        yield f"world {number}", number, scenario
     for number, scenario in enumerate(task.ablation or (), 1):
-        yield f"the ablation of world {number}", scenario
+        yield f"the ablation of world {number}", number, scenario
+
+
+def _line_of_world(task: Task, number: int) -> int | None:
+    return YamlFile.read(task.path).line(("worlds", number - 1))
 
 
 def _unused(task: Task) -> Iterator[Finding]:
-    used = {requirement.check for _, scenario in _scenarios(task) for requirement in scenario.require}
+    used = {requirement.check for *_, scenario in _scenarios(task) for requirement in scenario.require}
     for check in task.checks:
         if check.name not in used:
             message = f'no world requires the check "{check.name}"; require it or remove it'
@@ -204,7 +211,7 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
         yield Finding("untripped", task.name, message, task.path, 1)
         return
     tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
-    required = [r for _, scenario in _scenarios(task) for r in scenario.require]
+    required = [r for *_, scenario in _scenarios(task) for r in scenario.require]
     for side, requirement in {_side(r): r for r in reversed(required)}.items():
         if side not in tripped:
             message = (
@@ -229,18 +236,20 @@ def _same_worlds(task: Task) -> Iterator[Finding]:
                     f'{where} {one} ("{first.world.about}")'
                 )
                 subject = f"{'ablation ' if ablated else ''}{one} and {other}"
-                line = second.require[0].line if second.require else 1
-                yield Finding("same-worlds", subject, message, task.path, line)
+                yield Finding("same-worlds", subject, message, task.path, _line_of_world(task, other))
 
 
 def _require_the_same(one: Scenario, other: Scenario) -> bool:
-    """Whether no sequence of events satisfies one and not the other; they may be written differently."""
+    """Whether no sequence of events satisfies one and not the other; they may be written differently.
+
+    Of two that nothing satisfies this is not said, unless they are written alike.
+    """
     first, second = ({r.formula: None for r in scenario.require} for scenario in (one, other))
     if first.keys() == second.keys():
         return True
     reasoner = Reasoner([*first, *second])
     try:
-        return all(
+        return reasoner.clash([*first]) is None and all(
             reasoner.trace([*held], denied) is None
             for held, others in ((first, second), (second, first))
             for denied in others
@@ -259,6 +268,7 @@ class _Place:
 
     task: Task
     where: str
+    number: int
     scenario: Scenario
 
     def findings(self) -> Iterator[Finding]:
@@ -280,7 +290,8 @@ class _Place:
                 yield self.unsatisfiable(involved, clash[1])
                 rest = [r for r in rest if r not in involved]
         except Undecided:
-            yield self.undecided(self.where, f"whether {self.where} can be satisfied", rest[0].line)
+            line = _line_of_world(self.task, self.number)
+            yield self.undecided(self.where, f"whether {self.where} can be satisfied", line)
         for requirement in rest:
             yield from self.implied(requirement, [r for r in rest if r is not requirement])
 
@@ -288,7 +299,8 @@ class _Place:
         subject = " and ".join(r.text for r in involved)
         together = "" if len(involved) == 1 else " together"
         message = f'no text was found with which "{subject}" can hold{together} in {self.where}{condition}'
-        return self.finding("unsatisfiable", subject, message, involved[-1].line)
+        line = involved[-1].line if condition or together else self.line_of_fault(involved[0])
+        return self.finding("unsatisfiable", subject, message, line)
 
     def implied(self, requirement: Requirement, others: Sequence[Requirement]) -> Iterator[Finding]:
         subject, line = requirement.text, requirement.line
@@ -304,7 +316,16 @@ class _Place:
                 f'no sequence of the texts that were tried breaks "{subject}" in {self.where}{unless}'
                 f"{clash[1]}; it may never be the only one to fail"
             )
-            yield self.finding("implied", subject, message, line)
+            fault = line if reasons or clash[1] else self.line_of_fault(requirement)
+            yield self.finding("implied", subject, message, fault)
+
+    def line_of_fault(self, requirement: Requirement) -> int | None:
+        """Where to mend what is wrong in any world: the check, unless arguments may be to blame."""
+        check = self.check(requirement)
+        return requirement.line if check.parameters else check.line
+
+    def check(self, requirement: Requirement) -> Check:
+        return next(check for check in self.task.checks if check.name == requirement.check)
 
     def undecided(self, subject: str, what: str, line: int | None) -> Finding:
         return self.finding("undecided", subject, f"{what} would take too long to find out", line)
@@ -340,7 +361,7 @@ class _Place:
         return [room.name for room in self.scenario.world.rooms]
 
     def dead(self, requirement: Requirement) -> Iterator[Finding]:
-        line = next(check.line for check in self.task.checks if check.name == requirement.check)
+        line = self.check(requirement).line
         for element in dict.fromkeys(elements(requirement.formula)):
             for text in _texts(element):
                 subject = f"{text} in {requirement.check}"

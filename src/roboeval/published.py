@@ -132,20 +132,28 @@ def _assigned(text: str, name: str) -> dict[str, str]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of odd escapes in texts
             statements = ast.parse(text).body
-        values = {
-            target.id: ast.literal_eval(statement.value)
-            for statement in statements
-            if isinstance(statement, ast.Assign)
-            for target in statement.targets
-            if isinstance(target, ast.Name) and target.id in ("name", "prompt", "completion")
-        }
     except SyntaxError as error:
         raise BadInput(f"is no Python ({error.msg})", file=name, line=error.lineno) from None
-    except (ValueError, RecursionError, MemoryError) as error:
-        raise BadInput(f"cannot be read as assignments of texts ({error})", file=name) from None
+    except (ValueError, RecursionError, MemoryError):
+        raise BadInput("is no readable Python; write plain assignments", file=name) from None
+    values = {
+        target.id: _value(statement, target.id, name)
+        for statement in statements
+        if isinstance(statement, ast.Assign)
+        for target in statement.targets
+        if isinstance(target, ast.Name) and target.id in ("name", "prompt", "completion")
+    }
     if not isinstance(values.get("completion"), str):
         raise BadInput("does not assign a text to `completion`", file=name)
     return {key: _joined(value) for key, value in values.items() if isinstance(value, str)}
+
+
+def _value(statement: ast.Assign, what: str, name: str) -> object:
+    try:
+        return ast.literal_eval(statement.value)
+    except (ValueError, TypeError, RecursionError, MemoryError):
+        sentence = f"`{what}` is no plain text; write the text out"
+        raise BadInput(sentence, file=name, line=statement.lineno) from None
 
 
 def _joined(text: str) -> str:

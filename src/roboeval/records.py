@@ -223,6 +223,11 @@ def name_of(key: Key) -> str:
     return "/".join(map(str, key))
 
 
+def how_many(count: int) -> str:
+    """A number of completions: `1 completion`, `2,000 completions`."""
+    return f"{count:,} completion{'s' * (count != 1)}"
+
+
 def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     """Every reply that a recorded model has for a suite's prompts, as completions.
 

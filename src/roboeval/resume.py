@@ -114,16 +114,25 @@ def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> None:
     was = load_head(path)
     changed = [name for name in about if was.get(name) != about[name]]
     if changed:
-        name = {"digest": "content of the suite", "codebotler": "version of this tool"}.get(
-            changed[0], changed[0]
-        )
-        then, now = _brief(was.get(changed[0])), _brief(about[changed[0]])
-        raise BadInput(f"was judged with another {name} ({then}, now {now}); --redo starts over", file=path)
+        name = changed[0]
+        then, now = _brief(name, was.get(name)), _brief(name, about[name])
+        what = f"{CALLED.get(name, name)} ({then}, now {now})"
+        raise BadInput(f"was judged with another {what}; --redo starts over", file=path)
 
 
+CALLED = {
+    "version": "version of the suite",
+    "digest": "content of the suite",
+    "rules": "set of rules",
+    "codebotler": "version of this tool",
+    "python": "version of Python",
+    "tasks": "selection of tasks",
+}
 LONGEST = 60  # characters of a value that a sentence can bear
 
 
-def _brief(value: object) -> str:
+def _brief(name: str, value: object) -> str:
     text = json.dumps(value)
+    if name == "tasks":
+        text = ", ".join(map(str, value)) if isinstance(value, list) else "all"
     return text if len(text) <= LONGEST else text[:LONGEST] + "..."

@@ -26,6 +26,8 @@ from roboeval.records import (
 )
 from roboeval.suite import Suite
 
+ABLATED = "-ablation"  # at the end of the name of an evaluation's files
+
 
 @dataclass(frozen=True)
 class Source:
@@ -59,6 +61,8 @@ def open_source(text: str, suite: Suite) -> Source:
     Raises:
         BadInput: there is no such thing.
     """
+    if not text:
+        raise BadInput("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
     if text.partition(":")[0] == "recorded" and not path.exists():
         return Source(lambda: recorded_completions(text, suite))
@@ -111,6 +115,11 @@ class Run:
     def head(self, key: str) -> Path:
         """The file that says by what the rows of an evaluation were judged."""
         return self.path / "evaluations" / f"{key}.json"
+
+    def judged_by(self) -> list[str]:
+        """The names of the suites by which it was judged, sorted."""
+        keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
+        return sorted({key.removesuffix(ABLATED) for key in keys})
 
     def source(self, suite: Suite | None = None) -> Source:
         """Its completions; with a suite, all must be of tasks and prompts of it."""
@@ -225,7 +234,7 @@ def load_head(path: Path) -> dict[str, Any]:
 
 def evaluation_key(suite: Suite, *, ablated: bool) -> str:
     """The name of an evaluation's files."""
-    return f"{suite.name}-ablation" if ablated else suite.name
+    return suite.name + ABLATED * ablated
 
 
 def tasks_to_judge(

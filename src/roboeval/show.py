@@ -260,17 +260,18 @@ def _told(program: Mapping[str, Any]) -> Text:
         often.append(f"{GONE}\n", "yellow")
     if program["passed"]:
         return often.append("passed", "green")
-    text = Text.assemble(often, kind_of(program["failure"]), f' in "{visible(program["world"])}"\n')
+    text = Text.assemble(often, kind_of(program["failure"]), f' in "{visible(program["world"])}"')
     if program["explanation"] is None:
-        return text.append(_error_sentence(program))
-    return text.append(
-        f"{visible(program['failure']['check'])}: {shortened(program['explanation'], EXPLANATION)}"
-    )
+        why = _error_sentence(program)
+    else:
+        why = f"{visible(program['failure']['check'])}: {shortened(program['explanation'], EXPLANATION)}"
+    return text.append(f"\n{why}" if why else "")
 
 
 def _error_sentence(verdict: Mapping[str, Any]) -> str:
-    where = "" if verdict["line"] is None else f"line {verdict['line']}: "
-    return where + shortened(verdict["error"]["message"])
+    """Where an error arose and what it says, of which either may be unknown."""
+    where = "" if verdict["line"] is None else f"line {verdict['line']}"
+    return ": ".join(filter(None, [where, shortened(verdict["error"]["message"])]))
 
 
 def completion_view(
@@ -279,7 +280,9 @@ def completion_view(
     """What `completion_data` says, for a person."""
     data = completion_data(row, completion, suite, ablated=ablated)
     lines = {world["line"] for world in data["worlds"] if not world["satisfied"]}
-    parts: list[RenderableType] = [_completion_head(data), Text(), *_program(data["program"], lines)]
+    parts: list[RenderableType] = [_completion_head(data)]
+    if data["program"] is not None:
+        parts += [Text(), *_program(data["program"], lines)]
     for number, world in enumerate(data["worlds"], 1):
         parts += [Text(), *_world(world, f"World {number} of {len(data['worlds'])}: ")]
     return Group(*parts)
@@ -291,13 +294,13 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
     head.append_text(Text("passed", "green") if why is None else kind_of(why))
     if data["model"] is not None:
         head.append(f"\nwritten by {visible(data['model'])}{by_hand([data['model']])}", "dim")
+    if data["program"] is None:
+        return head.append(f"\n{GONE}", "yellow")
     told = NOT_RECORDED if data["instruction"] is None else visible(data["instruction"])
     return head.append(f"\n{told}", "italic")
 
 
-def _program(program: str | None, marked: set[int | None]) -> list[RenderableType]:
-    if program is None:
-        return [Text(GONE, "yellow")]
+def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
     lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
     source = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
     syntax = Syntax(
@@ -333,4 +336,5 @@ def _ending(world: Mapping[str, Any]) -> Text:
     if world["error"] is None:
         return text
     allowed = " (allowed here)" if world["satisfied"] else ""
-    return text.append(f"{allowed}: {visible(world['error']['kind'])}, {_error_sentence(world)}")
+    told = ", ".join(filter(None, [visible(world["error"]["kind"]), _error_sentence(world)]))
+    return text.append(f"{allowed}: {told}")

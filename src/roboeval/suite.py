@@ -207,6 +207,7 @@ def read_task(file: YamlFile, path: Path, skills: SkillTable = SKILLS) -> Task:
     form = file.validate(TaskFile)
     if form.name != path.stem:
         raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"', "name")
+    _expect_different_worlds(form, file)
     checks = {check.name: check for check in _checks(form, file)}
     reader = _Reader(file, checks, skills)
     ablated = [world for world in form.worlds if world.ablation is not None]
@@ -228,6 +229,15 @@ def read_task(file: YamlFile, path: Path, skills: SkillTable = SKILLS) -> Task:
     )
 
 
+def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
+    numbers: dict[str, int] = {}
+    for number, world in enumerate(form.worlds, 1):
+        first = numbers.setdefault(world.about, number)
+        if first != number:
+            sentence = f'world {number} is about "{world.about}", as world {first} is'
+            raise file.wrong(f"{sentence}; say what is special in each", "worlds", number - 1, "about")
+
+
 def _checks(form: TaskFile, file: YamlFile) -> list[Check]:
     checks = []
     for head, body in form.checks.items():
@@ -235,6 +245,15 @@ def _checks(form: TaskFile, file: YamlFile) -> list[Check]:
         if match is None:
             raise file.wrong(f'"{head}" is no head of a check; write name or name(p1, p2)', "checks", head)
         parameters = tuple(p.strip() for p in match[2].split(",")) if match[2] else ()
+        for used in re.findall(r"\{([^\W\d]\w*)\}", body.rtl):
+            if used not in parameters:
+                known = f"its parameters are: {', '.join(parameters)}" if parameters else "it takes none"
+                sentence = f'the check "{match[1]}" has no parameter "{used}"; {known}'
+                raise file.wrong(sentence, "checks", head, "rtl")
+        for parameter in parameters:
+            if f"{{{parameter}}}" not in body.rtl:
+                sentence = f'the check "{match[1]}" does not use its parameter "{parameter}"'
+                raise file.wrong(f"{sentence}; write {{{parameter}}} in its rtl", "checks", head, "rtl")
         line = file.line(("checks", head))
         checks.append(Check(match[1], parameters, body.category, body.rtl, body.commonsense, line))
     return checks

@@ -9,13 +9,14 @@ from typing import Any
 
 from rich import box
 from rich.columns import Columns
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from codebotler.badinput import BadInput
 from roboeval.evaluation import Scope
 from roboeval.metrics import Estimate, PromptScore, TaskScore, overall, score_by_prompt
+from roboeval.records import how_many
 from roboeval.suite import Suite
 from roboeval.tables import Row, by_hand, grid, visible
 from roboeval.taxonomy import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, ROBOT_KINDS, TASK
@@ -116,7 +117,7 @@ def summary(
     scored = {score.task: score for score in score_by_prompt(results())}
     scope = scope or Scope(judged)
     if not judged:
-        raise BadInput(f"0 of {scope.total:,} completions judged, so there is nothing to count")
+        raise BadInput(f"0 of {how_many(scope.total)} judged, so there is nothing to count")
     tasks = tuple(scored[name] for name in dict.fromkeys([*suite.tasks, *scored]) if name in scored)
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
@@ -164,10 +165,10 @@ def render(summary: Summary, *, title: str) -> RenderableType:
     n, failed = _judged(summary.prompts), sum(each.count for each in summary.failures)
     parts: list[RenderableType] = [head]
     if n != summary.scope.total:
-        parts.append(Text(f"{n:,} of {summary.scope.total:,} completions judged", style="yellow"))
-    parts += [Text(), _task_table(summary), Text(), *_overall(summary), *_missed(summary.missing)]
+        parts.append(Text(f"{n:,} of {how_many(summary.scope.total)} judged", style="yellow"))
+    parts += [Text(), _TaskTable(summary), Text(), *_overall(summary), *_missed(summary.missing)]
     if failed:
-        told = f"{failed:,} of {n:,} completions failed ({failed / n:.1%}); shares are of all completions:"
+        told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all completions:"
         tables = Columns([_failure_table(each) for each in summary.failures], padding=(1, 3))
         parts += [Text(), Text(told), Text(), tables]
     return Group(*parts)
@@ -187,18 +188,40 @@ def _judged(prompts: Iterable[PromptScore]) -> int:
     return sum(prompt.n for prompt in prompts)
 
 
-def _task_table(summary: Summary) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("task", overflow="fold")
-    passes = [f"pass@{k}" for k in summary.k]
-    for name in ["completions", *passes, "worst prompt", "best prompt"]:
-        table.add_column(name, justify="right", no_wrap=True)
-    for task in summary.tasks:
-        means = [task.pass_at(k).mean for k in summary.k]
-        shares = [*means, task.lowest(summary.k[0]), task.highest(summary.k[0])]
-        cells = [Text(f"{share:.2f}", _mood(share)) for share in shares]
-        table.add_row(Text(visible(task.task)), f"{_judged(task.prompts):,}", *cells)
-    return table
+@dataclass(frozen=True)
+class _TaskTable:
+    """The scores of tasks; where there is no room for all columns, names of tasks stay whole."""
+
+    summary: Summary
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Table]:
+        boundless = options.update(max_width=10_000)
+        tables = list(self._tables())
+        fitting = (t for t in tables if console.measure(t, options=boundless).maximum <= options.max_width)
+        yield next(fitting, tables[-1])
+
+    def _tables(self) -> Iterator[Table]:
+        """The table with fewer and fewer columns."""
+        passes = [f"pass@{k}" for k in self.summary.k]
+        yield self._table("completions", *passes, "worst prompt", "best prompt")
+        yield self._table("completions", *passes, "worst\nprompt", "best\nprompt")
+        yield self._table("completions", *passes)
+        for count in range(len(passes), 0, -1):
+            yield self._table(*passes[:count])
+
+    def _table(self, *columns: str) -> Table:
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+        table.add_column("task", overflow="fold")
+        for name in columns:
+            table.add_column(name, justify="right", no_wrap=True)
+        first = self.summary.k[0]
+        for task in self.summary.tasks:
+            shares = {f"pass@{k}": task.pass_at(k).mean for k in self.summary.k}
+            shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
+            cells = {name: Text(f"{share:.2f}", _mood(share)) for name, share in shares.items()}
+            cells["completions"] = Text(f"{_judged(task.prompts):,}")
+            table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))
+        return table
 
 
 def _mood(share: float) -> str:

@@ -18,6 +18,7 @@ from roboeval.suite import Suite
 Row: TypeAlias = Mapping[str, Any]
 
 NOT_RECORDED = "instruction not recorded"
+ALL_GONE = "the programs that were judged no longer stand in this run"
 
 
 # --- a part of a run
@@ -126,6 +127,7 @@ def prompt_head(prompt: int, rows: Sequence[Row], written: Mapping[Key, Completi
         "instructions": list(dict.fromkeys(c.instruction for c in those if c.instruction is not None)),
         "models": list(dict.fromkeys(c.model for c in those if c.model is not None)),
         "completions": len(rows),
+        "gone": len(rows) - len(those),
         "passed": passed,
         "pass@1": passed / len(rows),
     }
@@ -166,6 +168,8 @@ def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
     """What `prompt_head` says, for a person."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
     head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
+    if prompt["gone"] == prompt["completions"]:
+        return [head, Text(ALL_GONE, "yellow")]
     return [head, *(Text(visible(text), "italic") for text in prompt["instructions"] or [NOT_RECORDED])]
 
 

@@ -19,6 +19,7 @@ RECORDED = [
 UNPARSABLE = {"SyntaxError", "IndentationError"}
 
 TASK = 'def task_program():\n    go_to("kitchen")\n    say("hello")\n'
+OTHER = 'def task_program():\n    say("other")\n'
 BODY = '    go_to("kitchen")\n    say("hello")\n'
 CUT_OFF = 'def task_program():\n    go_to("kitchen")\n    say("hel'
 HELPER = "def rooms():\n    return get_all_rooms()\n"
@@ -82,7 +83,16 @@ def test_recorded_programs_survive_chat(program: str, fails: str | None) -> None
         "Like this:\n\n    " + TASK.replace("\n", "\n    ").rstrip(" ") + "\nThat is all.\n",
         "1. The program:\n   " + fenced(TASK).replace("\n", "\n   "),
         "Install it:\n" + fenced("pip install robot\n", "bash") + "Then:\n" + fenced(TASK),
-        fenced(TASK) + "Or shorter:\n" + fenced('def task_program():\n    say("other")\n'),
+        fenced(OTHER) + "Or better:\n" + fenced(TASK),
+        fenced(TASK) + "Or better:\n" + fenced(CUT_OFF + "\n").removesuffix("```\n"),
+        fenced(TASK) + "Call it:\n" + fenced("task_program()\n"),
+        BODY + "```\n\n# Task: say other\n" + fenced(OTHER),
+        TASK + "```\n\n# Task: say other\n" + fenced(OTHER),
+        "<think>\nPerhaps\n" + fenced(OTHER) + "or not.\n</think>\n\n" + fenced(TASK),
+        "<think>" + OTHER + "</think>" + TASK,
+        " <thinking>\n" + OTHER + "</thinking>\n" + BODY,
+        OTHER + "\nThat may do.</think>\n\nHere it is:\n" + TASK,
+        fenced(TASK) + "<think>\n" + fenced(OTHER) + "\nHm, ",
         BODY,
         BODY.lstrip(),
         fenced(BODY),
@@ -131,6 +141,12 @@ def test_text_that_looks_like_prose_or_fences_stays_in_a_string() -> None:
     assert source(program) == program
 
 
+def test_thoughts_that_end_in_nothing_are_no_program() -> None:
+    assert source("<think>\n" + fenced(TASK)) == ""
+    kept = 'def task_program():\n    say("""\n<think> is a tag, and so is\n</think>\n""")\n'
+    assert source(kept) == kept
+
+
 def test_other_blocks_come_along_only_where_needed() -> None:
     unused = "def unused():\n    pass\n"
     stub = "def go_to(room):\n    pass\n"
@@ -138,8 +154,8 @@ def test_other_blocks_come_along_only_where_needed() -> None:
     assert source(fenced(HELPER) + "and\n" + fenced(unused) + fenced(stub) + fenced(USES_HELPER)) == needed
     assert source(fenced(USES_HELPER) + fenced(HELPER)) == f"{USES_HELPER}\n\n{HELPER}"
     assert source(fenced(HELPER) + fenced("rooms = list\n") + fenced(USES_HELPER)) == needed
-    assert source(fenced(HELPER + TASK) + fenced(USES_HELPER)) == HELPER + TASK
-    assert source(fenced(USES_HELPER) + fenced(HELPER + TASK)) == USES_HELPER
+    assert source(fenced(HELPER + TASK) + fenced(USES_HELPER)) == USES_HELPER
+    assert source(fenced(USES_HELPER) + fenced(HELPER + TASK)) == HELPER + TASK
 
 
 def test_helpers_of_helpers_come_along() -> None:

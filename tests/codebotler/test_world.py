@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -113,6 +114,10 @@ REGEX = 'w.yaml, line {}: "{}" is no valid regular expression: {}'
                 "write a smaller one, or put quotes around a text"
             ),
         ),
+        (
+            GOOD + "  - name: a\n    footprint: [[0, 0], [4, 0], [4, 3], [0, 3]]\n    stand_at: [4.5, 1]\n",
+            'w.yaml, line 7: the robot would stand at (4.5, 1), outside of the footprint of "a"; move one',
+        ),
         ("robot: hall\nrooms: !!set {hall}\n", 'w.yaml, line 2: the tag "set" is not supported; remove it'),
         (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", "w.yaml, line 5: this entry is a text, not a number"),
         (GOOD + "  - hall\n", 'w.yaml, line 5: the room "hall" stands here twice; remove one'),
@@ -194,6 +199,32 @@ def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(text
     assert str(caught.value) == sentence
 
 
+@pytest.mark.parametrize(
+    ("point", "is_within"),
+    [
+        ((1, 1), True),
+        ((5, 1), True),
+        ((1, 5), True),
+        ((5, 5), False),
+        ((2, 4), True),
+        ((0, 3), True),
+        ((6, 2), True),
+        ((6, 6), False),
+        ((-1, 2), False),
+        ((7, 0), False),
+        ((2, 6.1), False),
+    ],
+)
+def test_the_robot_stands_within_a_room_of_any_shape(point: tuple[float, float], *, is_within: bool) -> None:
+    corner = "[[0, 0], [6, 0], [6, 2], [2, 2], [2, 6], [0, 6]]"  # 2 m wide, around a corner
+    text = f"robot: a\nrooms: [{{name: a, footprint: {corner}, stand_at: [{point[0]}, {point[1]}]}}]\n"
+    if is_within:
+        assert read(text).rooms[0].stand_at == point
+    else:
+        with pytest.raises(BadInput, match="outside of the footprint"):
+            read(text)
+
+
 def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "w.yaml"
     path.write_text("robot: attic\nrooms: [hall]\n", encoding="utf-8")
@@ -223,14 +254,21 @@ ROOMS = st.builds(
     people=st.lists(st.builds(Person, NAMES, st.lists(REGEXES, max_size=3).map(tuple)), max_size=2).map(
         tuple
     ),
-    footprint=st.none() | st.lists(POINTS, min_size=3, max_size=5).map(tuple),
     stand_at=st.none() | POINTS,
+)
+MEASURED = st.builds(
+    lambda room, corners, stands: replace(
+        room, footprint=tuple(corners), stand_at=corners[0] if stands else None
+    ),
+    ROOMS,
+    st.lists(POINTS, min_size=3, max_size=5),
+    st.booleans(),
 )
 
 
 @st.composite
 def worlds(draw: st.DrawFn) -> World:
-    rooms = draw(st.lists(ROOMS, min_size=1, max_size=4, unique_by=lambda room: room.name))
+    rooms = draw(st.lists(ROOMS | MEASURED, min_size=1, max_size=4, unique_by=lambda room: room.name))
     start = draw(st.sampled_from(rooms)).name
     return World(tuple(rooms), start, draw(TEXTS), may_wait_forever=draw(st.booleans()))
 

@@ -69,6 +69,11 @@ def test_a_missing_file(tmp_path: Path) -> None:
     )
 
 
+def test_an_empty_name() -> None:
+    for verb in (("evaluate",), ("import", "--out", "run")):
+        assert refused(*verb, "") == "nothing is named; name a run, a .jsonl, or a folder or zip of .py"
+
+
 def test_an_empty_file(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("")
     assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl: there is no completion in it"
@@ -185,7 +190,7 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
     (folder / "SayGoodDay_0_0.py").write_text(
         f"completion = open({str(marker)!r}, 'w').write('x') and 'program'\n"
     )
-    assert "cannot be read as assignments of texts" in refused("evaluate", folder)
+    assert "line 1: `completion` is no plain text; write the text out" in refused("evaluate", folder)
     assert not marker.exists()
 
 
@@ -349,6 +354,22 @@ def test_a_run_that_was_not_judged(tmp_path: Path) -> None:
     assert refused("show", "nothing", cwd=tmp_path) == "nothing: is no run: it holds no completions.jsonl"
 
 
+def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
+    roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
+    (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", "--suite", "mine", cwd=tmp_path).status == 0
+    for asked in (("export", "run"), ("show", "run", "--ablation"), ("show", "run", "MakeTea")):
+        sentence = refused(*asked, cwd=tmp_path)
+        assert sentence == 'run: was judged by the suite "mine", not by "paper"; name it with --suite'
+    (tmp_path / "run" / "evaluations" / "mine.sha256").unlink()
+    sentence = refused("show", "run", "--suite", "mine", cwd=tmp_path)
+    assert sentence.startswith(
+        "run/evaluations/mine.sha256: is missing, so that nobody knows which programs were"
+    )
+    assert pasted(sentence, tmp_path).status == 0
+    assert roboeval("show", "run", "--suite", "mine", cwd=tmp_path).status == 0
+
+
 # --- what it is for
 
 
@@ -410,7 +431,8 @@ def test_commands_in_sentences_can_be_pasted(tmp_path: Path) -> None:
 
 def test_commands_in_sentences_say_what_was_ablated(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
-    roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
+    imported = roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
+    assert "1 completion is in run" in imported.err
     unjudged = refused("show", "run", "--ablation", cwd=tmp_path)
     assert unjudged == "run: has not been judged; `roboeval evaluate run --ablation` does it"
     judged = pasted(unjudged, tmp_path)
@@ -553,6 +575,18 @@ def test_tasks_are_listed_and_shown() -> None:
     shown = roboeval("tasks", "LunchBreak").out
     assert "requires not tells_after_asking" in shown
     assert refused("tasks", "Nonsense").startswith('the suite "paper" has no task "Nonsense"')
+
+
+def test_accepted_findings_are_shown_with_their_reasons() -> None:
+    linted = roboeval("tasks", "HalloweenShopping", "--lint")
+    assert linted.status == 0
+    assert re.fullmatch(
+        r"nothing was found but 1 finding that the task files accept; --accepted tells why\n", linted.out
+    )
+    shown = roboeval("tasks", "HalloweenShopping", "--lint", "--accepted")
+    assert shown.status == 0
+    assert re.search(r"HalloweenShopping.yaml:\d+: accepted: .* \[same-worlds: 4 and 5\]: \w+", shown.out)
+    assert refused("tasks", "--accepted") == "--accepted is about what --lint finds; add --lint"
 
 
 def test_help_costs_little() -> None:

@@ -102,14 +102,14 @@ def test_a_requirement_that_cannot_hold(linted: Lint) -> None:
     (finding,) = linted({"odd": 'tr.Exists(say("a")) and not tr.Exists(say("a|b"))'}, ["odd"])
     assert finding.name == "unsatisfiable: odd"
     assert finding.message == 'no text was found with which "odd" can hold in world 1'
-    assert finding.line == 13
+    assert finding.line == 5  # of the check, which can hold in no world
     assert linted({"even": 'tr.Exists(say("a|b")) and not tr.Exists(say("a"))'}, ["even"]) == []
 
 
 def test_requirements_that_cannot_hold_together(linted: Lint) -> None:
     checks = {"goes": GOES, "stays": STAYS, "speaks": SPEAKS}
     (finding,) = linted(checks, ["speaks", "goes", "stays"])
-    assert finding.name == "unsatisfiable: goes and stays"
+    assert (finding.name, finding.line) == ("unsatisfiable: goes and stays", 15)
     assert linted(checks, ["speaks", "goes"], ["stays", "speaks"]) == []
 
 
@@ -117,6 +117,7 @@ def test_what_needs_a_visit_to_an_absent_room_can_hold_only_if_requests_are_odd(
     checks = {"greets": 'tr.ActAtFirst("lobby", say("hello"))'}
     findings = linted(checks, ["greets"])
     assert names(findings) == ["absent: lobby in greets", "unsatisfiable: greets"]
+    assert [one.line for one in findings] == [13, 13]
     assert findings[1].message.endswith("as long as each visit names one room of the world")
 
 
@@ -144,12 +145,17 @@ def test_a_requirement_that_always_holds(linted: Lint) -> None:
     (finding,) = linted({"any": 'tr.AtLeast(say("a"), 0)'}, ["any"])
     tried = 'no sequence of the texts that were tried breaks "any" in world 1'
     assert finding.message == f"{tried}; it may never be the only one to fail"
+    assert finding.line == 5
+    checks = {"none(x)": 'tr.AtLeast(say("{x}"), 0)', "speaks": SPEAKS}
+    found = linted(checks, ["speaks"], ['none("b")', "speaks"])
+    assert [(one.name, one.line) for one in found if one.kind == "implied"] == [('implied: none("b")', 22)]
 
 
 def test_what_takes_too_long_is_said(linted: Lint) -> None:
     started = time.monotonic()
     findings = linted({"many": 'tr.Count(say("a"), 1000000000)', "speaks": SPEAKS}, ["many", "speaks"])
-    assert names(findings) == ["undecided: many", "undecided: speaks", "undecided: world 1"]
+    assert names(findings) == ["undecided: world 1", "undecided: many", "undecided: speaks"]
+    assert [one.line for one in findings] == [9, 14, 14]
     assert time.monotonic() - started < 10
     assert linted({"some": 'tr.Count(say("a"), 100)'}, ["some"]) == []
 
@@ -339,6 +345,12 @@ def test_worlds_that_require_the_same_in_other_words(linted: Lint) -> None:
         assert "same-worlds" not in [each.kind for each in linted(checks, one, other)]
 
 
+def test_worlds_that_cannot_be_satisfied_do_not_require_the_same(linted: Lint) -> None:
+    checks = {"goes": GOES, "stays": STAYS, "speaks": SPEAKS}
+    found = linted(checks, ["goes", "stays", "speaks"], ["goes", "not goes"], ["speaks"])
+    assert {one.kind for one in found} == {"unsatisfiable"}
+
+
 def test_worlds_of_an_ablation_that_require_the_same(linted: Lint) -> None:
     def ablated(*texts: str) -> list[str]:
         require = "\n    ".join(("require: {require}", "ablation: [" + ", ".join(texts) + "]"))
@@ -353,7 +365,7 @@ def test_worlds_of_an_ablation_that_require_the_same(linted: Lint) -> None:
 def test_worlds_that_require_the_same(linted: Lint) -> None:
     checks = {"speaks": SPEAKS, "goes": GOES}
     (finding,) = linted(checks, ["speaks", "goes"], ["speaks"], ["goes", "speaks"])
-    assert finding.name == "same-worlds: 1 and 3"
+    assert (finding.name, finding.line) == ("same-worlds: 1 and 3", 25)  # where world 3 begins
     assert linted(checks, ["speaks"], ["not speaks"], ["goes"]) == []
 
 
@@ -377,9 +389,16 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     line = 'Hello.yaml:6: warning: no world requires the check "goes"; require it or remove it [unused: goes]'
     assert render(findings) == line
     accepted = replace(findings[0], accepted="for later")
-    assert render([*findings, accepted]) == f"{line}\n1 finding is accepted by the task files"
-    assert render([accepted, accepted]) == "2 findings are accepted by the task files"
-    assert render([]) == ""
+    assert render([*findings, accepted]) == (
+        f"{line}\n1 finding more is accepted by the task files; --accepted tells why"
+    )
+    assert render([accepted, accepted]) == (
+        "nothing was found but 2 findings that the task files accept; --accepted tells why"
+    )
+    told = line.replace("warning", "accepted") + ": for later"
+    assert render([*findings, accepted], accepted=True) == f"{line}\n{told}"
+    assert render([accepted], accepted=True) == told
+    assert render([], accepted=True) == render([]) == "nothing was found"
     monkeypatch.chdir(tmp_path / "suite0" / "recorded")
     assert render(findings).startswith(f"{path}:6: ")
 
@@ -419,7 +438,8 @@ def of_paper() -> list[Finding]:
 
 def test_the_papers_suite_has_no_open_finding(of_paper: list[Finding]) -> None:
     assert [one.name for one in of_paper if one.accepted is None] == []
-    assert render(of_paper) == f"{len(of_paper)} findings are accepted by the task files"
+    told = f"nothing was found but {len(of_paper)} findings that the task files accept; --accepted tells why"
+    assert render(of_paper) == told
 
 
 def test_a_finding_of_the_papers_suite_comes_back(paper: Suite) -> None:

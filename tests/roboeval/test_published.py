@@ -53,7 +53,9 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
         ("prompt = 'p'\n", "{}: does not assign a text to `completion`"),
         ("completion = 3\n", "{}: does not assign a text to `completion`"),
         ("a = 1\ncompletion = 'x\n", "{}, line 2: is no Python (unterminated string literal (detected"),
-        ("completion = f'{x}'\n", "{}: cannot be read as assignments of texts (malformed node or string"),
+        ("a = 1\ncompletion = f'{x}'\n", "{}, line 2: `completion` is no plain text; write the text out"),
+        ("name = n()\ncompletion = 'x'\n", "{}, line 1: `name` is no plain text; write the text out"),
+        ("completion = " + "-" * 100_000 + "1\n", "{}: is no readable Python; write plain assignments"),
         (b"a = 1\ncompletion = '\xff'\n", "{}, line 2: is no UTF-8 text; save it as UTF-8"),
         (b"#" * 5_000_001, "{}: is larger than 5,000,000 bytes"),
         (

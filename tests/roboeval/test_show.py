@@ -168,6 +168,15 @@ def test_the_line_of_an_error_is_marked_and_that_of_an_allowed_timeout_is_not() 
     assert "satisfied, timeout (allowed here): TimeoutError, line 1: 1,000 skill calls" in text
 
 
+def test_an_error_without_a_message_is_told_by_its_kind_and_line() -> None:
+    for line, where in ((2, ", line 2"), (None, "")):
+        full = row(completion(), failed(Status.KILLED, "MemoryError", "", line=line))
+        text = printed(completion_view(full, completion(), SUITE))
+        assert f"\nnot satisfied, killed: MemoryError{where}\n" in text
+        text = printed(prompt_view([full], [completion()], SUITE, "Visit", 0))
+        assert text.endswith('MemoryError in "amy is in"' + ("\n     line 2" if line else ""))
+
+
 def test_lines_keep_their_numbers_whatever_ends_them() -> None:
     written = completion(program="\n\r\n\rx = (\n\n\n")
     text = printed(completion_view(row(written, LOST), written, SUITE))
@@ -178,9 +187,20 @@ def test_lines_keep_their_numbers_whatever_ends_them() -> None:
 @pytest.mark.parametrize("written", [None, completion(program="")])
 def test_what_was_not_recorded_is_said_and_not_taken_from_the_suite(written: Completion | None) -> None:
     text = printed(completion_view(row(completion(), FINE), written, SUITE))
-    assert "instruction not recorded" in text
+    assert ("instruction not recorded" in text) == (written is not None)
     assert "Visit Amy." not in text
     assert ("the program that was judged no longer stands in this run" in text) == (written is None)
+
+
+def test_of_a_prompt_it_is_said_what_is_gone_and_what_was_not_recorded() -> None:
+    gone, unknown = "the programs that were judged no longer stand in this run", "instruction not recorded"
+    for written, told, untold in ([], gone, unknown), (THREE[:1], unknown, gone):
+        for text in (
+            printed(task_view(ROWS, written, SUITE, "Visit")),
+            printed(prompt_view(ROWS, written, SUITE, "Visit", 0)),
+        ):
+            assert told in text
+            assert untold not in text
 
 
 def test_a_completion_as_data_holds_every_step() -> None:

@@ -67,6 +67,22 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
             'says("bye")]\n    ablation: []\n  - {about: b, robot: r, rooms: [r], require: [goes]}\n',
             "line 7: some worlds have an ablation and some have none",
         ),
+        (
+            'say("{what}")',
+            'say("{waht}")',
+            'line 6: the check "says" has no parameter "waht"; its parameters are: what',
+        ),
+        ("tr.Exists(goto(", 'tr.Exists(goto("{room}",', 'line 5: the check "goes" has no parameter "room"'),
+        (
+            'say("{what}")',
+            'say("x{3}")',
+            'line 6: the check "says" does not use its parameter "what"; write {what} in its rtl',
+        ),
+        (
+            'says("bye")]\n',
+            'says("bye")]\n  - robot: r\n    about: one\n    rooms: [r]\n    require: [goes]\n',
+            'line 13: world 2 is about "one", as world 1 is; say what is special in each',
+        ),
         ("require: [goes,", "demand: [goes,", 'line 8: the key "require" is missing'),
         ("robot: kitchen", "robot: hall", 'line 9: the robot starts in "hall", but the rooms are: kitchen'),
         ("summary: s", "summary: s\nsummary: t", 'line 3: the key "summary" stands here a second time'),

@@ -80,6 +80,29 @@ def test_the_tables_fit_and_break_no_number(width: int) -> None:
     assert "ExhaustiveSearch" in text
 
 
+@pytest.mark.parametrize(
+    ("width", "columns"),
+    [
+        (100, "completions pass@1 pass@2 worst prompt best prompt"),
+        (80, "completions pass@1 pass@2 worst prompt best prompt"),
+        (70, "completions pass@1 pass@2 prompt prompt"),
+        (60, "completions pass@1 pass@2"),
+        (40, "pass@1 pass@2"),
+        (30, "pass@1"),
+        (20, "pass@1"),
+    ],
+)
+def test_task_names_stay_whole_and_columns_go_where_there_is_little_room(width: int, columns: str) -> None:
+    name = "HalloweenShopping"
+    suite = replace(SUITE, tasks={name: replace(TASK, name=name)})
+    rows = [row(0, index, task=name) for index in range(2)]
+    text = printed(render(summary(rows, suite, k=(1, 2)), title="x"), width)
+    assert max(map(len, text.splitlines())) <= width
+    assert ("\n" + name in text) == (width > 20)
+    (head,) = [line for line in text.splitlines() if line.startswith("task")]
+    assert " ".join(head.split()) == f"task {columns}"
+
+
 def test_tasks_without_a_score_are_told_apart() -> None:
     suite = replace(SUITE, tasks={name: replace(TASK, name=name) for name in ("Visit", "A", "B", "C")})
     scope = Scope({"Visit": 9, "B": 2, "C": 5}, frozenset({"Visit", "A", "B"}))
@@ -113,6 +136,13 @@ def test_rows_are_counted_and_not_kept() -> None:
             assert sum(ref() is not None for ref in alive) <= 2
 
     assert summary(rows(), SUITE).prompts[0].n == 100
+
+
+def test_one_is_one() -> None:
+    one = row(0, 0, ("PythonError", "NameError"))
+    assert "1 of 1 completion failed" in printed(render(summary([one], SUITE), title="x"))
+    with pytest.raises(BadInput, match=r"^0 of 1 completion judged, so there is nothing to count$"):
+        summary([], SUITE, scope=Scope({"Visit": 1}))
 
 
 def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:

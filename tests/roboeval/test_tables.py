@@ -23,6 +23,7 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
         "instructions": ["Visit her."],
         "models": [],
         "completions": 2,
+        "gone": 0,
         "passed": 1,
         "pass@1": 0.5,
         "failures": [failure],
@@ -33,7 +34,8 @@ def test_a_task_is_shown_prompt_by_prompt() -> None:
 
 
 def test_an_instruction_that_nobody_recorded_is_never_taken_from_the_suite() -> None:
-    text = printed(tables.task_view(ROWS, [], SUITE, "Visit"))
+    completions = [Completion(task="Visit", prompt=prompt, index=0, program="") for prompt in range(2)]
+    text = printed(tables.task_view(ROWS, completions, SUITE, "Visit"))
     assert text.count("instruction not recorded") == 2
     assert "Go to Alice." not in text
 

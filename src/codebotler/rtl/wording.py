@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from codebotler.rtl.choice import PLAIN, choices
 from codebotler.rtl.formula import Element, Regex, Text, Without, Words, compile_regex
 
 if TYPE_CHECKING:
@@ -179,7 +180,9 @@ def room(pattern: str) -> str:
         pattern: the regex.
     """
     names = literals(pattern)
-    return listed([room_name(name) for name in names], "or") if names else f"a room matching /{pattern}/"
+    if not names:
+        return f"a room matching the pattern /{pattern}/"
+    return listed([room_name(name) for name in names], "or")
 
 
 def room_name(name: str) -> str:
@@ -253,9 +256,8 @@ def literals(pattern: str) -> list[str]:
     Args:
         pattern: the regex.
     """
-    names = [re.sub(r"\\(\W)", r"\1", part) for part in pattern.split("|")]
-    plain = re.fullmatch(r"(?:[^\\.^$*+?{}\[\]()]|\\[^\w|])*", pattern)
-    return names if plain and all(name and name == name.strip() for name in names) else []
+    found = choices(pattern)
+    return [*found[PLAIN]] if [*found] == [PLAIN] else []
 
 
 def _qualities(text: Text) -> list[str]:
@@ -269,19 +271,17 @@ def _qualities(text: Text) -> list[str]:
                 return []
             if start := _forbidden_start(pattern):
                 return [f'not starting with "{listed(literals(start.removesuffix(_END_OF_WORD)), "or")}"']
-            return [f"with {named}" if (named := _named(pattern)) else f"matching /{pattern}/"]
+            return [f"with {named}" if (named := _named(pattern)) else f"matching the pattern /{pattern}/"]
 
 
 def _named(pattern: str) -> str:
-    if names := literals(pattern):
-        return f'"{listed(names, "or")}"'
-    inner = re.fullmatch(r"\\b(?:\(\?:)?(.+?)\)?\\b", pattern)
-    return f'the word "{listed(names, "or")}"' if inner and (names := literals(inner[1])) else ""
+    phrases = [place.format(listed(texts, "or")) for place, texts in choices(pattern).items()]
+    return listed(phrases, "or")
 
 
 def _word(pattern: str) -> str:
     names = literals(pattern)
-    return f'the word "{listed(names, "or")}"' if names else f"words matching /{pattern}/"
+    return f'the word "{listed(names, "or")}"' if names else f"words matching the pattern /{pattern}/"
 
 
 def _forbidden_start(pattern: str) -> str:

@@ -316,6 +316,10 @@ FAILS: dict[str, tuple[str, object]] = {
         "def task_program(robot):\n    say('a')\n",
         (P, "TypeError", "task_program() missing 1 required positional argument: 'robot'"),
     ),
+    "task that nobody awaits": (
+        "async def task_program():\n    say('a')\n",
+        (P, "TypeError", "task_program is a coroutine, which nobody awaits; write def, not async def"),
+    ),
     "no task": ("def main():\n    say('a')\n", (P, "NameError", "name 'task_program' is not defined")),
     "nothing": ("", (P, "NameError", "name 'task_program' is not defined")),
     "simulator is hidden": (task("robot.go_to('x')"), (P, "NameError", "name 'robot' is not defined")),

@@ -28,6 +28,8 @@ __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will d
 RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1002
 HEADROOM = 50  # for what a skill calls, so that the limit is met by the program, not on the way to the robot
 
+UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not async def"
+
 
 class Run:
     """One run of one program: its budget, its clock and its line to the engine.
@@ -84,8 +86,9 @@ class Run:
         sys.modules["__main__"] = self.namespace
         try:
             exec(loads(code), names)  # noqa: S102, S302 - this is what the sandbox is for
-            if not self.has_entered(names.get("task_program")):
-                exec("task_program()", names)  # noqa: S102 - the same
+            has_run = self.has_entered(names.get("task_program"))
+            if not has_run and type(eval("task_program()", names)) is types.CoroutineType:  # noqa: S307 - the same
+                raise TypeError(UNAWAITED)  # noqa: TRY301 - a function more, and recursion goes less deep
         except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
             setrecursionlimit(RECURSION_LIMIT + HEADROOM)
             return self.ended_by(error)
