@@ -161,6 +161,7 @@ def ratios(times: dict[str, list[float]], other: int) -> str:
 
 # --- what is apart
 
+COPIES = 12  # of honest programs, so that all workers have work while one of them is held up
 HANGS = "def task_program():\n    sum(range(10**12))\n"
 LOOPS = {
     "200,000 turns of a loop": "def task_program():\n    for i in range(199_998): pass\n",
@@ -172,10 +173,11 @@ LOOPS = {
 
 def report_hanging(ours: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> None:
     """Print what a program that hangs, a run of five seconds of processor time, costs the honest ones."""
-    alone = seconds(ours, part)
-    beside = seconds(ours, [(HANGS, NOWHERE), *part])
+    longer = [(f"{source}\n# {copy}\n", world) for copy in range(COPIES) for source, world in part]
+    alone = seconds(ours, longer)
+    beside = seconds(ours, [(HANGS, NOWHERE), *longer])
     print(
-        f"{len(part)} honest runs: {alone:.1f} s; with one that hangs among them {beside:.1f} s "
+        f"{len(longer)} honest runs: {alone:.1f} s; with one that hangs among them {beside:.1f} s "
         f"(its share of {WORKERS} workers: {5 / WORKERS:.1f} s)"
     )
 

@@ -12,7 +12,8 @@ import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from functools import partial
 from itertools import islice
 from typing import Any, Self, TypeVar
 
@@ -155,31 +156,43 @@ class Lanes:
     ) -> Iterator[Value]:
         """Like `map`, in threads, calling the function once for equal keys and reading ahead a little.
 
+        While the next result is long in coming, more is read, so that the other threads have work.
+
         Args:
             function: what to do; its results are pickled.
             keys: what to do it to.
             name: a short name of a key, which no other key has.
         """
-        waiting: deque[tuple[bytes, Future[Value] | None]] = deque()
-        running: dict[bytes, Future[Value]] = {}
+        waiting: deque[tuple[bytes, Future[None] | None]] = deque()
+        running: dict[bytes, Future[None]] = {}
+        unfinished: set[Future[None]] = set()
         remaining = iter(keys)
         with Done() as done:
+            work = partial(done.put, function)
             while True:
-                for key in islice(remaining, max(0, 8 * self.workers - len(waiting))):
+                room = min(8 * self.workers - len(unfinished), MOST_AHEAD - len(waiting))
+                for key in islice(remaining, max(0, room)):
                     named = name(key)
                     if named not in done and named not in running:
-                        running[named] = self._pool.submit(function, key)
+                        running[named] = future = self._pool.submit(work, named, key)
+                        unfinished.add(future)
+                        future.add_done_callback(unfinished.discard)
                     waiting.append((named, running.get(named)))
                 if not waiting:
                     return
-                named, future = waiting.popleft()
-                if future is None:
-                    yield done[named]
+                named, first = waiting[0]
+                if first is not None and not first.done():
+                    last = next(reversed(running.values()))
+                    wait((first, last), return_when=FIRST_COMPLETED)
                     continue
-                value = future.result()
-                if running.pop(named, None) is not None:
-                    done[named] = value
-                yield value
+                if first is not None:
+                    first.result()
+                    running.pop(named, None)
+                waiting.popleft()
+                yield done[named]
+
+
+MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
 
 class Done:
@@ -187,6 +200,7 @@ class Done:
 
     def __init__(self) -> None:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by __exit__
+        self._lock = threading.Lock()
         self._places: dict[bytes, int] = {}
 
     def __enter__(self) -> Self:
@@ -198,10 +212,15 @@ class Done:
     def __contains__(self, name: bytes) -> bool:
         return name in self._places
 
-    def __setitem__(self, name: bytes, value: object) -> None:
-        self._places[name] = self._file.seek(0, os.SEEK_END)
-        pickle.dump(value, self._file)
+    def put(self, function: Callable[[Key], Value], name: bytes, key: Key) -> None:
+        """Call a function, and keep what it returns."""
+        data = pickle.dumps(function(key))
+        with self._lock:
+            place = self._file.seek(0, os.SEEK_END)
+            self._file.write(data)
+            self._places[name] = place
 
     def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - whatever was put there
-        self._file.seek(self._places[name])
-        return pickle.load(self._file)  # noqa: S301 - we wrote it
+        with self._lock:
+            self._file.seek(self._places[name])
+            return pickle.load(self._file)  # noqa: S301 - we wrote it

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.simulator.engine import EngineError, run
+from codebotler.simulator.engine import EngineError, Lanes, run
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
@@ -134,6 +134,20 @@ def test_pairs_are_read_only_a_little_ahead() -> None:
     assert [said(outcome) for outcome in islice(outcomes, 30)] == [[str(number)] for number in range(30)]
     outcomes.close()  # type: ignore[attr-defined]  # it is a generator
     assert next(read) < 50
+
+
+def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
+    others_done = threading.Semaphore(0)
+
+    def work(number: int) -> int:
+        if number:
+            others_done.release()
+            return number
+        return sum(others_done.acquire(timeout=30) for _ in range(500))
+
+    with Lanes(2) as lanes:
+        results = lanes.map_distinct(work, range(600), name=lambda number: number.to_bytes(2))
+        assert list(results) == [500, *range(1, 600)]
 
 
 # --- the same everywhere
