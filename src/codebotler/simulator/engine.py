@@ -182,8 +182,7 @@ class Lanes:
                     return
                 named, first = waiting[0]
                 if first is not None and not first.done():
-                    last = next(reversed(running.values()))
-                    wait((first, last), return_when=FIRST_COMPLETED)
+                    wait({first, *list(unfinished)}, return_when=FIRST_COMPLETED)
                     continue
                 if first is not None:
                     first.result()
