@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.simulator.child import Child
 from codebotler.simulator.engine import EngineError, Lanes, run
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
@@ -148,6 +149,26 @@ def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
     with Lanes(2) as lanes:
         results = lanes.map_distinct(work, range(600), name=lambda number: number.to_bytes(2))
         assert list(results) == [500, *range(1, 600)]
+
+
+def test_drives_to_rooms_by_their_names_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers: list[object] = []
+    send = Child.send
+
+    def send_and_note(child: Child, message: tuple[object, ...]) -> None:
+        answers.append(message[0])
+        send(child, message)
+
+    lane = Lane()
+    monkeypatch.setattr(Child, "send", send_and_note)
+    world = World((Room("start_loc"), Room("lab+"), Room("é'\"\n"), Room("hall \\d")), "start_loc")
+    program = "def task_program():\n    for room in get_all_rooms() * 3:\n        go_to(room)\n"
+    outcome = lane.run(program, lambda: SimulatedRobot(world, AS_WRITTEN))
+    lane.close()
+    assert outcome.error is not None
+    assert (outcome.error.kind, outcome.line) == ("GoToInvalidLocation", 3)
+    assert [event.text for event in outcome.trace] == ["start_loc", "lab+", "é'\"", "hall \\d"]
+    assert [answer for answer in answers if answer in ("ok", "error")] == ["error"]
 
 
 # --- the same everywhere

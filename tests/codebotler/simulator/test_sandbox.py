@@ -264,6 +264,15 @@ WORKS: dict[str, tuple[str, object]] = {
         ),
         ["(False, True)", "True", "True", "2024-01-01 12:00:00"],
     ),
+    "nothing is left of what ran before in the zygote": (
+        task(
+            "say(' '.join(name for name in sorted(globals()) if name[0] != '_'))\nsay(str(time.monotonic()))"
+        ),
+        [
+            "ask get_all_rooms get_current_location go_to is_in_room pick place say sys task_program time",
+            "0.0",
+        ],
+    ),
     "selectors and executors are there": (
         "import concurrent.futures, selectors, threading, platform, os\n"
         + task(

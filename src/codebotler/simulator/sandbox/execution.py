@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 # Functions below look here for `len` and the like, and not where a program can write.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
 
-# Python 3.11 counts calls into C as well: with two more, a function can call itself as often as under 3.12.
-RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1002
+# Python 3.11 counts calls into C as well: with one more, a function can call itself as often as under 3.12.
+RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
 HEADROOM = 50  # for what a skill calls, so that the limit is met by the program, not on the way to the robot
 
 UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not async def"
