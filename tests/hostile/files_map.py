@@ -1,13 +1,10 @@
 """Tries to map files into memory by the descriptors it was left."""
 # ends: finished
 # does: say 0
+import ctypes
 
 
 def task_program():
-    frame = sys._getframe()
-    while "ctypes" not in frame.f_globals:
-        frame = frame.f_back
-    ctypes = frame.f_globals["ctypes"]
     mmap = ctypes.CDLL(None).mmap
     mmap.restype = ctypes.c_ssize_t
     mmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_size_t]

@@ -1,13 +1,11 @@
 """Tries to take back what ends it when the zygote ends, and to widen its limits."""
 # ends: finished
 # does: say 6 refused
+import ctypes
 
 
 def task_program():
-    frame = sys._getframe()
-    while "ctypes" not in frame.f_globals:
-        frame = frame.f_back
-    kernel = frame.f_globals["ctypes"].CDLL(None)
+    kernel = ctypes.CDLL(None)
     refused = sum(kernel.prctl(option, value, 0, 0, 0) == -1 for option, value in ((1, 0), (4, 1), (36, 1)))
     unlimited = b"\xff" * 16
     refused += kernel.setrlimit(0, unlimited) == -1

@@ -1,13 +1,11 @@
 """Tries to signal others by every system call that there is for it."""
 # ends: finished
 # does: say 24 refused
+import ctypes
 
 
 def task_program():
-    frame = sys._getframe()
-    while "ctypes" not in frame.f_globals:
-        frame = frame.f_back
-    call = frame.f_globals["ctypes"].CDLL(None).syscall
+    call = ctypes.CDLL(None).syscall
     kill, tkill, tgkill, queue, pidfd_open, pidfd_send = 62, 200, 234, 129, 434, 424
     refused = 0
     for pid in (@PARENT_PID@, @ZYGOTE_PID@, @BYSTANDER_PID@):

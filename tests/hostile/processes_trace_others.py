@@ -1,13 +1,11 @@
 """Tries to trace and to rewrite other processes."""
 # ends: finished
 # does: say 15 refused
+import ctypes
 
 
 def task_program():
-    frame = sys._getframe()
-    while "ctypes" not in frame.f_globals:
-        frame = frame.f_back
-    kernel = frame.f_globals["ctypes"].CDLL(None)
+    kernel = ctypes.CDLL(None)
     attach, seize = 16, 0x4206
     refused = 0
     for pid in (@PARENT_PID@, @ZYGOTE_PID@, @BYSTANDER_PID@):

@@ -10,47 +10,11 @@ import sys
 from codebotler.simulator.child import Child, LostChildError
 from codebotler.simulator.conversation import Conversation, described
 from codebotler.simulator.isolated import start
+from codebotler.simulator.play import LESSONS, PLAY, STAGE
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox.ticks import prepared
-from codebotler.world import Person, Room, World
 
 NUMBER = 8  # bytes of a number that it reports
-LESSONS, REHEARSALS = 20, 8
-STAGE = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
-PLAY = marshal.dumps(
-    prepared(
-        """
-def find(thing, rooms):
-    for number, room in enumerate(sorted(rooms)):
-        go_to(room)
-        if is_in_room(thing):
-            return [room, number + 1]
-    return None
-
-def task_program():
-    start = get_current_location()
-    rooms = [room for room in get_all_rooms() if room != start and "all" not in room]
-    found = find("mug", rooms)
-    if found is not None and len(found) > 0:
-        pick("mug")
-        answer = ask("", "Is it yours, " + found[0] + "?", ["Yes", "No"])
-        counts = {"yes": 0}
-        counts[answer.lower()] = counts.get("yes", 0) + 1
-        time.sleep(1)
-        place("mug")
-    try:
-        go_to("nowhere")
-    except Exception as error:
-        say(str(error))
-    go_to(start)
-    message = f"{', '.join(rooms)}: {counts['yes']} of {len(rooms)}"
-    while not message.endswith("."):
-        message += "."
-    say(message)
-""",
-        lowercase=False,
-    )[0]
-)
+REHEARSALS = 8
 EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"))
 
 

@@ -160,7 +160,7 @@ code = [
 instructions = ctypes.create_string_buffer(b"".join(struct.pack("HBBI", *line) for line in code))
 header = struct.pack("HxxxxxxP", len(code), ctypes.addressof(instructions))
 refuse_new_rights()
-install(ctypes.create_string_buffer(header))
+install((header, bytes(instructions)))
 """
 EVALUATE = """
 from roboeval.cli import main

@@ -34,7 +34,7 @@ def serve(*, library: bool) -> None:
     door = socket(fileno=DOOR)
     run = Run()
     simulate_surroundings(run)
-    skills, rehearsals = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
+    skills, lessons = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
     run.provide(skills)
     if library:
         from codebotler.simulator.sandbox.stdlib import load_stdlib  # noqa: PLC0415 - it is large
@@ -46,7 +46,7 @@ def serve(*, library: bool) -> None:
     sys.meta_path[:] = [NothingMore() if library else MoreInTheLibrary()]
     give_up_rights()
     seccomp = usable_filter()
-    rehearse(run, door, rehearsals)
+    learn(run, door, lessons)
     gc.collect()
     gc.freeze()
     report(0 if seccomp is None else 1)
@@ -54,15 +54,11 @@ def serve(*, library: bool) -> None:
         pass
 
 
-def rehearse(run: Run, door: socket, times: int) -> None:
-    """Run a program of the engine's own here, and not in a child, as often as the interpreter learns from it.
-
-    What it learns, such as where it found an attribute, is written to memory that children then need not
-    copy.
-    """
-    report(times)
+def learn(run: Run, door: socket, lessons: int) -> None:
+    """Run the engine's own play here, and not in a child."""
+    report(lessons)
     names = vars(run.namespace).copy()
-    for _ in range(times):
+    for _ in range(lessons):
         line = asked_for(door)
         os.dup2(line, CHANNEL)
         if line != CHANNEL:

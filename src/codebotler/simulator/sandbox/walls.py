@@ -94,7 +94,7 @@ def prctl(option: int, value: int = 0, other: int | bytes = 0) -> None:
     if sys.platform != "linux":
         return
     if _ctypes.call_function(_ctypes.dlsym(LIBC, "prctl"), (option, value, other, 0, 0)) != 0:
-        raise OSError(f"prctl({option}) failed")
+        raise PermissionError(1, f"prctl({option}) was refused")
 
 
 SYSCALLS = {
