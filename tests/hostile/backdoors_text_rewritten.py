@@ -1,6 +1,7 @@
 """Tries to change a text in place after it was checked."""
 # ends: finished
 # does: say open sesame
+
 import ctypes
 
 

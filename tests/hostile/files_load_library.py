@@ -1,5 +1,6 @@
 """Tries to load a shared library, which would be code of its own."""
 # ends: python-error OSError
+
 import ctypes
 
 

@@ -1,6 +1,7 @@
 """Tries to map files into memory by the descriptors it was left."""
 # ends: finished
 # does: say 0
+
 import ctypes
 
 

@@ -1,6 +1,7 @@
 """Tries to leave memory that the next run can find."""
 # ends: finished
 # does: say -1 -1 -1 -1
+
 import ctypes
 
 

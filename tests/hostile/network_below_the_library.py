@@ -1,6 +1,7 @@
 """Tries to open sockets and rings by the numbers of system calls."""
 # ends: finished
 # does: say -1 -1 -1 -1
+
 import ctypes
 
 

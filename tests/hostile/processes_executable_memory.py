@@ -1,6 +1,7 @@
 """Tries to make memory executable, for code that no compiler of Python made."""
 # ends: finished
 # does: say -1 -1
+
 import ctypes
 
 

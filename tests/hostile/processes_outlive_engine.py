@@ -1,6 +1,7 @@
 """Tries to take back what ends it when the zygote ends, and to widen its limits."""
 # ends: finished
 # does: say 6 refused
+
 import ctypes
 
 

@@ -1,5 +1,6 @@
 """Tries to crash its interpreter."""
 # ends: killed Crash
+
 import ctypes
 
 

@@ -1,6 +1,7 @@
 """Tries to signal others by every system call that there is for it."""
 # ends: finished
 # does: say 24 refused
+
 import ctypes
 
 

@@ -1,6 +1,7 @@
 """Tries to trace and to rewrite other processes."""
 # ends: finished
 # does: say 15 refused
+
 import ctypes
 
 

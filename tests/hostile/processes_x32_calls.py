@@ -1,5 +1,6 @@
 """Tries to pass the list of allowed system calls by the numbers of another interface."""
 # ends: killed ForbiddenCall
+
 import ctypes
 
 

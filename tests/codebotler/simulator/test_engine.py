@@ -348,8 +348,10 @@ def killing(times: int) -> Behaviour:
 
     def say(robot: SimulatedRobot, message: str) -> None:
         if next(left, None) is not None:
+            family = children_of(os.getpid())
             for pid in zygotes():
                 os.kill(pid, signal.SIGKILL)
+            assert are_gone(family)
         robot.record("say", message)
 
     return say
