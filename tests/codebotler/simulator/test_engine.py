@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import count, islice
 from pathlib import Path
 
@@ -370,6 +371,37 @@ def test_run_whose_zygote_is_killed_is_run_again() -> None:
 def test_zygote_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
     with pytest.raises(EngineError, match="an isolated process was lost twice"):
         list(run([(saying("a"), WORLD)], workers=1, behaviours=doing(killing(99))))
+
+
+def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 1.0)
+
+    def slow(robot: SimulatedRobot, message: str) -> None:
+        time.sleep(2.5)
+        robot.record("say", message)
+
+    (outcome,) = run([(saying("a"), WORLD)], workers=1, behaviours=doing(slow))
+    assert said(outcome) == ["a"]
+
+
+def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
+    is_busy, may_go_on = threading.Event(), threading.Event()
+
+    def busy(robot: SimulatedRobot, message: str) -> None:
+        is_busy.set()
+        assert may_go_on.wait(30)
+        robot.record("say", message)
+
+    lane = Lane()
+    with ThreadPoolExecutor(1) as thread:
+        running = thread.submit(lane.run, saying("a"), lambda: SimulatedRobot(WORLD, behaviours=doing(busy)))
+        assert is_busy.wait(30)
+        family = children_of(os.getpid())
+        lane.stop()
+        assert are_gone(family)
+        may_go_on.set()
+        assert isinstance(running.exception(30), EngineError)
+    lane.close()
 
 
 def test_child_that_is_killed_from_outside_is_told_so() -> None:
