@@ -12,9 +12,9 @@ import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from functools import partial
+from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
+from queue import SimpleQueue
 from typing import Any, Self, TypeVar
 
 from codebotler.simulator.lane import EngineError, Lane
@@ -163,31 +163,36 @@ class Lanes:
             keys: what to do it to.
             name: a short name of a key, which no other key has.
         """
-        waiting: deque[tuple[bytes, Future[None] | None]] = deque()
-        running: dict[bytes, Future[None]] = {}
-        unfinished: set[Future[None]] = set()
+        waiting: deque[bytes] = deque()
+        running: set[bytes] = set()
+        ended: SimpleQueue[bytes] = SimpleQueue()
+        failed: dict[bytes, BaseException] = {}
         remaining = iter(keys)
+
+        def work(named: bytes, key: Key) -> None:
+            try:
+                done[named] = function(key)
+            except BaseException as error:  # noqa: BLE001 - raised where it is waited for
+                failed[named] = error
+            ended.put(named)
+
         with Done() as done:
-            work = partial(done.put, function)
             while True:
-                room = min(8 * self.workers - len(unfinished), MOST_AHEAD - len(waiting))
+                room = min(8 * self.workers - len(running), MOST_AHEAD - len(waiting))
                 for key in islice(remaining, max(0, room)):
                     named = name(key)
+                    waiting.append(named)
                     if named not in done and named not in running:
-                        running[named] = future = self._pool.submit(work, named, key)
-                        unfinished.add(future)
-                        future.add_done_callback(unfinished.discard)
-                    waiting.append((named, running.get(named)))
+                        running.add(named)
+                        self._pool.submit(work, named, key)
                 if not waiting:
                     return
-                named, first = waiting[0]
-                if first is not None and not first.done():
-                    wait({first, *list(unfinished)}, return_when=FIRST_COMPLETED)
+                if waiting[0] in running or not ended.empty():
+                    running.remove(ended.get())
                     continue
-                if first is not None:
-                    first.result()
-                    running.pop(named, None)
-                waiting.popleft()
+                named = waiting.popleft()
+                if named in failed:
+                    raise failed[named]
                 yield done[named]
 
 
@@ -211,9 +216,8 @@ class Done:
     def __contains__(self, name: bytes) -> bool:
         return name in self._places
 
-    def put(self, function: Callable[[Key], Value], name: bytes, key: Key) -> None:
-        """Call a function, and keep what it returns."""
-        data = pickle.dumps(function(key))
+    def __setitem__(self, name: bytes, value: object) -> None:
+        data = pickle.dumps(value)
         with self._lock:
             place = self._file.seek(0, os.SEEK_END)
             self._file.write(data)
