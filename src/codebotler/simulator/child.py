@@ -15,7 +15,14 @@ from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
-from codebotler.simulator.sandbox import CPU_SECONDS, HEADER, MAX_FRAME, MORE, PIECE
+from codebotler.simulator.sandbox import (
+    CPU_SECONDS,
+    HEADER,
+    MAX_FRAME,
+    MORE,
+    PIECE,
+    WITHOUT_REFERENCES,
+)
 from codebotler.trace import RunError, Status
 
 LONGEST = 60.0  # seconds of waiting for a child in all; nothing that computes takes so long
@@ -67,7 +74,7 @@ class Child:
             ProtocolError: the child says something else in between.
             TimeoutError: the child waits for something else than to listen.
         """
-        data = marshal.dumps(message)  # type: ignore[arg-type]  # made of texts, numbers and the like
+        data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # made of texts, numbers and the like
         whole = len(data).to_bytes(HEADER, "big") + data
         for start in range(0, len(whole), PIECE):
             if start and (said := self.receive()) != MORE:

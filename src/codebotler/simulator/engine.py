@@ -6,17 +6,13 @@ import contextlib
 import hashlib
 import logging
 import os
-import pickle
 import sys
-import tempfile
 import threading
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from itertools import islice
-from queue import SimpleQueue
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
+from codebotler.simulator.distinct import Distinct
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
@@ -163,67 +159,4 @@ class Lanes:
             keys: what to do it to.
             name: a short name of a key, which no other key has.
         """
-        waiting: deque[bytes] = deque()
-        running: set[bytes] = set()
-        ended: SimpleQueue[bytes] = SimpleQueue()
-        failed: dict[bytes, BaseException] = {}
-        remaining = iter(keys)
-
-        def work(named: bytes, key: Key) -> None:
-            try:
-                done[named] = function(key)
-            except BaseException as error:  # noqa: BLE001 - raised where it is waited for
-                failed[named] = error
-            ended.put(named)
-
-        with Done() as done:
-            while True:
-                room = min(8 * self.workers - len(running), MOST_AHEAD - len(waiting))
-                for key in islice(remaining, max(0, room)):
-                    named = name(key)
-                    waiting.append(named)
-                    if named not in done and named not in running:
-                        running.add(named)
-                        self._pool.submit(work, named, key)
-                if not waiting:
-                    return
-                if waiting[0] in running or not ended.empty():
-                    running.remove(ended.get())
-                    continue
-                named = waiting.popleft()
-                if named in failed:
-                    raise failed[named]
-                yield done[named]
-
-
-MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
-
-
-class Done:
-    """Results by name, in a file that nobody else sees, so that a million of them need little memory."""
-
-    def __init__(self) -> None:
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by __exit__
-        self._lock = threading.Lock()
-        self._places: dict[bytes, int] = {}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._file.close()
-
-    def __contains__(self, name: bytes) -> bool:
-        return name in self._places
-
-    def __setitem__(self, name: bytes, value: object) -> None:
-        data = pickle.dumps(value)
-        with self._lock:
-            place = self._file.seek(0, os.SEEK_END)
-            self._file.write(data)
-            self._places[name] = place
-
-    def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - whatever was put there
-        with self._lock:
-            self._file.seek(self._places[name])
-            return pickle.load(self._file)  # noqa: S301 - we wrote it
+        return Distinct(self._pool, 8 * self.workers, function, name).results(keys)

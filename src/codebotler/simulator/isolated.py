@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import inspect
 import marshal
 import subprocess
 import sys
 import tempfile
+import threading
 from functools import cache
 from pathlib import Path
 from typing import BinaryIO
 
-from codebotler.simulator.sandbox import FLAGS
+from codebotler.simulator.sandbox import FLAGS, WITHOUT_REFERENCES
 
 SANDBOX = Path(__file__).with_name("sandbox")
 
@@ -37,9 +39,18 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
     )
 
 
-@cache
 def codes() -> BinaryIO:
     """A file with the code of the modules that isolated processes run, by name."""
+    with ONE_AT_A_TIME:
+        return written_codes()
+
+
+ONE_AT_A_TIME = threading.Lock()
+
+
+@cache
+def written_codes() -> BinaryIO:
+    """Make the file."""
     simulator, package = __package__, __package__ + ".sandbox"
     sources = dict.fromkeys((simulator.partition(".")[0], simulator), "")
     sources[package] = (SANDBOX / "__init__.py").read_text(encoding="utf-8")
@@ -47,8 +58,10 @@ def codes() -> BinaryIO:
         sources[f"{package}.{path.stem}"] = path.read_text(encoding="utf-8")
     for name in NEEDED:
         sources[name] = inspect.getsource(importlib.import_module(name))
-    file = tempfile.TemporaryFile()  # noqa: SIM115 - there as long as this process
-    file.write(marshal.dumps({name: code_of(source, name) for name, source in sources.items()}))
+    file = tempfile.TemporaryFile()  # noqa: SIM115 - closed at the end of this process
+    atexit.register(file.close)
+    by_name = {name: code_of(source, name) for name, source in sources.items()}
+    file.write(marshal.dumps(by_name, WITHOUT_REFERENCES))
     file.flush()
     return file
 
@@ -58,4 +71,6 @@ NEEDED = ("__future__", "types")
 
 def code_of(source: str, name: str) -> bytes:
     """The code of one module."""
-    return marshal.dumps(compile(source, f"<{name}>", "exec", dont_inherit=True), 2)
+    return marshal.dumps(
+        compile(source, f"<{name}>", "exec", dont_inherit=True, optimize=0), WITHOUT_REFERENCES
+    )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import marshal
 
+from codebotler.simulator.sandbox import WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.ticks import prepared
 from codebotler.world import Person, Room, World
 
@@ -43,7 +44,7 @@ def task_program():
     say(message)
 """
 
-PLAY = marshal.dumps(prepared(TEXT, lowercase=False)[0])
+PLAY = marshal.dumps(prepared(TEXT, lowercase=False)[0], WITHOUT_REFERENCES)
 
 LESSONS = 20
 """How often it is run: the interpreter learns from what it has done a few times."""

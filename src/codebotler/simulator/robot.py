@@ -139,7 +139,15 @@ def go_to(robot: SimulatedRobot, location: str) -> None:
 @lru_cache(maxsize=4096)
 def sure_drives(rooms: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
     """The drives that succeed whatever happens: to each room by its name, unless it is an odd regex."""
-    return tuple(("go_to", room) for room in rooms if resolve_room(rooms, room) is not None)
+    return tuple(("go_to", room) for room in rooms if is_found_by_itself(room))
+
+
+def is_found_by_itself(room: str) -> bool:
+    """Whether the name of a room is found in itself."""
+    try:
+        return found_in(room, room)
+    except re.error:
+        return False
 
 
 def resolve_room(rooms: Sequence[str], request: str) -> str | None:

@@ -12,10 +12,11 @@ from codebotler.simulator.conversation import Conversation, described
 from codebotler.simulator.isolated import start
 from codebotler.simulator.play import LESSONS, PLAY, STAGE
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.sandbox import WITHOUT_REFERENCES
 
 NUMBER = 8  # bytes of a number that it reports
 REHEARSALS = 8
-EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"))
+EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
 
 
 class Zygote:
@@ -36,7 +37,8 @@ class Zygote:
         os.close(report)
         self._end_is_unread = False
         try:
-            self._door.sendall(marshal.dumps((described(SimulatedRobot(STAGE)), LESSONS)))
+            told = (described(SimulatedRobot(STAGE)), LESSONS)
+            self._door.sendall(marshal.dumps(told, WITHOUT_REFERENCES))
             for _ in range(self._read_report()):
                 self._teach()
             self.has_seccomp = self._read_report() == 1

@@ -21,6 +21,7 @@ from codebotler.simulator.isolated import codes
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
+from codebotler.skills import SKILLS, SkillTable
 from codebotler.trace import Outcome, Status
 from codebotler.world import Room, World
 
@@ -152,6 +153,56 @@ def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
     with Lanes(2) as lanes:
         results = lanes.map_distinct(work, range(600), name=lambda number: number.to_bytes(2))
         assert list(results) == [500, *range(1, 600)]
+
+
+def test_what_was_read_before_the_keys_failed_has_results() -> None:
+    def keys() -> Iterator[int]:
+        yield from range(20)
+        raise ValueError("no more")
+
+    with Lanes(2) as lanes:
+        results = lanes.map_distinct(
+            lambda number: number * 2, keys(), name=lambda number: number.to_bytes(2)
+        )
+        assert [next(results) for _ in range(20)] == list(range(0, 40, 2))
+        with pytest.raises(ValueError, match="no more"):
+            next(results)
+
+
+TELLS_WHAT_IS_THE_SAME = """
+def task_program():
+    go_to('kitchen')
+    here = get_current_location()
+    say(str([here is get_all_rooms()[1], here is 'kitchen']))
+"""
+
+
+def test_identities_depend_neither_on_what_the_engine_holds_nor_on_waiting() -> None:
+    hall, kitchen = str(b"hall", "ascii"), str(b"kitchen", "ascii")
+    worlds = [World((Room("hall"), Room("kitchen")), "hall"), World((Room(hall), Room(kitchen)), hall)]
+    lane = Lane()
+    outcomes = []
+    for world in worlds:
+        for surely in (SimulatedRobot(world).surely, ()):
+            robot = SimulatedRobot(world)
+            robot.surely = surely
+            outcomes.append(lane.run(TELLS_WHAT_IS_THE_SAME, lambda robot=robot: robot))  # type: ignore[misc]  # bound
+    lane.close()
+    assert outcomes == outcomes[:1] * 4
+
+
+def test_a_room_that_is_no_regex_harms_no_program_that_drives_nowhere() -> None:
+    world = World((Room("hall"), Room("[")), "hall")
+    lane = Lane()
+    assert said(lane.run(saying("a"), lambda: SimulatedRobot(world))) == ["a"]
+    lane.close()
+
+
+def test_a_smaller_table_of_skills_leaves_no_other_skill() -> None:
+    table = SkillTable(tuple(skill for skill in SKILLS.values() if skill.name != "pick"))
+    (outcome,) = run([("def task_program(): pick('x')", WORLD)], workers=1, skills=table)
+    assert outcome.error is not None
+    assert outcome.error.kind == "NameError"
 
 
 def test_drives_to_rooms_by_their_names_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:

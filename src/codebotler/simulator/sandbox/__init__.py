@@ -23,6 +23,9 @@ MEMORY = 512 * 1024 * 1024
 CPU_SECONDS = 5
 """Seconds of processor time of a closed process, against what ticks cannot see, such as one long call."""
 
+WITHOUT_REFERENCES = 2
+"""The version of marshal's format: later ones write what depends on what else the writing process holds."""
+
 PREPARER, ZYGOTE, LIBRARY_ZYGOTE = "preparer", "zygote", "library-zygote"
 """The roles: who compiles programs, who forks runs, and who forks runs that import something."""
 

@@ -59,8 +59,10 @@ class Run:
         Args:
             skills: name, parameters (name and type, `str` or `list`) and way of calling of each.
         """
-        self.skills = skills
         names = vars(self.namespace)
+        for name, _, _ in self.skills:
+            del names[name]
+        self.skills = skills
         names.update((name, self.skill(name, parameters, way)) for name, parameters, way in skills)
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
@@ -104,6 +106,7 @@ class Run:
         self.spent = self.entered = False
         self.codes.clear()
         self.known = {}
+        RAISED.clear()
         self.count_anew()
         provided = vars(self.namespace)
         provided.clear()

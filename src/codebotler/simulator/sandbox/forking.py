@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from codebotler.simulator.sandbox.walls import Filter
 
 DOOR, REPORT = 5, 6
+PID = 8  # bytes of a process id: as an int, a small one would take no memory and a large one some
 DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
 
 
@@ -93,7 +94,7 @@ def one_run(door: socket, run: Run, seccomp: Filter | None) -> bool:
     line = asked_for(door)
     if line < 0:
         return False
-    parent = getpid()
+    parent = getpid().to_bytes(PID, "big")
     pid = os.fork()
     if pid == 0:
         try:
@@ -128,12 +129,12 @@ def end_of(pid: int) -> int:
     return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
 
 
-def go_behind_walls(line: int, seccomp: Filter | None, parent: int) -> None:
+def go_behind_walls(line: int, seccomp: Filter | None, parent: bytes) -> None:
     """Be the child of one run: take the channel and close the walls."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
-    if getppid() != parent:  # it died before that: no signal will come
+    if getppid().to_bytes(PID, "big") != parent:  # it died before that: no signal will come
         os._exit(1)
     enclose(seccomp)
 

@@ -11,7 +11,7 @@ import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: nothing can 
 from _json import encode_basestring_ascii as quoted
 from marshal import dumps
 
-from codebotler.simulator.sandbox import CHANNEL, IMPORTING, MAX_CODE, PLAIN, REFUSED
+from codebotler.simulator.sandbox import CHANNEL, IMPORTING, MAX_CODE, PLAIN, REFUSED, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.channel import receive, send_bytes
 from codebotler.simulator.sandbox.ticks import TOO_LARGE, prepared
 from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
@@ -19,7 +19,6 @@ from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_f
 DOOR = 5
 ALWAYS_THERE = frozenset({"sys", "time", "__future__"})
 REHEARSAL = "def task_program():\n    for room in get_all_rooms():\n        say(f'in {room}')\n"
-WITHOUT_REFERENCES = 2  # later versions of the format depend on what else this process holds
 
 
 def serve() -> None:

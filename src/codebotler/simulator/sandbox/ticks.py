@@ -39,7 +39,7 @@ def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset
             add_ticks(node)
         for node in tree.body:
             note_entries(node)
-        return compile(tree, PROGRAM, "exec", dont_inherit=True), imports
+        return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), imports
     except (RecursionError, MemoryError):
         raise MemoryError(TOO_LARGE) from None
 
