@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
 import tempfile
@@ -16,6 +17,7 @@ from typing import Any, Generic, Self, TypeVar
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
+IN_MEMORY = 8_000_000  # bytes of results
 MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
 
@@ -80,10 +82,10 @@ class Distinct(Generic[Key, Value]):
 
 
 class Done:
-    """Results by name, in a file that nobody else sees, so that a million of them need little memory."""
+    """Results by name; most in a file that nobody else sees, so that a million of them need little memory."""
 
     def __init__(self) -> None:
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by __exit__
+        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY)  # noqa: SIM115 - closed by __exit__
         self._lock = threading.Lock()
         self._places: dict[bytes, int] = {}
 
@@ -91,17 +93,22 @@ class Done:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        with contextlib.suppress(OSError):  # of a full disk has been told
+            self._file.close()
 
     def __contains__(self, name: bytes) -> bool:
         return name in self._places
 
     def __setitem__(self, name: bytes, value: object) -> None:
         data = pickle.dumps(value)
-        with self._lock:
-            place = self._file.seek(0, os.SEEK_END)
-            self._file.write(data)
-            self._places[name] = place
+        try:
+            with self._lock:
+                place = self._file.seek(0, os.SEEK_END)
+                self._file.write(data)
+                self._file.flush()
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
+        self._places[name] = place
 
     def __getitem__(self, name: bytes) -> Any:  # noqa: ANN401 - whatever was put there
         with self._lock:

@@ -6,13 +6,14 @@ import atexit
 import importlib
 import inspect
 import marshal
+import os
 import subprocess
 import sys
 import tempfile
 import threading
 from functools import cache
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO
 
 from codebotler.simulator.sandbox import FLAGS, WITHOUT_REFERENCES
 
@@ -39,7 +40,7 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
     )
 
 
-def codes() -> BinaryIO:
+def codes() -> IO[bytes]:
     """A file with the code of the modules that isolated processes run, by name."""
     with ONE_AT_A_TIME:
         return written_codes()
@@ -49,8 +50,8 @@ ONE_AT_A_TIME = threading.Lock()
 
 
 @cache
-def written_codes() -> BinaryIO:
-    """Make the file."""
+def written_codes() -> IO[bytes]:
+    """Make the file, in memory where the system can do that: a disk may be full."""
     simulator, package = __package__, __package__ + ".sandbox"
     sources = dict.fromkeys((simulator.partition(".")[0], simulator), "")
     sources[package] = (SANDBOX / "__init__.py").read_text(encoding="utf-8")
@@ -58,7 +59,9 @@ def written_codes() -> BinaryIO:
         sources[f"{package}.{path.stem}"] = path.read_text(encoding="utf-8")
     for name in NEEDED:
         sources[name] = inspect.getsource(importlib.import_module(name))
-    file = tempfile.TemporaryFile()  # noqa: SIM115 - closed at the end of this process
+    file: IO[bytes] = (  # closed at the end of this process
+        os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
+    )
     atexit.register(file.close)
     by_name = {name: code_of(source, name) for name, source in sources.items()}
     file.write(marshal.dumps(by_name, WITHOUT_REFERENCES))

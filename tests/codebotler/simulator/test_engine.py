@@ -169,6 +169,26 @@ def test_what_was_read_before_the_keys_failed_has_results() -> None:
             next(results)
 
 
+FULL_DISK = """
+import resource, signal, tempfile
+from codebotler.simulator.distinct import Done
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (9_000_000, 9_000_000))
+try:
+    with Done() as done:
+        for number in range(5):
+            done[bytes([number])] = bytes([number]) * 3_000_000
+except OSError as error:
+    print(error.filename == tempfile.gettempdir(), number)
+"""
+
+
+def test_results_that_no_longer_fit_name_the_full_folder() -> None:
+    ended = subprocess.run([sys.executable, "-c", FULL_DISK], check=True, capture_output=True, text=True)
+    assert ended.stdout.split() == ["True", "2"], ended
+
+
 TELLS_WHAT_IS_THE_SAME = """
 def task_program():
     go_to('kitchen')
