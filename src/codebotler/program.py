@@ -129,6 +129,8 @@ def _entry_problems(tree: ast.Module, source: str) -> Iterator[Problem]:
     found = entries(tree)
     if not found or found[-1].decorator_list or TASK in _names_bound(tree, besides=found):
         return
+    if isinstance(found[-1], ast.AsyncFunctionDef) and not _may_begin(tree, found[-1]):
+        yield Problem(found[-1].lineno, "TypeError", f"{TASK} is a coroutine, which nobody awaits")
     given = found[-1].args
     positional = [*given.posonlyargs, *given.args]
     required = positional[: len(positional) - len(given.defaults)]
@@ -138,6 +140,12 @@ def _entry_problems(tree: ast.Module, source: str) -> Iterator[Problem]:
         yield Problem(
             found[-1].lineno, "TypeError", f"{TASK} takes {names}, but it is called without arguments"
         )
+
+
+def _may_begin(tree: ast.Module, task: ast.AsyncFunctionDef) -> bool:
+    """Whether something names a coroutine that may then begin it, or it is an asynchronous generator."""
+    names = (node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
+    return TASK in names or any(isinstance(node, ast.Yield) for node in ast.walk(task))
 
 
 def _name_problems(tree: ast.Module, skills: SkillTable) -> Iterator[Problem]:

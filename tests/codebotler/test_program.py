@@ -59,6 +59,10 @@ def test_right_programs_have_no_problems(program: str, fails: str | None) -> Non
             "def task_program(robot, *, now, x=1):\n    pass",
             (1, "task_program takes robot and now, but it is called without arguments"),
         ),
+        (
+            "async def task_program():\n    pass",
+            (1, "task_program is a coroutine, which nobody awaits"),
+        ),
         (in_task("say(wish + wish)"), (2, "the name wish is not defined")),
         (in_task("help()"), (2, "the name help is not defined")),
         (in_task("say(__file__)"), (2, "the name __file__ is not defined")),

@@ -264,6 +264,15 @@ WORKS: dict[str, tuple[str, object]] = {
         ),
         ["(False, True)", "True", "True", "2024-01-01 12:00:00"],
     ),
+    "a task that returns a coroutine": (
+        "async def note(): pass\n" + task("say('a')\nreturn note()"),
+        ["a"],
+    ),
+    "a task that is begun by hand": (
+        "async def task_program():\n    say('a')\n"
+        "try:\n    task_program().send(None)\nexcept StopIteration: pass\n",
+        ["a"],
+    ),
     "nothing is left of what ran before in the zygote": (
         task(
             "say(' '.join(name for name in sorted(globals()) if name[0] != '_'))\nsay(str(time.monotonic()))"
@@ -327,6 +336,10 @@ FAILS: dict[str, tuple[str, object]] = {
     ),
     "task that nobody awaits": (
         "async def task_program():\n    say('a')\n",
+        (P, "TypeError", "task_program is a coroutine, which nobody awaits; write def, not async def"),
+    ),
+    "task that is called and that nobody awaits": (
+        "async def task_program():\n    say('a')\n\ntask_program()\n",
         (P, "TypeError", "task_program is a coroutine, which nobody awaits; write def, not async def"),
     ),
     "no task": ("def main():\n    say('a')\n", (P, "NameError", "name 'task_program' is not defined")),

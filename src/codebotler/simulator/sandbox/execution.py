@@ -28,6 +28,7 @@ __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will d
 RECURSION_LIMIT = 1000 if sys.version_info >= (3, 12) else 1001
 HEADROOM = 50  # for what a skill calls, so that the limit is met by the program, not on the way to the robot
 
+COROUTINE = 0x80  # among the flags of code
 UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not async def"
 
 
@@ -88,8 +89,10 @@ class Run:
         sys.modules["__main__"] = self.namespace
         try:
             exec(loads(code), names)  # noqa: S102, S302 - this is what the sandbox is for
-            has_run = self.has_entered(names.get("task_program"))
-            if not has_run and type(eval(call_task.__code__, names)) is types.CoroutineType:  # noqa: S307 - the same
+            task = names.get("task_program")
+            if not self.has_entered(task):
+                eval(call_task.__code__, names)  # noqa: S307 - the same
+            if self.is_unawaited(task):
                 raise TypeError(UNAWAITED)  # noqa: TRY301 - a function more, and recursion goes less deep
         except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
             setrecursionlimit(RECURSION_LIMIT + HEADROOM)
@@ -135,10 +138,9 @@ class Run:
 
     def enter(self) -> None:
         """Note that the program has entered a function of its module."""
-        if not self.entered:
-            code = getframe(1).f_code
-            self.codes.add(code)
-            self.entered = code.co_name == "task_program"
+        code = getframe(1).f_code
+        self.codes.add(code)
+        self.entered = self.entered or code.co_name == "task_program"
 
     def start_task(self) -> None:
         """Note that the program calls `task_program` by its name."""
@@ -147,6 +149,14 @@ class Run:
     def has_entered(self, task: object) -> bool:
         """Whether the program has run its task by itself, by whatever name."""
         return self.entered or (type(task) is types.FunctionType and task.__code__ in self.codes)
+
+    def is_unawaited(self, task: object) -> bool:
+        """Whether the task is a coroutine that was never begun."""
+        return (
+            type(task) is types.FunctionType
+            and task.__code__.co_flags & COROUTINE != 0
+            and task.__code__ not in self.codes
+        )
 
     def ticker(self) -> Callable[[], None]:
         """The function that counts ticks and, once they are spent, raises each time it is called."""
