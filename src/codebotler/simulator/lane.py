@@ -32,10 +32,12 @@ class Lane:
     def __init__(self) -> None:
         self._stopped = False
         self._preparer = Preparer()
+        self._preparer.start()  # beside the zygote
         self._zygotes: dict[str, Zygote] = {}
         try:
             self.has_seccomp = self._zygote(ZYGOTE).has_seccomp
         except LostChildError as error:
+            self._preparer.close()
             raise EngineError(f"the engine does not start: {error}") from None
 
     def run(self, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:

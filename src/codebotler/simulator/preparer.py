@@ -65,6 +65,12 @@ class Preparer:
                 self._kept.popitem(last=False)
         return prepared
 
+    def start(self) -> Child:
+        """The process, started now if there is none; what is sent to it waits until it is ready."""
+        if self._child is None:
+            self._child = _started()
+        return self._child
+
     def kill(self) -> None:
         """End the process, also in the middle of a program."""
         child = self._child
@@ -98,16 +104,15 @@ class Preparer:
             return Outcome(death.status, (), death.error)
 
     def _ask(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
-        if self._child is None:
-            self._child = _started()
-        self._child.send((source, lowercase))
+        child = self.start()
+        child.send((source, lowercase))
         self._served += 1
         try:
-            answer = self._child.receive_bytes(len(IMPORTING) + MAX_CODE)
+            answer = child.receive_bytes(len(IMPORTING) + MAX_CODE)
         except (TimeoutError, ProtocolError):
             answer = None
         if not answer:
-            child, self._child, self._served = self._child, None, 0
+            self._child, self._served = None, 0
             closed = child.was_closed()
             status = child.ended()
             if not closed:
@@ -115,7 +120,7 @@ class Preparer:
             if status == -signal.SIGKILL:
                 raise LostChildError("the preparer was killed from outside")
             raise _DiedError(*cause_of_death(status))
-        self._child.rest()
+        child.rest()
         if answer[:1] == REFUSED:
             return refused(*json.loads(answer[1:]))
         return Prepared(answer[1:], imports=answer[:1] == IMPORTING)

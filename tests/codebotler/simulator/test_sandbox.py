@@ -269,8 +269,7 @@ WORKS: dict[str, tuple[str, object]] = {
         ["a"],
     ),
     "a task that is begun by hand": (
-        "async def task_program():\n    say('a')\n"
-        "try:\n    task_program().send(None)\nexcept StopIteration: pass\n",
+        "async def task_program(): say('a')\ntry: task_program().send(None)\nexcept StopIteration: pass\n",
         ["a"],
     ),
     "nothing is left of what ran before in the zygote": (

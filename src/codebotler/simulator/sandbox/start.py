@@ -27,8 +27,10 @@ def main(role: str, descriptors: list[str]) -> None:
     """
     if descriptors:
         start_again(list(map(int, descriptors)))
-    # Bytecode, there in one start and not in the next, would move the heap of a zygote.
-    sys.pycache_prefix = os.devnull
+    if (
+        role != "preparer"
+    ):  # bytecode, there in one start and not in the next, would move the heap of a zygote
+        sys.pycache_prefix = os.devnull
     sys.meta_path.insert(0, Given(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
     os.close(CODES)
     if role == "preparer":
