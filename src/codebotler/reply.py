@@ -28,8 +28,8 @@ def program_of(reply: str) -> Program:
     lines = re.split(r"\r\n|\r|\n", reply)
     if _is_plain(lines):
         return Program(_text(lines))
-    reply = _THOUGHT.sub("", reply)
-    lines = re.split(r"\r\n|\r|\n", reply)
+    reply = _aloud("\n".join(lines))
+    lines = reply.split("\n")
     blocks = tuple(_blocks(lines))
     chosen = _choose(blocks)
     if chosen is None:
@@ -58,10 +58,12 @@ class _Block:
 
 
 _ENTRY = re.compile(rf"(?:async\s+)?def\s+{TASK}\b|{TASK}\s*=(?!=)")
-_THOUGHT = re.compile(
-    r"""(?msx)
-      ^[ \t]* <think(?:ing)?> .*? (?: </think(?:ing)?> [ \t]*[\r\n]* | \Z)
-    | \A .*? </think(?:ing)?> [ \t]*[\r\n]*                 # the prompt began the thought
+_ASIDE = re.compile(
+    r"""(?imsx)
+      ^[ \t]* (?P<fence>`{3,}|~{3,}) [^`\n]*$ .*? (?: ^[ \t]* (?P=fence) [`~]* [ \t]*$ | \Z)
+    | ^[ \t]* (?P<thought> <think(?:ing)?> (?:
+        .*? (?: ^[ \t]* </think(?:ing)?> | </think(?:ing)?> [ \t]*$ ) | .*? </think(?:ing)?> | .* )) [ \t]*\n*
+    | (?P<end> </think(?:ing)?> ) [ \t]* (?: \n+ | \Z )                   # of what the prompt began
     """
 )
 _FENCE = re.compile(r"(?P<indent>\s*)(?P<marks>`{3,}|~{3,})[^`]*$")
@@ -83,6 +85,19 @@ _PROSE = re.compile(
     re.VERBOSE,
 )
 _INTERJECTION = re.compile(r" ?[A-Z][a-z]+\s*$")
+
+
+def _aloud(reply: str) -> str:
+    """A reply without thoughts; tags in a fence are code, unless the fence stands in a thought itself."""
+    kept = ""
+    start = 0
+    for found in _ASIDE.finditer(reply):
+        if found["thought"]:
+            kept += reply[start : found.start()]
+        elif not found["end"] or start:
+            continue
+        start = found.end()
+    return kept + reply[start:]
 
 
 def _is_plain(lines: Sequence[str]) -> bool:
@@ -210,18 +225,32 @@ def _without_next_example(lines: Sequence[str]) -> Sequence[str]:
 def _choose(blocks: Sequence[_Block]) -> _Block | None:
     """The block that is the program: one that defines it, or else one that could be meant as it.
 
-    Of several, an unfenced one at the start goes on from the prompt; else the last complete one is meant.
+    Of several, an unfenced one at the start goes on from the prompt; else the last complete one is meant
+    that is more than an outline.
     """
     versions = [block for block in blocks if block.defines_task and not block.headless]
     if blocks and not blocks[0].fenced and blocks[0].defines_task:
         return blocks[0]
     if versions:
-        whole = [block for block in versions if block.fenced and _tree_is_fine(block.lines)]
-        return [versions[0], *whole][-1]
+        whole = [block for block in versions[1:] if block.fenced and _tree_is_fine(block.lines)]
+        candidates = [versions[0], *whole]
+        return ([block for block in candidates if not _is_outline(block)] or candidates)[-1]
     for block in blocks:
         if block.headless and any(_CODE.match(line) for line in block.lines[1:]):
             return block
     return next((block for block in blocks if block.fenced), None)
+
+
+def _is_outline(block: _Block) -> bool:
+    """Whether nothing is done in it: its program is a docstring, `...` or `pass`."""
+    tree = parsed("\n".join(block.lines))
+    return not isinstance(tree, Problem) and any(all(map(_is_idle, e.body)) for e in entries(tree))
+
+
+def _is_idle(statement: ast.stmt) -> bool:
+    return isinstance(statement, ast.Pass) or (
+        isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
+    )
 
 
 def _with_definitions(chosen: _Block, blocks: Sequence[_Block]) -> str:

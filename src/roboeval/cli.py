@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
@@ -24,6 +24,17 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+
+def named(what: str) -> Callable[[str], Path]:
+    """A reader of paths that refuses the empty one, which would be the current folder."""
+
+    def path(text: str) -> Path:
+        return Path(text) if text else fail(f"nothing is named; name {what}")
+
+    return path
+
+
+RunArgument = Annotated[Path, typer.Argument(help="A run.", parser=named("a run"))]
 SuiteOption = Annotated[str, typer.Option(help="A suite that ships with the package, or a folder.")]
 TasksOption = Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common sense only.")]
@@ -48,7 +59,9 @@ def evaluate(
     source: Annotated[
         str, typer.Argument(help="A run, a .jsonl, a folder or zip of .py completions, or recorded:NAME.")
     ],
-    out: Annotated[Path | None, typer.Option(help="Keep completions and verdicts in this run.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Keep completions and verdicts in this run.", parser=named("a run"))
+    ] = None,
     suite: SuiteOption = "paper",
     tasks: TasksOption = None,
     ablation: AblationOption = False,
@@ -103,7 +116,7 @@ def evaluate(
 
 @app.command()
 def show(
-    run: Annotated[Path, typer.Argument(help="A run.")],
+    run: RunArgument,
     what: Annotated[str | None, typer.Argument(help="TASK, TASK/PROMPT or TASK/PROMPT/INDEX.")] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
@@ -186,11 +199,13 @@ def tasks(
 
 @app.command()
 def export(
-    run: Annotated[Path, typer.Argument(help="A run.")],
+    run: RunArgument,
     format: Annotated[  # noqa: A002 - the option's name
         str | None, typer.Option(help="csv or parquet; by default what --out ends in, or else csv.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="The file; by default beside the verdicts.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The file; by default beside the verdicts.", parser=named("a file"))
+    ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
 ) -> None:
@@ -216,7 +231,7 @@ def export(
 @app.command("import")
 def import_(
     path: Annotated[str, typer.Argument(help="A .jsonl, or a folder or zip of .py completions.")],
-    out: Annotated[Path, typer.Option(help="The run to make.")],
+    out: Annotated[Path, typer.Option(help="The run to make.", parser=named("a run"))],
     suite: SuiteOption = "paper",
 ) -> None:
     """Make a run of completions from elsewhere."""

@@ -137,10 +137,10 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     except (ValueError, RecursionError, MemoryError):
         raise BadInput("is no readable Python; write plain assignments", file=name) from None
     values = {
-        target.id: _value(statement, target.id, name)
+        target.id: _value(statement.value, target.id, name)
         for statement in statements
-        if isinstance(statement, ast.Assign)
-        for target in statement.targets
+        if isinstance(statement, ast.Assign | ast.AnnAssign) and statement.value is not None
+        for target in (statement.targets if isinstance(statement, ast.Assign) else [statement.target])
         if isinstance(target, ast.Name) and target.id in ("name", "prompt", "completion")
     }
     if not isinstance(values.get("completion"), str):
@@ -148,12 +148,12 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     return {key: _joined(value) for key, value in values.items() if isinstance(value, str)}
 
 
-def _value(statement: ast.Assign, what: str, name: str) -> object:
+def _value(written: ast.expr, what: str, name: str) -> object:
     try:
-        return ast.literal_eval(statement.value)
+        return ast.literal_eval(written)
     except (ValueError, TypeError, RecursionError, MemoryError):
         sentence = f"`{what}` is no plain text; write the text out"
-        raise BadInput(sentence, file=name, line=statement.lineno) from None
+        raise BadInput(sentence, file=name, line=written.lineno) from None
 
 
 def _joined(text: str) -> str:

@@ -173,10 +173,19 @@ def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
     Raises:
         BadInput: the file is missing, or a line is no row of an evaluation.
     """
-    for number, row in read_rows(path, limit=MAX_EVALUATION, growing=True):
-        if not (row.keys() >= EVALUATED.keys() and all(isinstance(row[f], t) for f, t in EVALUATED.items())):
-            raise BadInput("this line is no row of an evaluation; --redo starts over", file=path, line=number)
-        yield number, row
+    try:
+        for number, row in read_rows(path, limit=MAX_EVALUATION, growing=True):
+            _expect_evaluated(row, path, number)
+            yield number, row
+    except BadInput as error:
+        if error.line is None:
+            raise
+        raise BadInput(f"{error.sentence}; --redo starts over", file=path, line=error.line) from None
+
+
+def _expect_evaluated(row: Mapping[str, Any], path: Path, number: int) -> None:
+    if not (row.keys() >= EVALUATED.keys() and all(isinstance(row[f], t) for f, t in EVALUATED.items())):
+        raise BadInput("this line is no row of an evaluation", file=path, line=number)
 
 
 EVALUATED = {

@@ -24,9 +24,7 @@ from roboeval.records import (
     recorded_completions,
     to_line,
 )
-from roboeval.suite import Suite
-
-ABLATED = "-ablation"  # at the end of the name of an evaluation's files
+from roboeval.suite import ABLATED, Suite
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from codebotler.skills import SKILLS, SkillTable
 from codebotler.world import World
 from roboeval.suitefile import Ability, Category, ScenarioFile, SuiteFile, TaskFile
 
+ABLATED = "-ablation"  # at the end of the name of an evaluation's files, and so of no suite's
 SUITES = Path(__file__).with_name("suites")
 
 
@@ -181,6 +182,9 @@ def load_suite(name: str = "paper", *, skills: SkillTable = SKILLS) -> Suite:
 def _read_suite(folder: Path, skills: SkillTable) -> Suite:
     file = YamlFile.read(folder / "suite.yaml")
     head = file.validate(SuiteFile)
+    if head.name.endswith(ABLATED):
+        sentence = f'"{head.name}" ends as the files of an ablation do; choose a name without "{ABLATED}"'
+        raise file.wrong(sentence, "name")
     paths = sorted((folder / "tasks").glob("*.yaml"))
     if not paths:
         raise BadInput("the suite has no tasks; put one file a task there", file=folder / "tasks")
@@ -232,19 +236,25 @@ def read_task(file: YamlFile, path: Path, skills: SkillTable = SKILLS) -> Task:
 def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
     numbers: dict[str, int] = {}
     for number, world in enumerate(form.worlds, 1):
-        first = numbers.setdefault(world.about, number)
+        first = numbers.setdefault(world.about.strip().casefold(), number)
         if first != number:
             sentence = f'world {number} is about "{world.about}", as world {first} is'
             raise file.wrong(f"{sentence}; say what is special in each", "worlds", number - 1, "about")
 
 
+_PARAMETER = r" *[^\W\d]\w* *"
+
+
 def _checks(form: TaskFile, file: YamlFile) -> list[Check]:
     checks = []
     for head, body in form.checks.items():
-        match = re.fullmatch(r"(\w+)(?:\(([\w, ]+)\))?", head)
+        match = re.fullmatch(rf"(\w+)(?:\(({_PARAMETER}(?:,{_PARAMETER})*)\))?", head)
         if match is None:
             raise file.wrong(f'"{head}" is no head of a check; write name or name(p1, p2)', "checks", head)
         parameters = tuple(p.strip() for p in match[2].split(",")) if match[2] else ()
+        if again := next((p for n, p in enumerate(parameters) if p in parameters[:n]), None):
+            sentence = f'the check "{match[1]}" has two parameters "{again}"; name them apart'
+            raise file.wrong(sentence, "checks", head)
         for used in re.findall(r"\{([^\W\d]\w*)\}", body.rtl):
             if used not in parameters:
                 known = f"its parameters are: {', '.join(parameters)}" if parameters else "it takes none"

@@ -164,8 +164,10 @@ def render(summary: Summary, *, title: str) -> RenderableType:
         head.append(" (ablation: only common sense was required)", style="not bold")
     n, failed = _judged(summary.prompts), sum(each.count for each in summary.failures)
     parts: list[RenderableType] = [head]
-    if n != summary.scope.total:
-        parts.append(Text(f"{n:,} of {how_many(summary.scope.total)} judged", style="yellow"))
+    if n < (total := summary.scope.total):
+        parts.append(Text(f"{n:,} of {how_many(total)} judged", style="yellow"))
+    elif n > total:
+        parts.append(Text(f"{how_many(n)} judged, but only {total:,} there now", style="yellow"))
     parts += [Text(), _TaskTable(summary), Text(), *_overall(summary), *_missed(summary.missing)]
     if failed:
         told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all completions:"

@@ -93,6 +93,12 @@ def test_recorded_programs_survive_chat(program: str, fails: str | None) -> None
         " <thinking>\n" + OTHER + "</thinking>\n" + BODY,
         OTHER + "\nThat may do.</think>\n\nHere it is:\n" + TASK,
         fenced(TASK) + "<think>\n" + fenced(OTHER) + "\nHm, ",
+        "<THINK>\n" + OTHER + "</Think>\n" + TASK,
+        "<think>They say </think>, and\n\n" + OTHER + "\nor not.\n</think>\n" + TASK,
+        "<think>\nI will greet.</think>Here it is:\n" + fenced(TASK),
+        OTHER + "\nThat may do.</THINKING>\n" + fenced(TASK) + "It thinks.\n</think>\n",
+        fenced(TASK) + "To fill in:\n" + fenced('def task_program():\n    """Says it."""\n    ...\n'),
+        fenced("def task_program():\n    pass\n") + "Filled in:\n" + fenced(TASK),
         BODY,
         BODY.lstrip(),
         fenced(BODY),
@@ -145,6 +151,22 @@ def test_thoughts_that_end_in_nothing_are_no_program() -> None:
     assert source("<think>\n" + fenced(TASK)) == ""
     kept = 'def task_program():\n    say("""\n<think> is a tag, and so is\n</think>\n""")\n'
     assert source(kept) == kept
+
+
+@pytest.mark.parametrize("tag", ["<think>", "</think>", "</THINK>"])
+def test_a_tag_in_code_begins_and_ends_no_thought(tag: str) -> None:
+    in_line = f"def task_program():\n    say('a {tag}')\n"
+    alone = f'def task_program():\n    say("""\n{tag}\n""")\n'
+    for code in (in_line, alone):
+        assert source(f"<think>\nFirst:\n{fenced(OTHER)}</think>\nSo:\n{fenced(code)}Done.\n") == code
+        assert source(f"So:\n{fenced(code)}Done.\n") == code
+        assert source(f"So:\n{fenced(code)}".removesuffix("```\n")) == code
+    assert source(f"Here it is:\n\n{in_line}\nThat is all of it.\n") == in_line
+
+
+def test_an_outline_is_taken_where_there_is_nothing_else() -> None:
+    outline = "def task_program():\n    pass\n"
+    assert source("Here:\n" + fenced(outline)) == outline
 
 
 def test_other_blocks_come_along_only_where_needed() -> None:

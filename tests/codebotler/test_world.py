@@ -49,6 +49,17 @@ def test_world_file_holds_all_that_a_world_is(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("shift", [0.0, 1e5])
+def test_a_point_on_a_slanted_edge_is_within(shift: float) -> None:
+    room = "{{name: a, footprint: [[{0}, 0], [{1}, 0.3], [{0}, 3]], stand_at: [{2}, {3}]}}"
+    room = f"robot: a\nrooms: [{room}]\n"
+    ends = shift, shift + 0.7
+    assert read(room.format(*ends, shift + 0.7 / 3, 0.1)).rooms[0].stand_at
+    assert read(room.format(*ends, shift + 0.7, 0.3)).rooms[0].stand_at
+    with pytest.raises(BadInput, match="outside of the footprint"):
+        read(room.format(*ends, shift + 0.7 / 3 + 0.001, 0.1))
+
+
 def test_only_the_rooms_and_the_start_are_needed() -> None:
     assert read("robot: a\nrooms: [a]\n") == World((Room("a"),), "a", about="", may_wait_forever=False)
 

@@ -72,6 +72,9 @@ def test_a_missing_file(tmp_path: Path) -> None:
 def test_an_empty_name() -> None:
     for verb in (("evaluate",), ("import", "--out", "run")):
         assert refused(*verb, "") == "nothing is named; name a run, a .jsonl, or a folder or zip of .py"
+    for words in (("show",), ("export",), ("import", "a.jsonl", "--out"), ("evaluate", "a.jsonl", "--out")):
+        assert refused(*words, "") == "nothing is named; name a run"
+    assert refused("export", "run", "--out", "") == "nothing is named; name a file"
 
 
 def test_an_empty_file(tmp_path: Path) -> None:
@@ -528,10 +531,16 @@ def test_show_gives_pass_at_any_k_that_the_run_can_estimate(run: Path) -> None:
 def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
-    (tmp_path / "run" / "evaluations" / "paper.jsonl").write_text('{"task": "SayGoodDay"}\n')
-    expected = "run/evaluations/paper.jsonl, line 1: this line is no row of an evaluation; --redo starts over"
-    assert refused("show", "run", cwd=tmp_path) == expected
-    assert refused("evaluate", "run", cwd=tmp_path) == expected
+    rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
+    for line, fault in [
+        ('{"task": "SayGoodDay"}', "row of an evaluation"),
+        ("?", "JSON"),
+        ("[]", "JSON object"),
+    ]:
+        rows.write_text(f"{line}\n")
+        expected = f"run/evaluations/paper.jsonl, line 1: this line is no {fault}; --redo starts over"
+        assert refused("show", "run", cwd=tmp_path) == expected
+        assert refused("evaluate", "run", cwd=tmp_path) == expected
 
 
 def test_export_writes_a_row_for_each_completion_and_world(run: Path) -> None:

@@ -29,6 +29,12 @@ def sentence_about(path: Path) -> str:
     return str(caught.value)
 
 
+def test_an_assignment_may_be_annotated(tmp_path: Path) -> None:
+    text = "prompt: str\nname: str = 'n'\ncompletion: str = 'x'\n"
+    (completion,) = published_completions(zipped(tmp_path / "a.zip", {"T_0_0.py": text}))
+    assert (completion.program, completion.instruction) == ("x", None)
+
+
 def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     members: dict[str, str | bytes] = {
         "a/T_0_10.py": FILE,

@@ -56,6 +56,16 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("prompts: [p]", "prompts: []", 'line 3: "prompts" has too few entries'),
         ("category: Location", "category: Place", "line 5: \"category\" is 'Place', but it should be"),
         ("goes:", "2 goes:", 'line 5: "2 goes" is no head of a check; write name or name(p1, p2)'),
+        (
+            "says(what)",
+            '"says(what, )"',
+            'line 6: "says(what, )" is no head of a check; write name or name(p1, p2)',
+        ),
+        (
+            "says(what)",
+            '"says(what, what)"',
+            'line 6: the check "says" has two parameters "what"; name them apart',
+        ),
         ('"kitchen"))', '"kitchen")', 'line 5: the check "goes" is no valid formula'),
         ("goto(", "gote(", 'line 5: the check "goes" is no valid formula'),
         ("[goes,", "[gose,", 'line 11: there is no check "gose"; add it under checks'),
@@ -82,6 +92,11 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
             'says("bye")]\n',
             'says("bye")]\n  - robot: r\n    about: one\n    rooms: [r]\n    require: [goes]\n',
             'line 13: world 2 is about "one", as world 1 is; say what is special in each',
+        ),
+        (
+            'says("bye")]\n',
+            'says("bye")]\n  - robot: r\n    about: " One "\n    rooms: [r]\n    require: [goes]\n',
+            'line 13: world 2 is about " One ", as world 1 is; say what is special in each',
         ),
         ("require: [goes,", "demand: [goes,", 'line 8: the key "require" is missing'),
         ("robot: kitchen", "robot: hall", 'line 9: the robot starts in "hall", but the rooms are: kitchen'),
@@ -127,6 +142,10 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, s
         (SUITE + "rules: {gravity: 9.81}\n", 'line 3: the key "gravity" means nothing here'),
         (SUITE + "rules: {skill_seconds: 2}\n", 'line 3: "skill_seconds" is 2, but it should be 0'),
         (SUITE + "rules: {limits: {calls: 0}}\n", 'line 3: "calls" is 0, but it should be greater than 0'),
+        (
+            "version: 1\nname: my-ablation\n",
+            'line 2: "my-ablation" ends as the files of an ablation do; choose a name without "-ablation"',
+        ),
         ("", "suite.yaml: the file is empty"),
     ],
 )

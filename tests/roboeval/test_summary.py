@@ -117,6 +117,11 @@ def test_tasks_without_a_score_are_told_apart() -> None:
         summary([], suite, scope=scope)
 
 
+def test_rows_whose_completions_are_gone_are_told() -> None:
+    text = printed(render(summary(ROWS, SUITE, scope=Scope({"Visit": 3})), title="x"))
+    assert text.startswith("x\n4 completions judged, but only 3 there now\n")
+
+
 def test_a_finished_evaluation_does_not_count_what_it_judged() -> None:
     assert "completions judged" not in printed(render(summary(ROWS, SUITE), title="x"))
 

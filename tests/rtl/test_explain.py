@@ -28,6 +28,32 @@ VERBS = {
 STEP = re.compile(rf"\b({'|'.join(VERBS)})\b(?:(?!\b(?:{'|'.join(VERBS)})\b)[^:;])*? (?:at |\()step (\d+)")
 
 
+LONG = "x" * 5_000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f'tr.Exists(goto("{LONG}"))',
+        f'tr.Exists(goto("{LONG}+"))',
+        f'tr.Exists(say("{LONG}"))',
+        f'tr.Exists(say("{LONG}+"))',
+        rf'tr.Exists(say(r"\b{LONG}\b"))',
+        f'tr.Exists(say(without("{LONG}")))',
+        f'tr.Exists(say(without("{LONG}+")))',
+        rf'tr.Exists(say(r"^(?!{LONG}\b)"))',
+        f'tr.Exists(ask("{LONG}", ".*"))',
+        f'tr.Exists(pick("{LONG}"))',
+    ],
+)
+def test_a_long_text_of_a_formula_is_shortened(text: str) -> None:
+    why = explain(parse(text), (Event("say", "hi"),))
+    why = why or explain(parse(text), (Event("say", LONG),))
+    assert why is not None
+    assert "xxx" in why.sentence
+    assert len(why.sentence) < 400
+
+
 def subformulas(formula: Formula) -> list[Formula]:
     match formula:
         case And(parts) | Or(parts):

@@ -14,14 +14,15 @@ if TYPE_CHECKING:
 
 _MOST = 200  # texts that are spelled out, and of these:
 _MOST_TOLD = 20
-_RUN = 3  # numbers in a row that are told as a range
+_RUN = 3  # numbers in a row, at least, that are told as a range
 
+_FLAGS = re.IGNORECASE | re.DOTALL
 _NUMERAL = re.compile("0|[1-9][0-9]{0,8}")
 
 # Stand for themselves in what is spelled out; no formula holds these characters.
 _MARKS = {"AT_BOUNDARY": "\ue000", "AT_BEGINNING": "\ue001", "AT_END": "\ue002"}
 _MARKED = re.compile("([\ue000\ue001]?)( ?)([^\ue000-\ue002]+?)( ?)([\ue000\ue002]?)")
-PLAIN, _WORD, _NUMBER = '"{}"', 'the word "{}"', "a number from {}"
+PLAIN, _WORD, _NUMBER = '"{}"', 'the word "{}"', "a number from {} as a word of its own"
 _PLACES: dict[tuple[str, ...], str] = {
     ("", "", "", ""): PLAIN,
     ("\ue000", "", "", "\ue000"): _WORD,
@@ -40,7 +41,7 @@ _PLACES: dict[tuple[str, ...], str] = {
 def choices(pattern: str) -> dict[str, tuple[str, ...]]:
     """What a text must hold so that a regex is found in it, in words; empty where that is no choice of texts.
 
-    Numbers in a row are told as a range.
+    Words that are numbers in a row, and nothing else, are told as a range.
 
     Args:
         pattern: the regex.
@@ -49,7 +50,8 @@ def choices(pattern: str) -> dict[str, tuple[str, ...]]:
         how the texts must stand, as a phrase with `{}` where they go, and the texts; the plain ones first.
     """
     try:
-        texts = _spelled(_parsed(pattern)) or ()
+        tree = _parsed(pattern)
+        texts = () if tree.state.flags & ~(_FLAGS | re.UNICODE) else _spelled(tree) or ()
     except (re.error, RecursionError, OverflowError):
         return {}
     told: dict[str, dict[str, None]] = {PLAIN: {}}
@@ -61,20 +63,14 @@ def choices(pattern: str) -> dict[str, tuple[str, ...]]:
         if plain != plain.strip() or ("word" in place and not (plain[0].isalnum() and plain[-1].isalnum())):
             return {}  # of what is no word, a boundary tells something else
         told.setdefault(place, {})[plain] = None
-    ranged = {place: _ranged(plain) for place, plain in told.items() if plain}
-    if len(ranged.get(_WORD, ())) == 1 < len(told[_WORD]):
-        ranged = {_NUMBER if place == _WORD else place: plain for place, plain in ranged.items()}
-    return ranged if sum(map(len, ranged.values())) <= _MOST_TOLD else {}
+    phrases = dict(_phrase(place, tuple(plain)) for place, plain in told.items() if plain)
+    return phrases if sum(map(len, phrases.values())) <= _MOST_TOLD else {}
 
 
-def _ranged(texts: Iterable[str]) -> tuple[str, ...]:
-    runs: list[list[str]] = []
-    for text in texts:
-        if runs and _is_next(runs[-1][-1], text):
-            runs[-1].append(text)
-        else:
-            runs.append([text])
-    return tuple(told for run in runs for told in ([f"{run[0]} to {run[-1]}"] if len(run) >= _RUN else run))
+def _phrase(place: str, texts: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    if place == _WORD and len(texts) >= _RUN and all(map(_is_next, texts, texts[1:])):
+        return _NUMBER, (f"{texts[0]} to {texts[-1]}",)
+    return place, texts
 
 
 def _is_next(one: str, other: str) -> bool:
@@ -84,7 +80,7 @@ def _is_next(one: str, other: str) -> bool:
 def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)
-        return import_module("re._parser").parse(pattern, re.IGNORECASE | re.DOTALL)
+        return import_module("re._parser").parse(pattern, _FLAGS)
 
 
 def _spelled(items: Any) -> list[str] | None:  # noqa: ANN401 - the same

@@ -149,7 +149,7 @@ def lacks(text: Text, actual: str) -> list[str]:
                 return []
             if (start := _forbidden_start(pattern)) and (found := compile_regex(start).match(actual)):
                 return [f"starts with {quoted(found[0])}"]
-            return [f"lacks {named}" if (named := _named(pattern)) else f"does not match /{pattern}/"]
+            return [f"lacks {named}" if (named := _named(pattern)) else f"does not match {_pattern(pattern)}"]
 
 
 def missing(text: Text, actual: str) -> int:
@@ -181,7 +181,7 @@ def room(pattern: str) -> str:
     """
     names = literals(pattern)
     if not names:
-        return f"a room matching the pattern /{pattern}/"
+        return f"a room matching the pattern {_pattern(pattern)}"
     return listed([room_name(name) for name in names], "or")
 
 
@@ -210,8 +210,11 @@ def shortened(text: str) -> str:
     Args:
         text: any text.
     """
-    line = " ".join(text.split())
-    return line if len(line) <= _SHOWN else line[: _SHOWN - 1].rstrip() + "…"
+    return _cut(" ".join(text.split()))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _SHOWN else text[: _SHOWN - 1].rstrip() + "…"
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
@@ -270,18 +273,28 @@ def _qualities(text: Text) -> list[str]:
             if is_any(text):
                 return []
             if start := _forbidden_start(pattern):
-                return [f'not starting with "{listed(literals(start.removesuffix(_END_OF_WORD)), "or")}"']
-            return [f"with {named}" if (named := _named(pattern)) else f"matching the pattern /{pattern}/"]
+                return [f'not starting with "{_either(literals(start.removesuffix(_END_OF_WORD)))}"']
+            return [
+                f"with {named}" if (named := _named(pattern)) else f"matching the pattern {_pattern(pattern)}"
+            ]
 
 
 def _named(pattern: str) -> str:
-    phrases = [place.format(listed(texts, "or")) for place, texts in choices(pattern).items()]
+    phrases = [place.format(_either(texts)) for place, texts in choices(pattern).items()]
     return listed(phrases, "or")
 
 
 def _word(pattern: str) -> str:
     names = literals(pattern)
-    return f'the word "{listed(names, "or")}"' if names else f"words matching the pattern /{pattern}/"
+    return f'the word "{_either(names)}"' if names else f"words matching the pattern {_pattern(pattern)}"
+
+
+def _pattern(pattern: str) -> str:
+    return f"/{_cut(pattern)}/"
+
+
+def _either(texts: Iterable[str]) -> str:
+    return listed([*map(_cut, texts)], "or")
 
 
 def _forbidden_start(pattern: str) -> str:
@@ -316,7 +329,7 @@ def _destination(text: Text, anywhere: str) -> str:
 def _thing(text: Text, thing: str) -> str:
     match text:
         case Regex(pattern) if names := literals(pattern):
-            return f'"{listed(names, "or")}"'
+            return f'"{_either(names)}"'
         case _:
             return f"{thing} {with_texts(text)}".rstrip()
 
@@ -345,6 +358,6 @@ def _question(element: Element, question: str) -> str:
 def _topic(text: Text, question: str) -> str:
     match text:
         case Regex(pattern) if names := literals(pattern):
-            return f"about {listed(names, 'or')}"
+            return f"about {_either(names)}"
         case _:
             return f"{question} {with_texts(text)}"
