@@ -100,7 +100,10 @@ class Zygote:
         if self._end_is_unread:
             self._end_of_child()  # of the last one, which nobody waited for
         self._end_is_unread = True
-        return self._read_report()
+        pid = self._read_report()
+        if pid <= 1:  # a signal to it would hit a whole group of processes
+            raise LostChildError("the zygote does not say which process it forked")
+        return pid
 
     def _end_of_child(self) -> int:
         self._end_is_unread = False
