@@ -366,10 +366,12 @@ def print_summary(
 
 def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     """Print what the linter finds in all tasks or one; status 1 if anything is open."""
-    from roboeval.lint import lint, render
+    from roboeval.findings import render
+    from roboeval.lint import lint
+    from roboeval.trials import tried
 
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
-    linted = (lint(one, suite) for one in wanted)
+    linted = (lint(one, tried(one, suite, workers=cores())) for one in wanted)
     findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
     print(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):

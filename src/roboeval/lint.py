@@ -7,105 +7,30 @@ then with any. Only a text unlike all samples, or an option that is no text, cou
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from pathlib import Path
-from typing import Literal, TypeAlias
 
 from codebotler.badinput import YamlFile
-from codebotler.models.recorded import NAMES, read_replies, recorded_model
 from codebotler.rtl import Element, Formula, Regex, Text
 from codebotler.rtl.wording import listed
-from codebotler.simulator.engine import run
 from codebotler.simulator.robot import resolve_room
-from roboeval.evaluate import judge
+from roboeval.findings import Finding, Kind
 from roboeval.names import absent_names
 from roboeval.satisfiability import Reasoner, Undecided, elements
-from roboeval.suite import Check, Requirement, Scenario, Suite, Task
-from roboeval.taxonomy import Verdict
+from roboeval.suite import Check, Requirement, Scenario, Task
+from roboeval.trials import Verdicts
 from roboeval.witnesses import can_match, representative_texts, samples
 
-Kind = Literal[
-    "unsatisfiable",
-    "implied",
-    "undecided",
-    "unused",
-    "untripped",
-    "dead-regex",
-    "absent",
-    "same-worlds",
-    "stale-acceptance",
-]
 
-Verdicts: TypeAlias = Sequence[Verdict]
-"""How one program did in all worlds of a task, or of its ablation."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Something about a task that is likely to be a mistake.
-
-    Args:
-        kind: what sort of mistake.
-        subject: what has it, in words that stay the same while the mistake does.
-        message: one sentence.
-        path: the task file.
-        line: where in it, counted from 1.
-        accepted: why it is there on purpose, as the task file says; None where it is open.
-    """
-
-    kind: Kind
-    subject: str
-    message: str
-    path: Path
-    line: int | None
-    accepted: str | None = None
-
-    @property
-    def name(self) -> str:
-        """By which a task file accepts it, such as `implied: comes_back`."""
-        return f"{self.kind}: {self.subject}"
-
-    def told(self) -> str:
-        """As a line for a reader, with the path as seen from the current folder."""
-        here = Path.cwd()
-        path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
-        what, why = ("warning", "") if self.accepted is None else ("accepted", f": {self.accepted}")
-        return f"{path}:{self.line or 1}: {what}: {self.message} [{self.name}]{why}"
-
-
-def lint_suite(suite: Suite, *, workers: int = 1) -> list[Finding]:
-    """Look for mistakes in all tasks of a suite.
-
-    Args:
-        suite: tasks and rules.
-        workers: how many recorded programs are run at the same time.
-
-    Raises:
-        BadInput: a file of recorded programs is wrong.
-        EngineError: no isolated process can be started.
-    """
-    verdicts = judged(suite.tasks.values(), suite, workers=workers)
-    return [one for name, task in suite.tasks.items() for one in lint(task, suite, verdicts=verdicts[name])]
-
-
-def lint(task: Task, suite: Suite, *, verdicts: Sequence[Verdicts] | None = None) -> list[Finding]:
+def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
     """Look for mistakes in a task.
 
     Args:
         task: the task.
-        suite: to which it belongs.
-        verdicts: on programs that are meant to be right or wrong; by default those that are recorded for the
-            task are run.
-
-    Raises:
-        BadInput: a file of recorded programs is wrong.
-        EngineError: no isolated process can be started.
+        verdicts: on programs that are meant to be right or wrong.
     """
-    if verdicts is None:
-        verdicts = judged([task], suite)[task.name]
     places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
     found = [
         *_unused(task),
@@ -117,68 +42,6 @@ def lint(task: Task, suite: Suite, *, verdicts: Sequence[Verdicts] | None = None
     ordered = sorted(distinct.values(), key=lambda finding: (finding.line or 0, finding.name))
     reasons = {accepted.finding: accepted.because for accepted in task.accepted}
     return [*(replace(one, accepted=reasons.get(one.name)) for one in ordered), *_stale(ordered, task)]
-
-
-def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
-    """Findings as lines for a reader, and that there is none.
-
-    Args:
-        findings: what was found.
-        accepted: whether to tell also the accepted ones, with their reasons, rather than only count them.
-    """
-    every = [*findings]
-    lines = [one.told() for one in every if accepted or one.accepted is None]
-    if hidden := len(every) - len(lines):
-        number = "1 finding" if hidden == 1 else f"{hidden} findings"
-        more = f"{number} more {'is' if hidden == 1 else 'are'} accepted by the task files"
-        none = f"nothing was found but {number} that the task files accept"
-        lines.append(f"{more if lines else none}; --accepted tells why")
-    return "\n".join(lines) or "nothing was found"
-
-
-def judged(tasks: Iterable[Task], suite: Suite, *, workers: int = 1) -> Mapping[str, list[Verdicts]]:
-    """Run the recorded programs of tasks in all their worlds, those of an ablation too.
-
-    Args:
-        tasks: of the suite.
-        suite: by whose rules worlds are simulated.
-        workers: how many programs are run at the same time.
-
-    Returns:
-        for each task, by name, one entry a program and one more a program where the task has an ablation.
-
-    Raises:
-        BadInput: a file of recorded programs is wrong.
-        EngineError: no isolated process can be started.
-    """
-    judges = [(task, worlds) for task in tasks for worlds in (task.scenarios, task.ablation) if worlds]
-    runs = [(task.name, program, worlds) for task, worlds in judges for program in recorded_programs(task)]
-    pairs = ((program, scenario.world) for _, program, worlds in runs for scenario in worlds)
-    outcomes = iter([*run(pairs, workers=workers, rules=suite.rules)])
-    verdicts: dict[str, list[Verdicts]] = {task.name: [] for task in suite.tasks.values()}
-    for name, _, worlds in runs:
-        verdicts[name].append([judge(next(outcomes), scenario) for scenario in worlds])
-    return verdicts
-
-
-def recorded_programs(task: Task) -> list[str]:
-    """The programs that somebody wrote for the task's prompts, right and wrong ones.
-
-    They stand in `recorded/*/TASK.yaml` of the suite's folder; where it has no such folder, in the package.
-
-    Args:
-        task: the task.
-
-    Raises:
-        BadInput: a file of recorded programs is wrong.
-    """
-    folder = task.path.parents[1] / "recorded"
-    if folder.is_dir():
-        written = [read_replies(path) for path in sorted(folder.glob(f"*/{task.path.name}"))]
-    else:
-        written = [recorded_model(name).replies for name in NAMES]
-    replies = (reply for one in written for prompt in task.prompts for reply in one.get(prompt, ()))
-    return [*dict.fromkeys(reply.program for reply in replies)]
 
 
 # --- the task as a whole
@@ -390,6 +253,8 @@ def _texts(element: Element) -> list[Text]:
 
 
 _PLAIN = ", as long as each visit names one room of the world"
+
+
 # --- accepted findings
 
 

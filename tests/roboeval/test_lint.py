@@ -19,10 +19,12 @@ from codebotler.rtl.formula import CutName
 from codebotler.trace import Event, Option, Trace
 from roboeval.catalogue import new_task
 from roboeval.evaluate import evaluate
-from roboeval.lint import Finding, lint, lint_suite, render
+from roboeval.findings import Finding, render
+from roboeval.lint import lint
 from roboeval.records import Completion
 from roboeval.satisfiability import Automaton, Reasoner, Undecided
 from roboeval.suite import Suite, load_suite
+from roboeval.trials import tried
 from roboeval.witnesses import can_match, representative_texts, samples
 
 Lint = Callable[..., list[Finding]]
@@ -75,7 +77,8 @@ def linted(tmp_path: Path) -> Lint:
             lines += [f"  - {{finding: '{name}', because: {why}}}" for name, why in accepted.items()]
         (suite / "tasks" / "Hello.yaml").write_text("\n".join(lines) + "\n")
         loaded = load_suite(str(suite))
-        findings = lint(loaded.task("Hello"), loaded, verdicts=None if untripped else [])
+        task = loaded.task("Hello")
+        findings = lint(task, tried(task, loaded) if untripped else [])
         return [one for one in findings if untripped or one.kind != "untripped"]
 
     return write
@@ -328,7 +331,7 @@ def test_a_person_in_a_text_who_is_in_another_world_only(
     first = re.sub("checks:.*\n", lambda _: check, first)
     path.write_text(f"{first}  - about: nobody is in the kitchen{second}")
     suite = load_suite(str(tmp_path))
-    found = lint(suite.task("Hello"), suite, verdicts=[])
+    found = lint(suite.task("Hello"), [])
     assert [one.subject for one in found if one.kind == "absent"] == [
         f"{name} in mentions" for name in absent
     ]
@@ -409,8 +412,8 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path: Path) -> None:
     new_task(tmp_path, "MakeTea")
     suite = load_suite(str(tmp_path))
-    assert lint_suite(suite) == []
     task = suite.task("MakeTea")
+    assert lint(task, tried(task, suite)) == []
     replies = read_replies(tmp_path / "recorded" / "mine" / "MakeTea.yaml")[task.prompts[0]]
     rows = [
         Completion(task="MakeTea", prompt=0, index=i, program=reply.program)
@@ -433,7 +436,8 @@ def test_a_new_task_leaves_programs_that_are_recorded_for_it(tmp_path: Path) -> 
 
 @pytest.fixture(scope="module")
 def of_paper() -> list[Finding]:
-    return lint_suite(load_suite("paper"), workers=2)
+    suite = load_suite("paper")
+    return [one for task in suite.tasks.values() for one in lint(task, tried(task, suite, workers=2))]
 
 
 def test_the_papers_suite_has_no_open_finding(of_paper: list[Finding]) -> None:
@@ -444,10 +448,10 @@ def test_the_papers_suite_has_no_open_finding(of_paper: list[Finding]) -> None:
 
 def test_a_finding_of_the_papers_suite_comes_back(paper: Suite) -> None:
     task = paper.task("HalloweenShopping")
-    findings = lint(replace(task, accepted=()), paper, verdicts=[])
+    findings = lint(replace(task, accepted=()), [])
     assert [one.name for one in findings if one.kind != "untripped"] == ["same-worlds: 4 and 5"]
     assert all(one.accepted is None for one in findings)
-    assert [one.accepted is None for one in lint(task, paper, verdicts=[])] == [True, False]
+    assert [one.accepted is None for one in lint(task, [])] == [True, False]
 
 
 IMPLIED = {

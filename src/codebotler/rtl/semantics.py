@@ -87,7 +87,7 @@ def test_holds(test: Test, trace: Trace, span: Span) -> bool:
     assert_never(test)
 
 
-test_holds.__test__ = False  # type: ignore[attr-defined]
+test_holds.__test__ = False  # type: ignore[attr-defined]  # lest pytest takes it for a test
 
 
 def matches(element: Element, trace: Trace, at: int) -> bool:

@@ -1,0 +1,57 @@
+"""How the programs that are recorded for a task, right and wrong ones, do in its worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+from codebotler.models.recorded import NAMES, read_replies, recorded_model
+from codebotler.simulator.engine import run
+from roboeval.evaluate import judge
+from roboeval.suite import Suite, Task
+from roboeval.taxonomy import Verdict
+
+Verdicts: TypeAlias = Sequence[Verdict]
+"""How one program did in all worlds of a task, or of its ablation."""
+
+
+def tried(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
+    """Run the recorded programs of a task in all its worlds, those of its ablation too.
+
+    Args:
+        task: the task.
+        suite: by whose rules worlds are simulated.
+        workers: how many programs are run at the same time.
+
+    Returns:
+        one entry a program, and one more a program where the task has an ablation.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+        EngineError: no isolated process can be started.
+    """
+    judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
+    runs = [(program, worlds) for worlds in judges for program in recorded_programs(task)]
+    pairs = ((program, scenario.world) for program, worlds in runs for scenario in worlds)
+    outcomes = iter([*run(pairs, workers=workers, rules=suite.rules)])
+    return [[judge(next(outcomes), scenario) for scenario in worlds] for _, worlds in runs]
+
+
+def recorded_programs(task: Task) -> list[str]:
+    """The programs that somebody wrote for the task's prompts, right and wrong ones.
+
+    They stand in `recorded/*/TASK.yaml` of the suite's folder; where it has no such folder, in the package.
+
+    Args:
+        task: the task.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+    """
+    folder = task.path.parents[1] / "recorded"
+    if folder.is_dir():
+        written = [read_replies(path) for path in sorted(folder.glob(f"*/{task.path.name}"))]
+    else:
+        written = [recorded_model(name).replies for name in NAMES]
+    replies = (reply for one in written for prompt in task.prompts for reply in one.get(prompt, ()))
+    return [*dict.fromkeys(reply.program for reply in replies)]
