@@ -2,8 +2,9 @@
 
 The list is fixed: every distinct (program, world) pair of the corpus, where CODEBOTLER_CORPUS names it, or
 else of the recorded models. Nothing is deduplicated; ours and the in-process way both compile each program
-once, while the clock runs. The three ways take turns over parts of the list, so that the ratios hold on a
-machine whose speed drifts. Pairs that reach a limit, loops and programs that hang are printed apart.
+once, while the clock runs. The three ways take turns over parts of the list, several times, so that the
+ratios hold on a machine whose speed drifts. Pairs that reach a limit, loops and programs that hang are
+printed apart.
 """
 
 import json
@@ -16,7 +17,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cache, partial
-from itertools import groupby
+from itertools import count, groupby, repeat
 from pathlib import Path
 
 from codebotler.simulator.engine import Lanes
@@ -24,12 +25,12 @@ from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Status
 from codebotler.world import Room, World
-from in_process import Reused
+from in_process import Reused, compiled
 from roboeval.records import recorded_completions
 from roboeval.suite import load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))
-ROUNDS = 3
+PARTS, TIMES = 3, 3
 
 Pair = tuple[str, World]
 
@@ -77,8 +78,15 @@ def reused(world: World) -> Reused:
     return Reused(world)
 
 
-def run_bare(part: Sequence[Pair]) -> None:
+@cache
+def forget(time: int) -> None:  # noqa: ARG001 - once for each time
+    """Compile all programs anew, which ours does, too: it keeps the code of few."""
+    compiled.cache_clear()
+
+
+def run_bare(part: Sequence[Pair], time: int = 0) -> None:
     """Run pairs in this process."""
+    forget(time)
     for pair in part:
         reused(NOWHERE).run(pair)
 
@@ -86,10 +94,11 @@ def run_bare(part: Sequence[Pair]) -> None:
 NOWHERE = World((Room("nowhere"),), "nowhere")
 
 
-def in_process(pool: ProcessPoolExecutor, part: Sequence[Pair]) -> None:
+def in_process(pool: ProcessPoolExecutor, times: Iterator[int], part: Sequence[Pair]) -> None:
     """No isolation: the same programs in as many processes."""
     share = -(-len(part) // (8 * WORKERS))
-    list(pool.map(run_bare, [part[at : at + share] for at in range(0, len(part), share)]))
+    shares = [part[at : at + share] for at in range(0, len(part), share)]
+    list(pool.map(run_bare, shares, repeat(next(times))))
 
 
 def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
@@ -109,10 +118,10 @@ def seconds(way: Callable[[Sequence[Pair]], object], part: Sequence[Pair]) -> fl
 
 
 def parts(whole: Sequence[Pair]) -> Iterator[list[Pair]]:
-    """The list in as many parts as there are rounds; each holds programs from all over the list."""
+    """The list in parts; each holds programs from all over the list."""
     programs = [list(same) for _, same in groupby(whole, key=lambda pair: pair[0])]
-    for start in range(ROUNDS):
-        yield [pair for program in programs[start::ROUNDS] for pair in program]
+    for start in range(PARTS):
+        yield [pair for program in programs[start::PARTS] for pair in program]
 
 
 def main() -> None:
@@ -127,36 +136,37 @@ def main() -> None:
         limited = [pair for pair, status in zip(whole, statuses, strict=True) if status is Status.TIMEOUT]
         ways: dict[str, Callable[[Sequence[Pair]], object]] = {
             "isolated, one child a run (ours)": ours,
-            "in-process, no isolation": partial(in_process, pool),
+            "in-process, no isolation": partial(in_process, pool, count(1)),
             "one `python -c pass` a run": partial(fresh_interpreters, threads),
         }
         times: dict[str, list[float]] = {}
-        for part in parts(honest):
+        for part in list(parts(honest)) * TIMES:
             for name, way in ways.items():
                 times.setdefault(name, []).append(seconds(way, part))
         report(len(honest), times)
         if limited:
             at_limit = seconds(ours, limited) / len(limited)
             print(f"{len(limited)} pairs that reach a limit, ours: {1000 * at_limit:.1f} ms a run")
-        report_hanging(ours, honest[: len(honest) // ROUNDS])
+        report_hanging(ours, honest[: len(honest) // PARTS])
     report_loops(honest)
 
 
-def report(count: int, times: dict[str, list[float]]) -> None:
+def report(pairs: int, times: dict[str, list[float]]) -> None:
     """Print the figures."""
-    print(f"{count} distinct pairs of program and world, {WORKERS} workers, Python {sys.version.split()[0]}")
+    print(f"{pairs} distinct pairs of program and world, {WORKERS} workers, Python {sys.version.split()[0]}")
     total = {name: sum(each) for name, each in times.items()}
     for name, spent in total.items():
-        print(f"{name:36}{count / spent:10.0f} runs/s")
+        print(f"{name:36}{pairs * TIMES / spent:10.0f} runs/s")
     ours, bare, fresh = total.values()
-    print(f"ours / in-process:         {bare / ours:.3f}   (by round: {ratios(times, 1)})")
-    print(f"ours / fresh interpreters: {fresh / ours:.2f}    (by round: {ratios(times, 2)})")
+    print(f"ours / in-process:         {bare / ours:.3f}   (by round, sorted: {ratios(times, 1)})")
+    print(f"ours / fresh interpreters: {fresh / ours:.2f}    (by round, sorted: {ratios(times, 2)})")
 
 
 def ratios(times: dict[str, list[float]], other: int) -> str:
-    """The ratio in each round."""
+    """The ratios of the rounds, the least first."""
     rounds = list(times.values())
-    return ", ".join(f"{b / a:.3f}" for a, b in zip(rounds[0], rounds[other], strict=True))
+    each = sorted(b / a for a, b in zip(rounds[0], rounds[other], strict=True))
+    return ", ".join(f"{ratio:.3f}" for ratio in each)
 
 
 # --- what is apart

@@ -18,8 +18,9 @@ OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty
 LAST_LINE = 1_000_000
 LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 WAITS = "it waits for something that can never come"
-Answer: TypeAlias = tuple[str, object, dict[str, Result]]
-STOP: Answer = ("stop", None, {})
+Answer: TypeAlias = tuple[str, object, bool]
+"""What kind of answer, what it says, and whether looking may show something else now."""
+STOP: Answer = ("stop", None, False)
 Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 
@@ -118,9 +119,9 @@ class Conversation:
                 return message
             match message:
                 case [str() as name, list() as values, int() | float() as now, int() as waits]:
-                    answer = self._answer(name, values, now)
+                    kind, value, changed = self._answer(name, values, now)
                     if waits:
-                        self.child.send(answer)
+                        self.child.send((kind, value, self._known() if changed else {}))
                 case _:
                     raise ProtocolError("a request is malformed")
             overrun += self.ledger.limit is not None
@@ -159,24 +160,30 @@ class Conversation:
 
     def _perform(self, skill: Skill, values: list[object]) -> Answer:
         arguments = _arguments(skill, values)
-        self.ledger.calls += 1
-        texts = [t for a in arguments for t in ([a] if isinstance(a, str) else [o.text for o in a])]
-        self.ledger.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - len(arguments))
-        if self.ledger.calls > self.limits.calls:
-            self.ledger.limit = f"{self.limits.calls:,} skill calls"
-        elif any(len(text) > self.limits.text for text in texts):
-            self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
-        elif self.ledger.text > self.limits.trace:
-            self.ledger.limit = f"texts of more than {self.limits.trace:,} characters in all"
+        self._spend(arguments)
         if self.ledger.limit is not None:
             return STOP
-        acts = skill.name not in self.robot.only_looks
         try:
             result = self.robot.perform(skill.name, arguments)
-            return ("ok", result, self._known() if acts else {})
         except RobotError as error:
             self.errors.append(error)
-            return ("error", (len(self.errors) - 1, error.kind, str(error)), self._known())
+            return ("error", (len(self.errors) - 1, error.kind, str(error)), True)
+        return ("ok", result, skill.name not in self.robot.only_looks)
+
+    def _spend(self, arguments: list[Argument]) -> None:
+        ledger, limits = self.ledger, self.limits
+        longest = 0
+        for argument in arguments:
+            texts = (argument,) if isinstance(argument, str) else [option.text for option in argument]
+            longest = max(longest, *map(len, texts), 0)
+            ledger.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - 1)
+        ledger.calls += 1
+        if ledger.calls > limits.calls:
+            ledger.limit = f"{limits.calls:,} skill calls"
+        elif longest > limits.text:
+            ledger.limit = f"a text of more than {limits.text:,} characters"
+        elif ledger.text > limits.trace:
+            ledger.limit = f"texts of more than {limits.trace:,} characters in all"
 
     def _ended(self, final: dict[str, object]) -> Outcome:
         line = final.get("line")
