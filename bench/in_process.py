@@ -30,7 +30,9 @@ CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
 DEEPER = 500  # a robot that is called as a function takes more of the stack than one that is asked by socket
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has
-Execution: TypeAlias = tuple[bytes, tuple[int, float, int, int, int, float], tuple[str, ...], dict[str, Any]]
+Execution: TypeAlias = tuple[
+    bytes, tuple[int, float, int, int, int, float, bool], tuple[str, ...], dict[str, Any]
+]
 ORDINARY = Path(__file__).with_name("ordinary_process.py")
 
 
@@ -185,7 +187,7 @@ class Unwalled(Bare):
         limits = self.limits
         bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
         start = self.robot.rules.clock_starts.timestamp()
-        return code, (*bounds, start), (), {}
+        return code, (*bounds, start, False), (), {}
 
     def ended(self, final: dict[str, Any]) -> Outcome:
         """The outcome of a run that ended like this."""

@@ -1,6 +1,6 @@
 """Tries to find more in what the engine sent than its own source and the names of skills."""
 # ends: finished
-# does: say calls codes count entered known longest namespace now room seconds skills spent start sure ticks
+# does: say calls codes count entered is_live known longest namespace now room seconds skills spent start sure ticks
 
 
 def task_program():

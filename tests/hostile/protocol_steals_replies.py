@@ -1,6 +1,6 @@
 """Tries to find more in the replies than was asked for."""
 # ends: finished
-# does: say ('ok', ['start', 'vault'], {})
+# does: say ('ok', ['start', 'vault'], {}, 0.0)
 
 import inspect
 import os

@@ -190,16 +190,17 @@ class Child:
         return self.end()
 
 
-def cause_of_death(status: int) -> tuple[Status, RunError]:
+def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, RunError]:
     """What a process died of that did not say how it ended.
 
     Args:
         status: its exit status, or minus the signal.
+        seconds: of processor time that it was given.
     """
     match -status:
         case signal.SIGXCPU:
             return Status.TIMEOUT, RunError(
-                "TimeoutError", f"{CPU_SECONDS} seconds of processor time in one step"
+                "TimeoutError", f"{seconds:,} seconds of processor time in one step"
             )
         case signal.SIGSYS:
             return Status.KILLED, RunError(

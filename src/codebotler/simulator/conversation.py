@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from json.encoder import encode_basestring_ascii as quoted
+from math import inf
 from typing import Protocol, TypeAlias
 
 from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import Rules
-from codebotler.simulator.sandbox import ACTS, LOOKS, TELLS
+from codebotler.simulator.sandbox import ACTS, CPU_SECONDS, LIVE_CPU_SECONDS, LOOKS, TELLS
 from codebotler.skills import Skill, SkillTable
 from codebotler.trace import Option, Outcome, RunError, Status, Trace
 
@@ -30,8 +31,13 @@ class Robot(Protocol):
 
     rules: Rules
     skills: SkillTable
-    now: float
-    """What the program's clock shows, in seconds since the start."""
+    is_live: bool
+    """Whether time passes by itself: then sleeping takes it, and ticks are counted anew at each skill."""
+
+    @property
+    def now(self) -> float:
+        """What the program's clock shows, in seconds since the start."""
+
     never_fails: frozenset[str]
     """Skills that return nothing and cannot fail, so that a program need not wait for them."""
     surely: tuple[tuple[str, str], ...]
@@ -49,6 +55,9 @@ class Robot(Protocol):
         Raises:
             RobotError: it cannot.
         """
+
+    def sleep_until(self, now: float) -> None:
+        """Let time pass, until `now` seconds since the start; back at once when it is to stop."""
 
 
 class Conversation:
@@ -77,7 +86,7 @@ class Conversation:
         bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
         start = robot.rules.clock_starts.timestamp()
         sure = tuple(f'"{name}",[{quoted(argument)}]' for name, argument in robot.surely)
-        child.send((code, described(robot), (*bounds, start), sure, self._known()))
+        child.send((code, described(robot), (*bounds, start, robot.is_live), sure, self._known()))
 
     def outcome(self) -> Outcome:
         """Talk to the end.
@@ -121,7 +130,7 @@ class Conversation:
                 case [str() as name, list() as values, int() | float() as now, int() as waits]:
                     kind, value, changed = self._answer(name, values, now)
                     if waits:
-                        self.child.send((kind, value, self._known() if changed else {}))
+                        self.child.send((kind, value, self._known() if changed else {}, self.robot.now))
                 case _:
                     raise ProtocolError("a request is malformed")
             overrun += self.ledger.limit is not None
@@ -130,13 +139,24 @@ class Conversation:
         return None
 
     def _answer(self, name: str, values: list[object], now: float) -> Answer:
-        if self.ledger.limit is None:
+        if self.robot.is_live:
+            self.child.rest()
+        elif self.ledger.limit is None:
             self._let_time_pass(now)
         if self.ledger.limit is None:
             if name in self._skills:
                 return self._perform(self._skills[name], values)
+            if name == "sleep" and self.robot.is_live:
+                return self._sleep(values)
             self.ledger.limit = self._beyond(name)
         return STOP
+
+    def _sleep(self, values: list[object]) -> Answer:
+        match values:
+            case [float(seconds)] if 0 <= seconds < inf:
+                self.robot.sleep_until(self.robot.now + seconds)
+                return ("ok", None, True)
+        raise ProtocolError("nobody can sleep like that")
 
     def _beyond(self, name: str) -> str:
         """The limit that a request which is no skill tells of; one to sleep has been told by its time."""
@@ -151,8 +171,8 @@ class Conversation:
         if now > self.limits.seconds:
             now = self.limits.seconds
             self.ledger.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
-        if now >= self.robot.now:  # else the program has found the channel, and deceives itself
-            self.robot.now = float(now)
+        if now > self.robot.now:  # if it is less, the program has found the channel, and deceives itself
+            self.robot.sleep_until(float(now))
 
     def _known(self) -> dict[str, Result]:
         """What looking shows that takes no argument and leaves no trace, by request: a child need not ask."""
@@ -208,7 +228,7 @@ class Conversation:
     def _died(self, status: int) -> Outcome:
         if not self._heard and not self.child.was_closed():
             raise LostChildError("a child ended before it was closed")
-        cause, error = cause_of_death(status)
+        cause, error = cause_of_death(status, LIVE_CPU_SECONDS if self.robot.is_live else CPU_SECONDS)
         return Outcome(cause, self.robot.trace, error)
 
     def _outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:

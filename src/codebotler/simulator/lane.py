@@ -8,10 +8,9 @@ import zlib
 from collections.abc import Callable
 
 from codebotler.simulator.child import LostChildError
-from codebotler.simulator.conversation import Conversation, ImportsMoreError
+from codebotler.simulator.conversation import Conversation, ImportsMoreError, Robot
 from codebotler.simulator.preparer import Prepared, Preparer
-from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, ZYGOTE
+from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, LIVE_ZYGOTE, ZYGOTE
 from codebotler.simulator.zygote import Zygote
 from codebotler.trace import Outcome
 
@@ -40,7 +39,7 @@ class Lane:
             self._preparer.close()
             raise EngineError(f"the engine does not start: {error}") from None
 
-    def run(self, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
+    def run(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         """Run a program with a robot, once more if a process was lost through no fault of the program.
 
         Args:
@@ -64,6 +63,24 @@ class Lane:
         EVENTS.debug("program %08x: %s%s", name, outcome.status.value, why)
         return outcome
 
+    def run_live(self, source: str, robot: Robot) -> Outcome:
+        """Run a program on a robot, once and never again: what that has done cannot be undone.
+
+        Args:
+            source: the program, which need not even parse.
+            robot: who executes its skills; what it raises besides `RobotError` ends the run and is thrown.
+
+        Raises:
+            EngineError: a process was lost, or the lane was stopped.
+        """
+        try:
+            prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
+            return prepared if isinstance(prepared, Outcome) else self._converse(LIVE_ZYGOTE, prepared, robot)
+        except LostChildError as error:
+            self.close()
+            stopped = "the engine was stopped" if self._stopped else f"an isolated process was lost: {error}"
+            raise EngineError(stopped) from None
+
     def stop(self) -> None:
         """End all processes and with them a run that is still going on; its thread notices."""
         self._stopped = True
@@ -82,7 +99,7 @@ class Lane:
         while self._zygotes:
             self._zygotes.popitem()[1].close()
 
-    def _try(self, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
+    def _try(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         try:
             robot = new_robot()
             prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
@@ -100,9 +117,9 @@ class Lane:
             self.close()
             raise LostChildError(str(error)) from None
 
-    def _converse(self, role: str, prepared: Prepared, robot: SimulatedRobot) -> Outcome:
+    def _converse(self, role: str, prepared: Prepared, robot: Robot) -> Outcome:
         child = self._zygote(role).fork()
-        return Conversation(child, prepared.code, robot, may_import=role == LIBRARY_ZYGOTE).outcome()
+        return Conversation(child, prepared.code, robot, may_import=role != ZYGOTE).outcome()
 
     def _zygote(self, role: str) -> Zygote:
         if role not in self._zygotes:

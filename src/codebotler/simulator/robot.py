@@ -73,7 +73,7 @@ class SimulatedRobot:
         self.things = {room.name: [Thing(label) for label in room.objects] for room in world.rooms}
         self.answers = {room.name: [list(person.answers) for person in room.people] for room in world.rooms}
         self.held: str | None = None
-        self.now = 0.0
+        self.now, self.is_live = 0.0, False
         self.events: list[Event] = []
 
     @property
@@ -95,6 +95,10 @@ class SimulatedRobot:
             RobotError: the robot cannot do it.
         """
         return self.behaviours[skill](self, *arguments)
+
+    def sleep_until(self, now: float) -> None:
+        """Let simulated time pass, until `now` seconds since the start."""
+        self.now = now
 
     def record(
         self, kind: str, text: str, options: tuple[Option, ...] = (), *, found: bool | None = None

@@ -48,3 +48,6 @@ class Rules:
 
 PAPER = Rules()
 """The rules of the paper's suite."""
+
+ENDLESS = Limits(calls=10**12, trace=10**12)
+"""For a run on a robot, where time has no limit and ticks are counted from one skill to the next."""

@@ -23,7 +23,7 @@ class Zygote:
     """One zygote and the children it forks, one at a time.
 
     Args:
-        role: of the two kinds of zygotes.
+        role: of the three kinds of zygotes.
 
     Raises:
         LostChildError: it does not start.

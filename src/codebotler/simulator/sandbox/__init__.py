@@ -23,11 +23,14 @@ MEMORY = 512 * 1024 * 1024
 CPU_SECONDS = 5
 """Seconds of processor time of a closed process, against what ticks cannot see, such as one long call."""
 
+LIVE_CPU_SECONDS = 3600
+"""The same for a run on a robot, which may take all day, and which somebody watches."""
+
 WITHOUT_REFERENCES = 2
 """The version of marshal's format: later ones write what depends on what else the writing process holds."""
 
-PREPARER, ZYGOTE, LIBRARY_ZYGOTE = "preparer", "zygote", "library-zygote"
-"""The roles: who compiles programs, who forks runs, and who forks runs that import something."""
+PREPARER, ZYGOTE, LIBRARY_ZYGOTE, LIVE_ZYGOTE = "preparer", "zygote", "library-zygote", "live-zygote"
+"""The roles: who compiles programs; who forks runs, those that import something, and those on a robot."""
 
 PROGRAM = "<program>"
 """The file that a program's code says it comes from."""

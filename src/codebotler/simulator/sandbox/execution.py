@@ -46,6 +46,7 @@ class Run:
         self.ticks = self.calls = self.room = 0
         self.start = self.seconds = 0.0
         self.longest = 0
+        self.is_live = False
         self.sure: tuple[str, ...] = ()
         self.known: dict[str, Any] = {}
         self.namespace = types.ModuleType("__main__")
@@ -70,7 +71,7 @@ class Run:
     def execute(
         self,
         code: bytes,
-        limits: tuple[int, float, int, int, int, float],
+        limits: tuple[int, float, int, int, int, float, bool],
         sure: tuple[str, ...],
         known: dict[str, Any],
     ) -> str:
@@ -78,12 +79,12 @@ class Run:
 
         Args:
             code: marshalled.
-            limits: ticks, simulated seconds, skill calls, characters of a text and of all texts; and what the
-                clock shows at the start, in seconds.
+            limits: ticks, simulated seconds, skill calls, characters of a text and of all texts; what the
+                clock shows at the start, in seconds; and whether time passes by itself.
             sure: requests of which nothing can come back, whenever they are made.
             known: what looking would show at the start, by request.
         """
-        self.ticks, self.seconds, self.calls, self.longest, self.room, self.start = limits
+        self.ticks, self.seconds, self.calls, self.longest, self.room, self.start, self.is_live = limits
         self.sure, self.known = sure, known
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
@@ -235,11 +236,14 @@ class Run:
         return result
 
     def sleep(self, seconds: object, /) -> None:
-        """Let simulated time pass; the engine hears of it with the next request, or when the time is up."""
+        """Let time pass; the engine hears of simulated time with the next request, or when it is up."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
             raise ValueError("sleep length must be non-negative and finite")
+        if self.is_live:
+            self.request(f'"sleep",[{float(seconds)!r}]')
+            return
         self.now += seconds
         if self.now > self.seconds:
             self.request('"sleep",[]')
@@ -257,8 +261,10 @@ class Run:
         if self.spent:
             raise BudgetSpentError
         send(f"[{request},{self.now!r},1]")
-        kind, value, known = receive()
+        kind, value, known, self.now = receive()
         self.known.update(known)
+        if self.is_live:
+            self.count_anew()
         if kind == "ok":
             return value
         if kind == "error":

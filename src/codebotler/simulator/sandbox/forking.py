@@ -9,7 +9,7 @@ from _socket import CMSG_SPACE, socket
 from marshal import loads
 from posix import getpid, getppid
 
-from codebotler.simulator.sandbox import CHANNEL
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_ZYGOTE, ZYGOTE
 from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.execution import Run
 from codebotler.simulator.sandbox.surroundings import simulate_surroundings
@@ -26,12 +26,13 @@ PID = 8  # bytes of a process id: as an int, a small one would take no memory an
 DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
 
 
-def serve(*, library: bool) -> None:
+def serve(role: str) -> None:
     """Serve runs, one at a time, until the engine closes its end.
 
     Args:
-        library: whether programs are to find the standard library.
+        role: of the three kinds of zygotes; programs find the standard library in all but the first.
     """
+    library, seconds = role != ZYGOTE, LIVE_CPU_SECONDS if role == LIVE_ZYGOTE else CPU_SECONDS
     door = socket(fileno=DOOR)
     run = Run()
     simulate_surroundings(run)
@@ -51,7 +52,7 @@ def serve(*, library: bool) -> None:
     gc.collect()
     gc.freeze()
     report(0 if seccomp is None else 1)
-    while one_run(door, run, seccomp):
+    while one_run(door, run, seccomp, seconds):
         pass
 
 
@@ -86,7 +87,7 @@ class MoreInTheLibrary:
         os._exit(0)
 
 
-def one_run(door: socket, run: Run, seccomp: Filter | None) -> bool:
+def one_run(door: socket, run: Run, seccomp: Filter | None, seconds: int) -> bool:
     """Fork the child of one run and report its process id and, at its end, its wait status.
 
     The dead child is reaped only when the next run is asked for, so that until then its id stays its own.
@@ -98,7 +99,7 @@ def one_run(door: socket, run: Run, seccomp: Filter | None) -> bool:
     pid = os.fork()
     if pid == 0:
         try:
-            go_behind_walls(line, seccomp, parent)
+            go_behind_walls(line, seccomp, seconds, parent)
             play(run)
             os._exit(0)
         finally:
@@ -129,14 +130,14 @@ def end_of(pid: int) -> int:
     return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
 
 
-def go_behind_walls(line: int, seccomp: Filter | None, parent: bytes) -> None:
+def go_behind_walls(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
     """Be the child of one run: take the channel and close the walls."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
     if getppid().to_bytes(PID, "big") != parent:  # it died before that: no signal will come
         os._exit(1)
-    enclose(seccomp)
+    enclose(seccomp, seconds)
 
 
 def play(run: Run) -> None:

@@ -11,7 +11,15 @@ import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: nothing can 
 from _json import encode_basestring_ascii as quoted
 from marshal import dumps
 
-from codebotler.simulator.sandbox import CHANNEL, IMPORTING, MAX_CODE, PLAIN, REFUSED, WITHOUT_REFERENCES
+from codebotler.simulator.sandbox import (
+    CHANNEL,
+    CPU_SECONDS,
+    IMPORTING,
+    MAX_CODE,
+    PLAIN,
+    REFUSED,
+    WITHOUT_REFERENCES,
+)
 from codebotler.simulator.sandbox.channel import receive, send_bytes
 from codebotler.simulator.sandbox.ticks import TOO_LARGE, prepared
 from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
@@ -28,7 +36,7 @@ def serve() -> None:
     answer(REHEARSAL, lowercase=True)
     os.dup2(DOOR, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
-    enclose(seccomp)
+    enclose(seccomp, CPU_SECONDS)
     while True:
         source, lowercase = receive()
         send_bytes(answer(source, lowercase=lowercase))

@@ -27,9 +27,7 @@ def main(role: str, descriptors: list[str]) -> None:
     """
     if descriptors:
         start_again(list(map(int, descriptors)))
-    if (
-        role != "preparer"
-    ):  # bytecode, there in one start and not in the next, would move the heap of a zygote
+    if role != "preparer":  # bytecode, there in one start and not in the next, would move a zygote's heap
         sys.pycache_prefix = os.devnull
     sys.meta_path.insert(0, Given(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
     os.close(CODES)
@@ -40,7 +38,7 @@ def main(role: str, descriptors: list[str]) -> None:
     else:
         from codebotler.simulator.sandbox import forking  # noqa: PLC0415 - the same
 
-        forking.serve(library=role == "library-zygote")
+        forking.serve(role)
 
 
 class Given:

@@ -7,7 +7,7 @@ import os
 import resource
 import sys
 
-from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, MEMORY
+from codebotler.simulator.sandbox import CHANNEL, MEMORY
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -28,15 +28,16 @@ def give_up_rights() -> None:
     refuse_new_rights()
 
 
-def enclose(seccomp: Filter | None) -> None:
+def enclose(seccomp: Filter | None, seconds: int) -> None:
     """Close everything but the channel; after `give_up_rights`, here or in the process that forked this one.
 
     Args:
         seccomp: what may be asked of the kernel; None where it takes no such list.
+        seconds: of processor time that remain.
     """
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
-    limit_time(CPU_SECONDS)
+    limit_time(seconds)
     if seccomp is not None:
         install(seccomp)
 

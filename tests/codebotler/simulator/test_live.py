@@ -1,0 +1,209 @@
+"""Runs on a robot: time passes by itself, nothing is done twice, and whoever stops the robot ends the run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import pytest
+
+from codebotler.simulator.engine import EngineError
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.simulator.rules import ENDLESS, PAPER
+from codebotler.skills import SKILLS
+from codebotler.trace import Event, Outcome, Status, Trace
+from processes import are_gone, children_of, zygotes
+
+LIVE = replace(PAPER, literals="as-written", limits=ENDLESS)
+
+
+class Machine:
+    """A robot that takes two seconds by its own clock for each skill, and waits for nothing in truth."""
+
+    def __init__(self, does: Callable[[str], Result] = lambda _: None) -> None:
+        self.rules, self.skills = LIVE, SKILLS
+        self.is_live, self.now = True, 0.0
+        self.never_fails: frozenset[str] = frozenset()
+        self.only_looks: frozenset[str] = frozenset()
+        self.surely: tuple[tuple[str, str], ...] = ()
+        self.done: list[str] = []
+        self.does = does
+
+    @property
+    def trace(self) -> Trace:
+        return tuple(Event("say", text) for text in self.done)
+
+    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
+        self.now += 2.0
+        text = str(arguments[0]) if arguments else skill
+        result = self.does(text)
+        self.done.append(text)
+        return result
+
+    def sleep_until(self, now: float) -> None:
+        self.done.append(f"sleeps {now - self.now:g} s")
+        self.now = now
+
+
+@pytest.fixture
+def lane() -> Iterator[Lane]:
+    lane = Lane()
+    yield lane
+    lane.close()
+
+
+def done(lane: Lane, program: str) -> tuple[list[str], Outcome]:
+    machine = Machine()
+    outcome = lane.run_live(program, machine)
+    return machine.done, outcome
+
+
+def test_clock_is_the_robots_and_sleeping_is_asked_of_it(lane: Lane) -> None:
+    program = (
+        "def task_program():\n"
+        "    say('Hello')\n"
+        "    say(str(time.monotonic()))\n"
+        "    time.sleep(30)\n"
+        "    say(time.strftime('%H:%M:%S'))\n"
+    )
+    happened, outcome = done(lane, program)
+    assert happened == ["Hello", "2.0", "sleeps 30 s", "12:00:34"]
+    assert outcome == Outcome(Status.FINISHED, tuple(Event("say", text) for text in happened))
+
+
+def test_ticks_are_counted_anew_after_each_skill_and_sleep(lane: Lane) -> None:
+    turns = "    for _ in range(150_000): pass\n"
+    both = f"def task_program():\n{turns}    say('a')\n{turns}    time.sleep(1)\n{turns}"
+    assert done(lane, both)[1].status == Status.FINISHED
+    happened, outcome = done(lane, f"def task_program():\n    say('a')\n{turns}{turns}")
+    assert (happened, outcome.status) == (["a"], Status.TIMEOUT)
+
+
+def test_there_is_no_limit_of_skill_calls_or_of_time(lane: Lane) -> None:
+    program = "def task_program():\n    for i in range(1500): say(str(i)); time.sleep(60)\n"
+    happened, outcome = done(lane, program)
+    assert outcome.status == Status.FINISHED
+    assert len(happened) == 3000
+
+
+def test_program_may_compute_for_long_if_it_acts_in_between(
+    lane: Lane, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 5.0)
+    program = (
+        "def task_program():\n"
+        "    for i in range(10):\n"
+        "        for _ in range(40): sum(range(1_200_000))\n"
+        "        say(str(i))\n"
+    )
+    assert done(lane, program)[0] == list("0123456789")
+
+
+@pytest.mark.parametrize("seconds", ["-1.0", "NaN", "Infinity", "true", '"1"', "[]"])
+def test_request_to_sleep_that_no_child_makes_ends_the_run(lane: Lane, seconds: str) -> None:
+    frame = f'["sleep",[{seconds}],0.0,1]'.encode()
+    program = (
+        "import os\n"
+        f"def task_program():\n    os.write(3, len({frame!r}).to_bytes(4, 'big') + {frame!r})\n"
+        "    say('a')\n"
+    )
+    machine = Machine()
+    assert lane.run_live(program, machine).status == Status.KILLED
+    assert machine.done == []
+
+
+def test_programs_that_import_run_once_only(lane: Lane) -> None:
+    happened, outcome = done(
+        lane, "def task_program():\n    say('a')\n    exec('import random')\n    say('b')\n"
+    )
+    assert (happened, outcome.status) == (["a", "b"], Status.FINISHED)
+
+
+def test_robots_errors_reach_the_program_in_its_own_words(lane: Lane) -> None:
+    def does(_: str) -> Result:
+        raise RobotError("GoToInvalidLocation", "the door is shut")
+
+    program = "def task_program():\n    go_to('Hall')\n"
+    outcome = lane.run_live(program, Machine(does))
+    assert outcome.error is not None
+    assert (outcome.error.kind, outcome.error.message, outcome.line) == (
+        "GoToInvalidLocation",
+        "the door is shut",
+        2,
+    )
+
+
+class StoppedError(Exception):
+    """Somebody has stopped the robot."""
+
+
+def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(lane: Lane) -> None:
+    def does(text: str) -> Result:
+        if text == "b":
+            raise StoppedError
+        return None
+
+    stubborn = (
+        "def task_program():\n"
+        "    while True:\n"
+        "        for text in 'abc':\n"
+        "            try: say(text)\n"
+        "            except BaseException: pass\n"
+    )
+    machine = Machine(does)
+    with pytest.raises(StoppedError):
+        lane.run_live(stubborn, machine)
+    assert machine.done == ["a"]
+    assert are_gone({child for pid in zygotes() for child in children_of(pid)})
+    assert done(lane, "def task_program(): say('next')")[0] == ["next"]
+
+
+def test_run_whose_process_is_lost_is_not_run_again(lane: Lane) -> None:
+    def does(_: str) -> Result:
+        family = children_of(os.getpid())
+        for pid in zygotes():
+            os.kill(pid, signal.SIGKILL)
+        assert are_gone(family)
+        return None
+
+    machine = Machine(does)
+    with pytest.raises(EngineError, match="lost"):
+        lane.run_live("def task_program():\n    say('a')\n    say('b')\n", machine)
+    assert machine.done == ["a"]
+    assert done(lane, "def task_program(): say('next')")[0] == ["next"]
+
+
+def test_stop_ends_a_run_that_sleeps(lane: Lane) -> None:
+    sleeps, may_go_on = threading.Event(), threading.Event()
+
+    class Sleeper(Machine):
+        def sleep_until(self, now: float) -> None:
+            sleeps.set()
+            assert may_go_on.wait(30)
+            super().sleep_until(now)
+
+    machine = Sleeper()
+    with ThreadPoolExecutor(1) as thread:
+        program = "def task_program():\n    time.sleep(3600)\n    say('a')\n"
+        running = thread.submit(lane.run_live, program, machine)
+        assert sleeps.wait(30)
+        family = children_of(os.getpid())
+        lane.stop()
+        assert are_gone(family)
+        may_go_on.set()
+        assert isinstance(running.exception(30), EngineError)
+    assert machine.done == ["sleeps 3600 s"]
+
+
+def test_program_that_does_not_parse_is_told_as_in_simulation(lane: Lane) -> None:
+    happened, outcome = done(lane, "def task_program(:\n")
+    assert (happened, outcome.status, outcome.error and outcome.error.kind) == (
+        [],
+        Status.PYTHON_ERROR,
+        "SyntaxError",
+    )
