@@ -1,10 +1,13 @@
 """Tries to find more in what the engine sent than its own source and the names of skills."""
 # ends: finished
-# does: say calls codes count entered is_live known longest namespace now room seconds skills spent start sure ticks
+# does: say calls codes count entered is_live known longest namespace
+# does: say now room seconds skills spent start sure ticks
 
 
 def task_program():
     for cell in say.__globals__["perform"].__closure__:
         if hasattr(cell.cell_contents, "spent"):
             run = cell.cell_contents
-    say(" ".join(sorted(vars(run))))
+    names = sorted(vars(run))
+    say(" ".join(names[:8]))
+    say(" ".join(names[8:]))
