@@ -9,6 +9,7 @@ import typer
 from codebotler import __version__
 from codebotler.cli import obey
 from roboeval.commands.catalogue import tasks
+from roboeval.commands.generating import generate, run
 from roboeval.commands.judging import evaluate, export, import_, show
 
 app = typer.Typer(
@@ -31,7 +32,9 @@ def roboeval(
         print(context.get_help())
 
 
+app.command()(generate)
 app.command()(evaluate)
+app.command()(run)
 app.command()(show)
 app.command()(tasks)
 app.command()(export)
