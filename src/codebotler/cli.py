@@ -68,6 +68,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for one that a user cannot cause."""
     from codebotler.badinput import BadInput
+    from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.simulator.engine import EngineError
 
     if isinstance(error, USAGE):
@@ -76,8 +77,10 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 2, message[:1].lower() + message[1:] + where
     if isinstance(error, BadInput):
         return 2, str(error)
-    if isinstance(error, EngineError):
+    if isinstance(error, EngineError | BudgetSpentError):
         return 1, str(error)
+    if isinstance(error, ModelError):
+        return (1 if error.may_pass else 2), error.sentence
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), _system_sentence(error)
     return None

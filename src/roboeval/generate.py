@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Settings, unheard
 from codebotler.models.paced import Paced
@@ -113,31 +114,30 @@ def generate_run(
         about = head(run, order, model.name, settings)
         with contextlib.closing(Appender(run.completions)) as file, InFlight(run.in_flight) as in_flight:
             done, used = found(run, order)
+            todo = [key for key in order.wanted() if key not in done]
             twice = in_flight.read(done, about["possibly_paid_twice"])
-            wanted = order.keys()
-            todo = [key for key in wanted if key not in done]
-            about |= {"possibly_paid_twice": in_flight.lost, "usage": asdict(used)}
-            about |= {"ended": None} if todo else {}
-            write_whole(run.about, to_text(about))
+            about |= {"possibly_paid_twice": in_flight.lost, "ended": None if todo else about["ended"]}
+            _write(run, about, used)
             in_flight.clear()
-            progress = Progress(len(wanted), len(wanted) - len(todo), twice, used)
+            progress = Progress(len(order.wanted()), len(order.wanted()) - len(todo), twice, used)
             begun(progress)
+            asking = _Asking(order, model, pace, file=file, in_flight=in_flight, progress=progress, told=told)
             try:
-                asyncio.run(
-                    _Asking(
-                        order, model, pace, file=file, in_flight=in_flight, progress=progress, told=told
-                    ).ask_for(todo)
-                )
+                asyncio.run(asking.ask_for(todo))
             finally:
                 progress.under_way = len(in_flight)
-            about |= {"usage": asdict(used)}
-            about |= {} if progress.missing else {"ended": about["ended"] or now_in_words()}
-            write_whole(run.about, to_text(about))
-        if progress.missing and not run.completions.stat().st_size:
+            if progress.missing is None:
+                about["ended"] = about["ended"] or now_in_words()
+            _write(run, about, used)
+        if asking.error is not None and not run.completions.stat().st_size:
             for path in (run.completions, run.about, run.in_flight):
                 path.unlink(missing_ok=True)
-            raise ModelError(progress.missing, may_pass=True)
+            raise asking.error
     return progress
+
+
+def _write(run: Run, about: dict[str, Any], used: Used) -> None:
+    write_whole(run.about, to_text(about | {"usage": asdict(used)}))
 
 
 _KEY: ContextVar[Key] = ContextVar("_KEY")
@@ -167,7 +167,7 @@ class _Noted:
 
 
 class _Asking:
-    """Asks for completions, several at the same time, and keeps each.
+    """Asks for completions, several at the same time, and keeps each; `error` is the last of the model's.
 
     A line is in the file as soon as its reply is there. Before it counts, the file must be on the disk: those
     that wait for this at the same time wait for it once.
@@ -193,6 +193,7 @@ class _Asking:
             token_budget=pace.token_budget,
         )
         self._prompts: dict[str, Prompt] = {}
+        self.error: ModelError | None = None
         self._failed_in_a_row = 0
         self._written = self._synced = 0
         self._syncing = asyncio.Lock()
@@ -227,18 +228,19 @@ class _Asking:
             self._progress.stopped = error.sentence
         except ModelError as error:
             self._in_flight.failed(key)
-            self._failed(key, error.sentence)
+            self._failed(key, error)
 
     def _prompt(self, instruction: str) -> Prompt:
         if instruction not in self._prompts:
             self._prompts[instruction] = prompt_for(instruction)
         return self._prompts[instruction]
 
-    def _failed(self, key: Key, sentence: str) -> None:
-        self._progress.failures[key] = sentence
+    def _failed(self, key: Key, error: ModelError) -> None:
+        self.error = error
+        self._progress.failures[key] = error.sentence
         self._failed_in_a_row += 1
         if self._failed_in_a_row >= max(FAILURES_IN_A_ROW, self._pace.concurrency):
-            self._progress.stopped = sentence
+            self._progress.stopped = error.sentence
 
     async def _keep(self, key: Key, reply: Reply) -> None:
         row = {

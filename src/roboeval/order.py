@@ -36,7 +36,7 @@ class Order:
     tasks: frozenset[str] | None = None
     num_completions: int = 50
 
-    def keys(self) -> list[Key]:
+    def wanted(self) -> list[Key]:
         """All of them: the first of every prompt, then the second, so that a part is a part of every task."""
         prompts = [
             (task.name, prompt)

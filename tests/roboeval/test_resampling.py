@@ -27,10 +27,9 @@ UNJUST = Trial(accepted=False, ran=True, passed=True)
 
 
 def drawn(trials: list[Trial], retries: int, chance: random.Random) -> Trial:
-    for _ in range(retries + 1):
-        trial = chance.choice(trials)
-        if trial.accepted:
-            break
+    trial = chance.choice(trials)
+    while retries and not trial.accepted:
+        trial, retries = chance.choice(trials), retries - 1
     return trial
 
 

@@ -148,7 +148,7 @@ def generated(
     base_url: str | None,
 ) -> Path:
     """Make or complete a run, and say where it is; ends with status 1 if completions are missing."""
-    from codebotler.models.base import ModelError, Settings
+    from codebotler.models.base import Settings
     from codebotler.models.open import open_model
     from roboeval.generate import Pace, generate_run
     from roboeval.order import Order
@@ -171,9 +171,6 @@ def generated(
     try:
         with meter:
             progress = generate_run(run, order, model, settings, pace, begun=meter.begin, told=meter.tell)
-    except ModelError as error:
-        note(f"roboeval: {error.sentence}")
-        raise SystemExit(1) from None
     except KeyboardInterrupt:
         note(f"roboeval: {meter.after_a_stop()}")
         raise SystemExit(STOPPED) from None
