@@ -12,7 +12,7 @@ KINDS = (
 )
 
 
-def open_model(name: str, settings: Settings) -> Model:  # noqa: ARG001 - until others are here
+def open_model(name: str, settings: Settings) -> Model:
     """The model of a name, ready to be asked.
 
     Args:
@@ -23,9 +23,22 @@ def open_model(name: str, settings: Settings) -> Model:  # noqa: ARG001 - until 
     Raises:
         BadInput: there is no such model, a key is not in the environment, or something is not installed.
     """
-    kind, colon, rest = name.partition(":")
+    kind, _, rest = name.partition(":")
     if kind == "recorded":
         return Recital(recorded_model(name))
-    if not colon or not kind or not rest.strip():
+    if not kind or not rest.strip():
         raise BadInput(f'"{name}" names no model; write {KINDS}')
-    raise BadInput(f'"{name}" names no model; write {KINDS}')
+    # Each of these imports a large library, which only who uses it should wait for.
+    match kind:
+        case "completions":
+            from codebotler.models.completions import Completions  # noqa: PLC0415 - see above
+
+            return Completions(rest, settings)
+        case "hf":
+            from codebotler.models.local import Local  # noqa: PLC0415 - see above
+
+            return Local(rest, settings)
+        case _:
+            from codebotler.models.chat import Chat  # noqa: PLC0415 - see above
+
+            return Chat(name, settings)
