@@ -8,9 +8,8 @@ import zlib
 from collections.abc import Callable
 
 from codebotler.simulator.child import LostChildError
-from codebotler.simulator.conversation import Conversation, ImportsMoreError
+from codebotler.simulator.conversation import Conversation, ImportsMoreError, Robot
 from codebotler.simulator.preparer import Prepared, Preparer
-from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, ZYGOTE
 from codebotler.simulator.zygote import Zygote
 from codebotler.trace import Outcome
@@ -40,7 +39,7 @@ class Lane:
             self._preparer.close()
             raise EngineError(f"the engine does not start: {error}") from None
 
-    def run(self, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
+    def run(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         """Run a program with a robot, once more if a process was lost through no fault of the program.
 
         Args:
@@ -82,7 +81,7 @@ class Lane:
         while self._zygotes:
             self._zygotes.popitem()[1].close()
 
-    def _try(self, source: str, new_robot: Callable[[], SimulatedRobot]) -> Outcome:
+    def _try(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         try:
             robot = new_robot()
             prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
@@ -100,7 +99,7 @@ class Lane:
             self.close()
             raise LostChildError(str(error)) from None
 
-    def _converse(self, role: str, prepared: Prepared, robot: SimulatedRobot) -> Outcome:
+    def _converse(self, role: str, prepared: Prepared, robot: Robot) -> Outcome:
         child = self._zygote(role).fork()
         return Conversation(child, prepared.code, robot, may_import=role == LIBRARY_ZYGOTE).outcome()
 
