@@ -11,6 +11,7 @@ from codebotler.cli import obey
 from roboeval.commands.catalogue import tasks
 from roboeval.commands.generating import generate, run
 from roboeval.commands.judging import evaluate, export, import_, show
+from roboeval.commands.resampling import resample
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -37,6 +38,7 @@ app.command()(evaluate)
 app.command()(run)
 app.command()(show)
 app.command()(tasks)
+app.command()(resample)
 app.command()(export)
 app.command("import")(import_)
 

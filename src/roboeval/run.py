@@ -124,6 +124,14 @@ class Run:
         """The file that says by what the rows of an evaluation were judged."""
         return self.path / "evaluations" / f"{key}.json"
 
+    def checks(self, key: str) -> Path:
+        """The file of what a check said of its programs; `key` is the suite's name."""
+        return self.path / "checks" / f"{key}.jsonl"
+
+    def checks_head(self, key: str) -> Path:
+        """The file that says how they were checked."""
+        return self.path / "checks" / f"{key}.json"
+
     def judged_by(self) -> list[str]:
         """The names of the suites by which it was judged, sorted."""
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
