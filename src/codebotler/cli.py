@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -21,13 +22,55 @@ ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no
 app = typer.Typer(rich_markup_mode=None, add_completion=False, pretty_exceptions_enable=False)
 
 
-@app.command()
+@app.callback(invoke_without_command=True)
 def codebotler(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
-    """Robot programs from plain words; so far a library, and the engine of `roboeval`."""
-    print(f"codebotler {__version__}" if version else context.get_help())
+    """Robot programs from plain words: checked before a robot moves."""
+    if version:
+        print(f"codebotler {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+@app.command()
+def check(
+    program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
+    world: Annotated[
+        Path | None, typer.Option(help="The world file that tells which rooms there are.")
+    ] = None,
+    samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
+    seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Draw also what the program never looks for.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    workers: Annotated[int, typer.Option(min=1, help="Runs that go on at the same time.")] = 1,
+) -> None:
+    """Look for problems in a program, in its text and in imagined worlds; status 1 if there are any."""
+    from codebotler.check import check as look_for_problems
+    from codebotler.checking import check_view, read_program
+    from codebotler.terminal import print_json, print_rich
+    from codebotler.world import World
+
+    known = None if world is None else World.read(world)
+    source = read_program(program)
+    found = look_for_problems(
+        source,
+        rooms=None if known is None else [room.name for room in known.rooms],
+        start=None if known is None else known.robot,
+        samples=samples,
+        seed=seed,
+        strict=strict,
+        workers=workers,
+    )
+    if json:
+        print_json(found.data())
+    else:
+        print_rich(check_view(found, source, "the program" if program == "-" else program))
+    raise typer.Exit(1 if found.problems else 0)
 
 
 def obey(app: typer.Typer, name: str) -> NoReturn:
