@@ -57,9 +57,7 @@ def generated(
         async def asked() -> Generation:
             try:
                 paced = Paced(model, concurrency=1)
-                return await generate(
-                    paced, prompt, problems, retries=retries, repair=repair, tried=tried
-                )
+                return await generate(paced, prompt, problems, retries=retries, repair=repair, tried=tried)
             finally:
                 await model.close()
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import platform
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
 
 from codebotler import __version__
 from codebotler.badinput import BadInput
@@ -15,6 +14,7 @@ from codebotler.simulator.imagined import Plan
 from roboeval.records import Appender, Completion, read_rows, to_line
 from roboeval.run import Run, load_head, to_text, write_whole
 from roboeval.suite import Suite
+
 
 class Checks:
     """What the check says of programs of a run.

@@ -17,8 +17,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from codebotler.terminal import visible
 from roboeval.metrics import Estimate, clustered_interval
-from roboeval.tables import Row, visible
+from roboeval.tables import Row
 
 LIMITS = (0, 2, 4, 8, 100)
 THRESHOLDS = (0.25, 0.5, 0.75, 1.0)

@@ -1,39 +1,19 @@
-"""What commands say: tables, JSON, progress, and sentences beside them."""
+"""What commands say while they work, and how they end on what they cannot use."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from time import monotonic
-from typing import TYPE_CHECKING, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
+from codebotler.terminal import note, print_json, print_rich
+
+__all__ = ["fail", "metered", "note", "print_json", "print_rich", "watched"]
 
 Item = TypeVar("Item")
 
 QUIET_S = 2.0  # for so long does a command say nothing at first; lines of a long one come more seldom
-
-
-def print_rich(what: RenderableType) -> None:
-    """Draw on the terminal, or plainly into a pipe."""
-    from rich.console import Console
-
-    console = Console()
-    if console.is_terminal:
-        console.print(what)
-        return
-    with console.capture() as drawn:
-        console.print(what)
-    print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
-
-
-def print_json(data: object) -> None:
-    """Print for machines."""
-    import json
-
-    print(json.dumps(data, indent=2))
 
 
 def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:
@@ -78,11 +58,6 @@ def metered(doing: str, total: int | None = None, done: int = 0) -> Iterator[Cal
                 next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
 
         yield tell
-
-
-def note(sentence: str) -> None:
-    """Say something beside the results."""
-    print(sentence, file=sys.stderr)
 
 
 def fail(sentence: str) -> NoReturn:
