@@ -10,6 +10,7 @@ KINDS = (
     "recorded, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
     "completions:NAME with --base-url, or hf:PATH"
 )
+EXTRA = 'pip install "codebotler[transformers]"'
 
 
 def open_model(name: str, settings: Settings) -> Model:
@@ -35,8 +36,10 @@ def open_model(name: str, settings: Settings) -> Model:
 
             return Completions(rest, settings)
         case "hf":
-            from codebotler.models.local import Local  # noqa: PLC0415 - see above
-
+            try:
+                from codebotler.models.local import Local  # noqa: PLC0415 - see above
+            except ImportError:
+                raise BadInput(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
             return Local(rest, settings)
         case _:
             from codebotler.models.chat import Chat  # noqa: PLC0415 - see above
