@@ -5,14 +5,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
 
 from codebotler.drives import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.program import Problem as Flaw
 from codebotler.program import Program, listed, parsed
 from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.imagined import AS_WRITTEN, Fact, ImaginedRobot, Lot, Plan
+from codebotler.simulator.imagined import AS_WRITTEN, Draw, Fact, ImaginedRobot, Lot, Plan
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rules import Rules
@@ -69,18 +70,19 @@ class Sample:
         number: of the world, from 0.
         outcome: how the run ended.
         facts: what was settled about the world while it ran, in that order.
+        draws: of the lots by which that was settled, in order.
         in_vain: whether the robot waited or searched in vain, so that the end says little of the program.
     """
 
     number: int
     outcome: Outcome
-    facts: tuple[Fact, ...]
+    facts: tuple[Fact, ...] = ()
+    draws: tuple[Draw, ...] = ()
     in_vain: bool = False
 
-    @property
-    def is_by_lot(self) -> bool:
-        """Whether chance had a say in it."""
-        return any(fact.by_lot for fact in self.facts)
+    def is_as_in(self, lot: Lot) -> bool:
+        """Whether the same run in another world would meet the same facts, and so be the same."""
+        return all(lot.draw(draw.count, *draw.fact) == draw.drawn for draw in self.draws)
 
     @property
     def lots(self) -> tuple[str, ...]:
@@ -207,18 +209,26 @@ def check(
         EngineError: no isolated process could be started.
     """
     settings = Settings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
+    plan = _plan(program, rooms, start, skills)
     with nullcontext(lanes) if lanes else Lanes(workers or 1) as open_lanes:
 
-        def runs(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:
-            def run(lot: Lot) -> Sample:
-                return imagined(open_lanes.here(), program, plan, lot, settings)
+        def run(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:
+            return open_lanes.map_distinct(
+                lambda lot: imagined(open_lanes.here(), program, plan, lot, settings),
+                lots,
+                name=lambda lot: digest(str(lot)),
+            )
 
-            return open_lanes.map_distinct(run, lots, name=lambda lot: digest(str(lot)))
-
-        return _checked(program, _plan(program, rooms, start, skills), settings, runs)
+        return _checked(program, plan, settings, Runner(run, open_lanes.workers))
 
 
-def check_on(lane: Lane, program: str, plan: Plan | None = None, settings: Settings | None = None) -> Check:
+def check_on(
+    lane: Lane,
+    program: str,
+    plan: Plan | None = None,
+    settings: Settings | None = None,
+    known: dict[Plan, list[Sample]] | None = None,
+) -> Check:
     """The same on one lane, one run after the other, for who checks many programs at the same time.
 
     Args:
@@ -226,22 +236,48 @@ def check_on(lane: Lane, program: str, plan: Plan | None = None, settings: Setti
         program: its source, which need not even parse.
         plan: the rooms; without it they are taken from the program.
         settings: how to check it.
+        known: runs of the same program under the same rules, by other checks; those of this one are added.
 
     Raises:
         EngineError: a process was lost twice, or the lane was stopped.
     """
     how = settings or Settings()
 
-    def runs(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:
+    def run(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:
         return (imagined(lane, program, plan, lot, how) for lot in lots)
 
-    return _checked(program, plan or _plan(program, None, None, how.skills), how, runs)
+    rooms = plan or _plan(program, None, None, how.skills)
+    return _checked(program, rooms, how, Runner(run, known={} if known is None else known))
 
 
 # --- running
 
 
-Runs: TypeAlias = Callable[[Plan, Iterable[Lot]], Iterator[Sample]]
+@dataclass
+class Runner:
+    """Runs a program in worlds, those that are alike to it once.
+
+    Args:
+        run: runs it in each of some worlds.
+        width: in how many at the same time.
+        known: what came of it, by what was certain of the worlds.
+    """
+
+    run: Callable[[Plan, Iterable[Lot]], Iterator[Sample]]
+    width: int = 1
+    known: dict[Plan, list[Sample]] = field(default_factory=dict)
+
+    def runs(self, plan: Plan, lots: Sequence[Lot]) -> list[Sample]:
+        """The runs in some worlds, in their order."""
+        known = self.known.setdefault(plan, [])
+        found = []
+        for start in range(0, len(lots), self.width):
+            these = lots[start : start + self.width]
+            known += self.run(plan, [lot for lot in these if not any(one.is_as_in(lot) for one in known)])
+            for lot in these:
+                same = next(one for one in known if one.is_as_in(lot))
+                found.append(replace(same, number=lot.sample))
+        return found
 
 
 def imagined(lane: Lane, program: str, plan: Plan, lot: Lot, settings: Settings) -> Sample:
@@ -261,7 +297,8 @@ def imagined(lane: Lane, program: str, plan: Plan, lot: Lot, settings: Settings)
         return robots[-1]
 
     outcome = lane.run(program, new_robot)
-    return Sample(lot.sample, outcome, tuple(robots[-1].facts), _is_in_vain(outcome, robots[-1]))
+    robot = robots[-1]
+    return Sample(lot.sample, outcome, tuple(robot.facts), tuple(robot.draws), _is_in_vain(outcome, robot))
 
 
 def _is_in_vain(outcome: Outcome, robot: ImaginedRobot) -> bool:
@@ -270,32 +307,31 @@ def _is_in_vain(outcome: Outcome, robot: ImaginedRobot) -> bool:
     return outcome.status is Status.TIMEOUT
 
 
-def _checked(program: str, plan: Plan, settings: Settings, runs: Runs) -> Check:
+def _checked(program: str, plan: Plan, settings: Settings, runner: Runner) -> Check:
     flaws = _flaws(program, plan, settings.skills)
-    if isinstance(parsed(program, compiled=True), Flaw):
-        return Check(tuple(flaws), (), plan, settings.seed, settings.strict)
-    ran = _samples(plan, settings, runs)
+    if len(flaws) == 1 and isinstance(parsed(program, compiled=True), Flaw):
+        return Check(flaws, (), plan, settings.seed, settings.strict)
+    ran = _samples(plan, settings, runner)
     for _ in range(GUESSES if plan.guessed else 0):
         wider = _widened(plan, ran)
         if wider == plan:
             break
-        plan, ran = wider, _samples(wider, settings, runs)
+        plan, ran = wider, _samples(wider, settings, runner)
     blamed = {flaw.line for flaw in flaws}
     failures = [problem for problem in _failures(ran, plan) if problem.line not in blamed]
     problems = sorted([*flaws, *failures], key=lambda problem: problem.line or 0)
     return Check(tuple(problems), tuple(ran), plan, settings.seed, settings.strict)
 
 
-def _samples(plan: Plan, settings: Settings, runs: Runs) -> list[Sample]:
+def _samples(plan: Plan, settings: Settings, runner: Runner) -> list[Sample]:
     """The runs in so many worlds, and in more where the program waits or searches in vain in all of them."""
-    count = settings.samples
-    lot = Lot(settings.seed, 0, settings.strict)
-    (first,) = runs(plan, [lot])
-    if not first.is_by_lot:  # then all worlds are alike to this program
-        return [replace(first, number=number) for number in range(count)]
-    ran = [first, *runs(plan, [replace(lot, sample=number) for number in range(1, count)])]
-    while all(sample.in_vain for sample in ran) and len(ran) < count + MORE:
-        ran += runs(plan, [replace(lot, sample=len(ran))])
+    first = Lot(settings.seed, 0, settings.strict)
+    lots = [replace(first, sample=number) for number in range(settings.samples + MORE)]
+    ran = runner.runs(plan, lots[: settings.samples])
+    for lot in lots[settings.samples :]:
+        if not all(sample.in_vain for sample in ran):
+            break
+        ran += runner.runs(plan, [lot])
     return ran
 
 
@@ -326,7 +362,8 @@ def _widened(plan: Plan, ran: Iterable[Sample]) -> Plan:
 # --- what is wrong
 
 
-def _flaws(program: str, plan: Plan, skills: SkillTable) -> list[Problem]:
+@lru_cache(maxsize=16)  # who checks with many seeds does so program by program
+def _flaws(program: str, plan: Plan, skills: SkillTable) -> tuple[Problem, ...]:
     """What the text shows, one problem a line."""
     flaws = list(Program(program).problems(skills))
     if not plan.guessed:
@@ -338,10 +375,10 @@ def _flaws(program: str, plan: Plan, skills: SkillTable) -> list[Problem]:
     by_line: dict[int | None, list[Flaw]] = {}
     for flaw in flaws:
         by_line.setdefault(flaw.line, []).append(flaw)
-    return [
+    return tuple(
         Problem(same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)
         for line, same in by_line.items()
-    ]
+    )
 
 
 def _no_room(request: str, plan: Plan) -> str:
@@ -368,7 +405,7 @@ def _message(same: Sequence[Sample], ran: Sequence[Sample], plan: Plan) -> str:
     first = same[0].outcome
     assert first.error is not None
     if first.status is Status.TIMEOUT:
-        often = f"in each of {len(ran)} imagined worlds " if same[0].is_by_lot else ""
+        often = f"in each of {len(ran)} imagined worlds " if same[0].draws else ""
         return f"the program never ends: {often}it reached a limit, {first.error.message}"
     if first.error.kind == "GoToInvalidLocation" and first.trace and first.trace[-1].kind == "goto":
         return _no_room(first.trace[-1].text, plan)

@@ -72,7 +72,7 @@ def _verdict(found: Check, name: str) -> Text:
         verdict = Text.assemble(("rejected", "bold red"), f": {what} in {visible(name)}")
     if not found.samples:
         return verdict.append("; it was not run")
-    if not any(sample.is_by_lot for sample in found.samples):
+    if not any(sample.draws for sample in found.samples):
         return verdict.append("; it runs in the same way in every world")
     return verdict.append(f"; run in {len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}")
 

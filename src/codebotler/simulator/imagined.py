@@ -91,6 +91,21 @@ class Lot:
 
 
 @dataclass(frozen=True)
+class Draw:
+    """One drawing of lots.
+
+    Args:
+        count: how many there were.
+        fact: what was drawn for.
+        drawn: which one, from 0.
+    """
+
+    count: int
+    fact: tuple[str, ...]
+    drawn: int
+
+
+@dataclass(frozen=True)
 class Fact:
     """Something that was settled about an imagined world.
 
@@ -177,6 +192,7 @@ class ImaginedRobot(SimulatedRobot):
         self.scenes: defaultdict[str, Scene] = defaultdict(Scene)
         self.told: dict[tuple[str, ...], str] = {}
         self.facts: list[Fact] = []
+        self.draws: list[Draw] = []
         self.hopes: defaultdict[str, Hope] = defaultdict(Hope)
         self.excuses: set[str] = set()
 
@@ -201,9 +217,15 @@ class ImaginedRobot(SimulatedRobot):
             return True
         return False if self.scene.lacks(name) else None
 
+    def draw(self, count: int, *fact: str) -> int:
+        """Draw for a fact, and remember it."""
+        drawn = self.lot.draw(count, *fact)
+        self.draws.append(Draw(count, fact, drawn))
+        return drawn
+
     def drawn(self, name: str) -> bool:
         """Draw whether somebody or something is in this room."""
-        return self.lot.draw(2, "is here", self.room, name) == 1
+        return self.draw(2, "is here", self.room, name) == 1
 
     def settle(self, name: str, *, here: bool, by_lot: bool) -> None:
         """Let somebody or something be in this room or not, from now on."""
@@ -266,7 +288,7 @@ def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option,
     asked = (robot.room, who, question.strip())
     texts = [option.text for option in options]
     if robot.told.get(asked) not in texts:
-        drawn = texts[robot.lot.draw(len(texts), "answer", *asked)]
+        drawn = texts[robot.draw(len(texts), "answer", *asked)]
         robot.told[asked] = drawn
         robot.facts.append(Fact(f'the answer to "{brief(question)}" is "{brief(drawn)}"', by_lot=True))
     chosen = texts.index(robot.told[asked])
