@@ -266,13 +266,15 @@ def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: 
     assert about(run)["usage"] == {"input_tokens": 3000, "output_tokens": 300}
 
 
-def test_one_in_ten_requests_fails_and_every_completion_comes_once(tmp_path: Path, paper: Suite) -> None:
+def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, paper: Suite) -> None:
     chance = random.Random(3)
     run = Run(tmp_path / "run")
     model = Scripted(fails=lambda _: CUT if chance.random() < 0.1 else None)
-    assert generated(run, paper, model, count=10, pace=Pace(concurrency=30)).missing is None
-    assert Counter(keys(run)) == Counter(expected(10))
-    assert 100 < len(model.asked) < 150
+    progress = generate_run(run, Order(paper), model, Settings(), Pace(concurrency=100))
+    assert (progress.done, progress.missing) == (4000, None)
+    prompts = [(task.name, number) for task in paper.tasks.values() for number in range(len(task.prompts))]
+    assert keys(run) == sorted((*prompt, index) for prompt in prompts for index in range(50))
+    assert 4300 < len(model.asked) < 4600
     assert about(run)["possibly_paid_twice"] == 0
 
 
