@@ -85,11 +85,13 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
 
 
 def _tell(attempt: Attempt, most: int) -> None:
+    which = f"attempt {attempt.number + 1} of {most}" if most > 1 else "the program"
     if attempt.problems:
-        which = f"attempt {attempt.number + 1} of {most}" if most > 1 else "the program"
         note(f"{which} has {'problems' if len(attempt.problems) > 1 else 'a problem'}:")
         for problem in attempt.problems:
             note(f"  {visible(problem)}")
+    elif attempt.number:
+        note(f"{which} is accepted")
 
 
 def in_words(prompt: Prompt, model: str) -> str:

@@ -266,6 +266,24 @@ def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: 
     assert about(run)["usage"] == {"input_tokens": 3000, "output_tokens": 300}
 
 
+def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
+    tmp_path: Path, paper: Suite
+) -> None:
+    run = Run(tmp_path / "run")
+    notes: list[list[str]] = []
+
+    def fails(number: int) -> ModelError | None:
+        notes.append([next(iter(row)) for _, row in read_rows(run.in_flight)])
+        return CUT if number == 0 else None
+
+    generated(run, paper, Scripted(fails=fails), count=1, pace=Pace(concurrency=1))
+    assert notes[:3] == [
+        ["lost", "sent"],
+        ["lost", "sent", "failed", "sent"],
+        ["lost", "sent", "failed", "sent", "sent"],
+    ]
+
+
 def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, paper: Suite) -> None:
     chance = random.Random(3)
     run = Run(tmp_path / "run")
