@@ -1,9 +1,12 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
 # installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
+# `make test-transformers` tests models that run on this machine, with a Python for which there is a torch (3.11);
+# it makes an environment of its own, since nothing else needs so much.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
+TORCH_VENV ?= .venv-transformers
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -12,7 +15,7 @@ SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraint
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo test fuzz lint bench clean
+.PHONY: demo test test-transformers fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@$(BIN)/roboeval evaluate recorded:careful
@@ -23,6 +26,9 @@ demo: $(VENV)/installed
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(TESTS)
+
+test-transformers: $(TORCH_VENV)/tested
+	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py
 
 fuzz: $(VENV)/tested
 	@seed=$${FUZZ_SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')}; \
@@ -56,10 +62,18 @@ $(VENV)/tested: $(VENV)/installed
 	@$(PIP) install --constraint constraints.txt --group test | { $(DOTS); }
 	@touch $@
 
+$(TORCH_VENV)/tested: $(SOURCES) constraints-transformers.txt
+	@echo "making an environment with torch in $(TORCH_VENV), which takes some minutes"
+	@$(PYTHON) -m venv --clear $(TORCH_VENV)
+	@$(TORCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(TORCH_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
+		--constraint constraints-transformers.txt "$(PACKAGE)[transformers]" --group test | { $(DOTS); }
+	@touch $@
+
 $(VENV)/linted: $(VENV)/tested
 	@printf "installing what linters need "
 	@$(PIP) install --constraint constraints.txt --group lint | { $(DOTS); }
 	@touch $@
 
 clean:
-	rm -rf $(VENV) dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(TORCH_VENV) dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

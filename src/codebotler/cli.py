@@ -6,6 +6,7 @@ import errno
 import io
 import os
 import sys
+from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -21,13 +22,126 @@ ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no
 app = typer.Typer(rich_markup_mode=None, add_completion=False, pretty_exceptions_enable=False)
 
 
-@app.command()
+@app.callback(invoke_without_command=True)
 def codebotler(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
-    """Robot programs from plain words; so far a library, and the engine of `roboeval`."""
-    print(f"codebotler {__version__}" if version else context.get_help())
+    """Robot programs from plain words: checked before a robot moves."""
+    if version:
+        print(f"codebotler {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+@app.command()
+def generate(
+    instruction: Annotated[str, typer.Argument(help="What the robot is to do, in plain words.")],
+    model: Annotated[
+        str,
+        typer.Option(
+            help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
+            "completions:NAME, or hf:PATH."
+        ),
+    ] = "recorded",
+    world: Annotated[
+        Path | None, typer.Option(help="The world file that tells which rooms there are.")
+    ] = None,
+    retries: Annotated[
+        int | None, typer.Option(min=0, help="Ask so many times more while there are problems.")
+    ] = None,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Ask again with the program and its problems; once by default.")
+    ] = False,
+    record: Annotated[
+        Path | None, typer.Option(help="Add a line of JSON for every attempt to this file.")
+    ] = None,
+    show_prompt: Annotated[
+        bool, typer.Option("--show-prompt", help="Print what the model would be asked, and ask nobody.")
+    ] = False,
+    temperature: Annotated[float, typer.Option(help="How far the model strays from the likeliest.")] = 0.2,
+    top_p: Annotated[float, typer.Option(help="The share of likely tokens that are drawn from.")] = 0.95,
+    max_tokens: Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")] = 512,
+    seed: Annotated[
+        int | None, typer.Option(help="Fix the random numbers, where a model takes a seed.")
+    ] = None,
+    timeout: Annotated[float, typer.Option(help="Seconds that a request may take.")] = 60.0,
+    base_url: Annotated[
+        str | None, typer.Option(help="Where the model is served, such as http://localhost:8000/v1.")
+    ] = None,
+) -> None:
+    """Have a model write a program, and print it; status 1 if a check finds problems in it."""
+    from codebotler.badinput import BadInput
+    from codebotler.generating import generated, in_words
+    from codebotler.models.base import Settings
+    from codebotler.models.open import open_model
+    from codebotler.prompts import prompt_for
+    from codebotler.world import World
+
+    if not instruction.strip():
+        raise BadInput("the instruction is empty; say what the robot is to do")
+    known = None if world is None else World.read(world)
+    prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
+    if show_prompt:
+        print(in_words(prompt, model))
+        return
+    settings = Settings(
+        temperature=temperature,
+        top_p=top_p,
+        max_tokens=max_tokens,
+        seed=seed,
+        timeout=timeout,
+        base_url=base_url,
+    )
+    made = generated(
+        open_model(model, settings),
+        prompt,
+        world=known,
+        retries=int(repair) if retries is None else retries,
+        repair=repair,
+        record=record,
+    )
+    print(made.program, end="" if made.program.endswith("\n") else "\n")
+    raise typer.Exit(1 if made.problems else 0)
+
+
+@app.command()
+def check(
+    program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
+    world: Annotated[
+        Path | None, typer.Option(help="The world file that tells which rooms there are.")
+    ] = None,
+    samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
+    seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Draw also what the program never looks for.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    workers: Annotated[int, typer.Option(min=1, help="Runs that go on at the same time.")] = 1,
+) -> None:
+    """Look for problems in a program, in its text and in imagined worlds; status 1 if there are any."""
+    from codebotler.check import check as look_for_problems
+    from codebotler.checking import check_view, read_program
+    from codebotler.terminal import print_json, print_rich
+    from codebotler.world import World
+
+    known = None if world is None else World.read(world)
+    source = read_program(program)
+    found = look_for_problems(
+        source,
+        rooms=None if known is None else [room.name for room in known.rooms],
+        start=None if known is None else known.robot,
+        samples=samples,
+        seed=seed,
+        strict=strict,
+        workers=workers,
+    )
+    if json:
+        print_json(found.data())
+    else:
+        print_rich(check_view(found, source, "the program" if program == "-" else program))
+    raise typer.Exit(1 if found.problems else 0)
 
 
 def obey(app: typer.Typer, name: str) -> NoReturn:
@@ -68,6 +182,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for one that a user cannot cause."""
     from codebotler.badinput import BadInput
+    from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.simulator.engine import EngineError
 
     if isinstance(error, USAGE):
@@ -76,8 +191,10 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 2, message[:1].lower() + message[1:] + where
     if isinstance(error, BadInput):
         return 2, str(error)
-    if isinstance(error, EngineError):
+    if isinstance(error, EngineError | BudgetSpentError):
         return 1, str(error)
+    if isinstance(error, ModelError):
+        return (1 if error.may_pass else 2), error.sentence
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), _system_sentence(error)
     return None

@@ -127,7 +127,7 @@ def _entry_problems(tree: ast.Module, source: str) -> Iterator[Problem]:
     if TASK not in bound_names(source):
         yield Problem(None, "NameError", f"the program defines no {TASK} at module level")
     found = entries(tree)
-    if not found or found[-1].decorator_list or TASK in _names_bound(tree, besides=found):
+    if not found or found[-1].decorator_list or TASK in names_bound(tree, besides=found):
         return
     if isinstance(found[-1], ast.AsyncFunctionDef) and not _may_begin(tree, found[-1]):
         yield Problem(found[-1].lineno, "TypeError", f"{TASK} is a coroutine, which nobody awaits")
@@ -136,7 +136,7 @@ def _entry_problems(tree: ast.Module, source: str) -> Iterator[Problem]:
     required = positional[: len(positional) - len(given.defaults)]
     required += [a for a, default in zip(given.kwonlyargs, given.kw_defaults, strict=True) if default is None]
     if required:
-        names = _listed([a.arg for a in required])
+        names = listed([a.arg for a in required])
         yield Problem(
             found[-1].lineno, "TypeError", f"{TASK} takes {names}, but it is called without arguments"
         )
@@ -160,7 +160,7 @@ def _name_problems(tree: ast.Module, skills: SkillTable) -> Iterator[Problem]:
 
 def _missing_here(tree: ast.Module, skills: SkillTable) -> Iterator[tuple[int, str, bool]]:
     """What pyflakes takes for defined, and is not: names of a console, and those only declared global."""
-    bound = _names_bound(tree)
+    bound = names_bound(tree)
     if "*" in bound:
         return
     declared = {name for node in ast.walk(tree) if isinstance(node, ast.Global) for name in node.names}
@@ -192,7 +192,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
 
 def _call_problems(tree: ast.Module, skills: SkillTable) -> Iterator[Problem]:
     """The calls of skills that cannot succeed; a name that it gives a meaning of its own is no skill."""
-    rebound = _names_bound(tree)
+    rebound = names_bound(tree)
     if "*" in rebound:
         return
     for node in ast.walk(tree):
@@ -217,7 +217,7 @@ def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Problem]:
 def _mismatch(node: ast.Call, skill: Skill) -> str | None:
     """Why the arguments do not fit the skill's parameters, in a sentence."""
     names = [p.name for p in skill.parameters]
-    takes = f"{skill.name} takes {_listed(names) or 'no arguments'}"
+    takes = f"{skill.name} takes {listed(names) or 'no arguments'}"
     keywords = [k.arg for k in node.keywords if k.arg]
     for word in keywords:
         if word not in names:
@@ -284,8 +284,8 @@ def _literal(node: ast.expr, *, wanted: str) -> str | None:
     return what if what and what != wanted else None
 
 
-def _names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
-    """The names that a program gives a meaning anywhere, in whatever scope."""
+def names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
+    """The names that a program gives a meaning anywhere, in whatever scope; `*` where nobody can tell."""
     names: set[str] = set()
     skipped = {id(node) for node in besides}
     for node in ast.walk(tree):
@@ -303,6 +303,6 @@ def _names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
     return names
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     """Names as one says them: `a, b and c`."""
     return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))

@@ -306,13 +306,21 @@ class Appender:
         if self.path.stat().st_size > length:
             self._file.truncate(length)
 
+    def sync(self) -> None:
+        """Bring everything to the disk; may be called from another thread.
+
+        Raises:
+            OSError: that is not possible.
+        """
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+
     def close(self) -> None:
-        """Bring everything to the disk."""
+        """Bring everything to the disk, and let go of the file."""
         with self._file:
-            try:
-                os.fsync(self._file.fileno())
-            except OSError as error:
-                raise OSError(error.errno, error.strerror, str(self.path)) from None
+            self.sync()
 
 
 def whole_length(path: Path) -> int:

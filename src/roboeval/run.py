@@ -102,6 +102,16 @@ class Run:
         """The file of its completions."""
         return self.path / COMPLETIONS
 
+    @property
+    def about(self) -> Path:
+        """The file that says who wrote the completions, and how they were asked for."""
+        return self.path / "run.json"
+
+    @property
+    def in_flight(self) -> Path:
+        """The file that notes requests for completions while they are under way."""
+        return self.path / "inflight.jsonl"
+
     def rows(self, key: str) -> Path:
         """The file of an evaluation's rows; `key` is the suite's name, with -ablation where ablated."""
         return self.path / "evaluations" / f"{key}.jsonl"
@@ -113,6 +123,14 @@ class Run:
     def head(self, key: str) -> Path:
         """The file that says by what the rows of an evaluation were judged."""
         return self.path / "evaluations" / f"{key}.json"
+
+    def checks(self, key: str) -> Path:
+        """The file of what a check said of its programs; `key` is the suite's name."""
+        return self.path / "checks" / f"{key}.jsonl"
+
+    def checks_head(self, key: str) -> Path:
+        """The file that says how they were checked."""
+        return self.path / "checks" / f"{key}.json"
 
     def judged_by(self) -> list[str]:
         """The names of the suites by which it was judged, sorted."""
@@ -170,13 +188,12 @@ class Run:
                 self._expect(source)
                 return count
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
-            run_json = self.path / "run.json"
-            write_whole(run_json, to_text(about))
+            write_whole(self.about, to_text(about))
             try:
                 with written_whole(self.completions) as file:
                     file.writelines(map(_line, source.read()))
             except BaseException:
-                run_json.unlink()
+                self.about.unlink()
                 raise
         return count
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -13,28 +13,26 @@ from rich.text import Text
 
 from codebotler.rtl import explain
 from codebotler.simulator.robot import located, resolve_room
-from codebotler.trace import Event, Trace
+from codebotler.storyboard import grid, steps_of, storyboard
+from codebotler.terminal import shortened, visible
+from codebotler.trace import Trace
 from codebotler.tracefile import trace_from
 from codebotler.world import World
 from roboeval.records import Completion, name_of
-from roboeval.storyboard import storyboard
 from roboeval.suite import Scenario, Suite
 from roboeval.tables import (
     NOT_RECORDED,
     Row,
     Selection,
     by_hand,
-    grid,
     key_of,
     kind_of,
     of_task,
     parse_selection,
     prompt_head,
     prompt_lines,
-    shortened,
     task_data,
     task_view,
-    visible,
 )
 
 __all__ = [
@@ -150,28 +148,18 @@ def _trace(verdict: Row, scenario: Scenario | None) -> Trace:
 
 def _world_data(verdict: Row, scenario: Scenario | None) -> dict[str, Any]:
     trace = _trace(verdict, scenario)
-    world = None if scenario is None else scenario.world
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
-        "steps": [_step_data(number, event, world) for number, event in enumerate(trace, 1)],
+        "steps": steps_of(trace, None if scenario is None else _rooms_of(scenario.world)),
         "failed_checks": [
             {"check": check, **_explained(check, scenario, trace)} for check in verdict["failed_checks"]
         ],
     }
 
 
-def _step_data(number: int, event: Event, world: World | None) -> dict[str, Any]:
-    data: dict[str, Any] = {"step": number, "kind": event.kind, "text": event.text}
-    if world is not None:
-        data["place"] = event.place
-        if event.kind == "goto":
-            data["to"] = resolve_room([room.name for room in world.rooms], event.text)
-    if event.found is not None:
-        data["found"] = event.found
-    if event.kind == "ask":
-        data["options"] = [o.text if o.is_text else {"no text": o.text} for o in event.options]
-        data["answer"] = event.answer
-    return data
+def _rooms_of(world: World) -> Callable[[str], str | None]:
+    rooms = [room.name for room in world.rooms]
+    return lambda request: resolve_room(rooms, request)
 
 
 def _explained(check: str, scenario: Scenario | None, trace: Trace) -> dict[str, Any]:

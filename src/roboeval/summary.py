@@ -14,11 +14,13 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.badinput import BadInput
+from codebotler.storyboard import grid
+from codebotler.terminal import visible
 from roboeval.evaluation import Scope
 from roboeval.metrics import Estimate, PromptScore, TaskScore, overall, score_by_prompt
 from roboeval.records import how_many
 from roboeval.suite import Suite
-from roboeval.tables import Row, by_hand, grid, visible
+from roboeval.tables import Row, by_hand
 from roboeval.taxonomy import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, ROBOT_KINDS, TASK
 
 ALWAYS_SHOWN: Mapping[str, Sequence[str]] = {PYTHON: PYTHON_KINDS, ROBOT: ROBOT_KINDS, TASK: CATEGORIES}

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 from rich.console import Group, RenderableType
-from rich.table import Table
 from rich.text import Text
 
 from codebotler.badinput import BadInput
+from codebotler.storyboard import grid
+from codebotler.terminal import visible
 from roboeval.records import Completion, Key
 from roboeval.suite import Suite
 
@@ -184,27 +185,3 @@ def by_hand(models: Collection[str | None]) -> str:
     if not recorded:
         return ""
     return f" ({'' if len(recorded) == len(models) else 'some '}programs written by hand)"
-
-
-# --- text that may come from a model
-
-
-def visible(text: str) -> str:
-    """A text with whatever a terminal would obey or hide, such as ESC, written out as an escape."""
-    if text.isprintable():
-        return text
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
-
-
-def shortened(text: str, most: int = 500) -> str:
-    """A text made visible, without what is too much to read."""
-    left = len(text) - most
-    return visible(text) if left <= 0 else f"{visible(text[:most])}... {left:,} more characters"
-
-
-def grid(*justify: Literal["left", "right"]) -> Table:
-    """A table without lines; numbers stand on the right and are never broken."""
-    table = Table.grid(padding=(0, 2, 0, 0))
-    for side in justify:
-        table.add_column(justify=side, no_wrap=side == "right", overflow="fold")
-    return table

@@ -1,63 +1,63 @@
-"""What commands say: tables, JSON, progress, and sentences beside them."""
+"""What commands say while they work, and how they end on what they cannot use."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from time import monotonic
-from typing import TYPE_CHECKING, NoReturn, TypeVar
+from typing import NoReturn, TypeVar
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
+from codebotler.terminal import note, print_json, print_rich
+
+__all__ = ["fail", "metered", "note", "print_json", "print_rich", "watched"]
 
 Item = TypeVar("Item")
 
 QUIET_S = 2.0  # for so long does a command say nothing at first; lines of a long one come more seldom
 
 
-def print_rich(what: RenderableType) -> None:
-    """Draw on the terminal, or plainly into a pipe."""
-    from rich.console import Console
-
-    console = Console()
-    if console.is_terminal:
-        console.print(what)
-        return
-    with console.capture() as drawn:
-        console.print(what)
-    print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
-
-
-def print_json(data: object) -> None:
-    """Print for machines."""
-    import json
-
-    print(json.dumps(data, indent=2))
-
-
 def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:
     """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
+    with metered(doing, total) as tell:
+        for done, item in enumerate(items, 1):
+            tell(done, "")
+            yield item
+
+
+@contextmanager
+def metered(doing: str, total: int | None = None, done: int = 0) -> Iterator[Callable[[int, str], None]]:
+    """What is to be told how far something has come, and more about it; it draws a bar or writes lines.
+
+    Args:
+        doing: what is being done, in a word.
+        total: how much there is to do; None where nobody knows.
+        done: how much of it was done before.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn(doing),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[more]}", markup=False),
+        TimeRemainingColumn(),
+    )
     of_all = "" if total is None else f" of {total:,}"
     started = monotonic()
     next_line = started + QUIET_S
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        job = progress.add_task(doing, total=total)
-        for done, item in enumerate(items, 1):
-            progress.update(job, completed=done)
+        job = progress.add_task(doing, total=total, completed=done, more="")
+
+        def tell(done: int, more: str) -> None:
+            nonlocal next_line
+            progress.update(job, completed=done, more=more)
             if not console.is_terminal and monotonic() >= next_line:
-                note(f"{doing}: {done:,}{of_all}")
+                note(", ".join(filter(None, (f"{doing}: {done:,}{of_all}", more))))
                 next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
-            yield item
 
-
-def note(sentence: str) -> None:
-    """Say something beside the results."""
-    print(sentence, file=sys.stderr)
+        yield tell
 
 
 def fail(sentence: str) -> NoReturn:

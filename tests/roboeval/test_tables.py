@@ -5,10 +5,11 @@ from __future__ import annotations
 import pytest
 
 from codebotler.badinput import BadInput
+from codebotler.terminal import visible
 from roboeval import tables
 from roboeval.records import Completion
 from roboeval.summary import render, summary
-from roboeval.tables import Selection, parse_selection, visible
+from roboeval.tables import Selection, parse_selection
 from small_run import HOSTILE, ROWS, SHOWN, SUITE, printed, row
 
 

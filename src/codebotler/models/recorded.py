@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+import textwrap
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 from functools import cache
 from pathlib import Path
 from typing import Annotated
@@ -11,9 +14,15 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.badinput import BadInput, YamlFile
+from codebotler.models import base
+from codebotler.models.base import Heard, ModelError, Usage, unheard
+from codebotler.prompts import Prompt
 
 FOLDER = Path(__file__).with_name("recorded")
 NAMES = ("careful", "hasty")
+CLOSEST, SHOWN = 3, 100  # how many instructions are suggested, and how much of each, in characters
+LONG = re.compile(r"[^\W\d_]{4,}")  # shorter words are in every instruction
+REAL_MODEL = "name a real model to have a program written for it, such as --model openai-chat:gpt-5.1"
 
 
 @dataclass(frozen=True)
@@ -51,6 +60,67 @@ class RecordedModel:
         """
         replies = self.replies[instruction]
         return replies[index % len(replies)]
+
+
+@dataclass(frozen=True)
+class Recital:
+    """A recorded model that is asked like any other.
+
+    Args:
+        recorded: what it recites.
+    """
+
+    recorded: RecordedModel
+
+    @property
+    def name(self) -> str:
+        """Such as `recorded:careful`."""
+        return f"recorded:{self.recorded.name}"
+
+    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> base.Reply:
+        """The recorded reply that stands for completion number `number`; it takes no time and no tokens.
+
+        Raises:
+            ModelError: nobody recorded the instruction; the sentence names the closest that were.
+        """
+        known = {_words(instruction): instruction for instruction in self.recorded.replies}
+        instruction = known.get(_words(prompt.instruction))
+        if instruction is None:
+            raise ModelError(self._unknown(prompt.instruction), may_pass=False)
+        program = self.recorded.reply(instruction, number).program
+        heard(program)
+        return base.Reply(program, program, Usage(), 0.0, "stop")
+
+    async def close(self) -> None:
+        """Nothing is held."""
+
+    def _unknown(self, instruction: str) -> str:
+        closest = " or ".join(
+            f'"{_short(known)}"' for known in closest_to(instruction, self.recorded.replies)
+        )
+        return (
+            f'{self.name} has no program for "{_short(instruction)}"; '
+            f"the closest instructions it knows are {closest}; {REAL_MODEL}"
+        )
+
+
+def closest_to(instruction: str, known: Iterable[str]) -> list[str]:
+    """The known instructions that share most long words, in the same order, with one that is not known."""
+    matcher = SequenceMatcher(a=(), b=LONG.findall(instruction.lower()), autojunk=False)
+
+    def likeness(other: str) -> tuple[int, float]:
+        matcher.set_seq1(LONG.findall(other.lower()))
+        return sum(block.size for block in matcher.get_matching_blocks()), matcher.ratio()
+
+    return sorted(known, key=likeness, reverse=True)[:CLOSEST]
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(text.lower().split())
+
+
+def _short(text: str) -> str:
+    return textwrap.shorten(text, SHOWN, placeholder=" ...")
 
 
 @cache

@@ -1,10 +1,16 @@
 import ast
+import asyncio
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from codebotler.badinput import BadInput
+from codebotler.models import base
+from codebotler.models.base import Settings
+from codebotler.models.open import open_model
 from codebotler.models.recorded import NAMES, read_replies, recorded_model
+from codebotler.prompts import prompt_for
 
 
 def write(path: Path, text: str) -> Path:
@@ -85,3 +91,70 @@ def test_file_that_is_no_list_is_no_file_without_replies(tmp_path: Path) -> None
 def test_instruction_without_replies_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput):
         read_replies(write(tmp_path / "a.yaml", "- instruction: Wave.\n  replies: []\n"))
+
+
+def reply_to(instruction: str, number: int = 0, model: str = "recorded") -> base.Reply:
+    return asyncio.run(open_model(model, Settings()).reply(prompt_for(instruction), number=number))
+
+
+def test_recorded_model_is_asked_like_any_other() -> None:
+    recorded = recorded_model("recorded:hasty")
+    instruction, replies = max(recorded.replies.items(), key=lambda item: len(item[1]))
+    heard: list[str] = []
+    model = open_model("recorded:hasty", Settings())
+    assert model.name == "recorded:hasty"
+    reply = asyncio.run(model.reply(prompt_for(instruction), number=1, heard=heard.append))
+    asyncio.run(model.close())
+    program = replies[1].program
+    assert reply == base.Reply(program, program, base.Usage(None, None), 0.0, "stop")
+    assert heard == [program]
+    assert reply_to(instruction, len(replies), "recorded:hasty").program == replies[0].program
+
+
+def test_spaces_and_capitals_do_not_make_another_instruction() -> None:
+    instruction = next(iter(recorded_model("recorded").replies))
+    assert reply_to(f"\n {instruction.upper().replace(' ', '  ')}\n") == reply_to(instruction)
+
+
+def test_unknown_instruction_is_told_with_the_closest_that_are_known_and_how_to_name_a_model() -> None:
+    with pytest.raises(base.ModelError) as caught:
+        reply_to("Fetch me a coffee from the kitchen")
+    sentence = caught.value.sentence
+    assert sentence.startswith('recorded:careful has no program for "Fetch me a coffee from the kitchen"; ')
+    assert '"Go to the lobby and ask the visitor there whether they want water' in sentence
+    assert sentence.endswith("such as --model openai-chat:gpt-5.1")
+    assert not caught.value.may_pass
+    assert "\n" not in sentence
+
+
+@pytest.mark.parametrize("name", ["", "gpt-5.1", ":a", "hf:", "completions: ", "openai-chat:"])
+def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
+    with pytest.raises(BadInput, match="names no model; write recorded"):
+        open_model(name, Settings())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"temperature": -0.1}, "the temperature is -0.1, but it must be between 0 and 100"),
+        ({"temperature": float("nan")}, "the temperature is nan, but it must be between 0 and 100"),
+        ({"top_p": 0.0}, "top-p is 0, but it must be above 0 and at most 1"),
+        ({"top_p": 1.5}, "top-p is 1.5, but it must be above 0 and at most 1"),
+        ({"max_tokens": 0}, "the limit is 0 tokens, but it must be at least 1"),
+        ({"timeout": 0.0}, "the timeout is 0 seconds, but it must be above 0"),
+        ({"base_url": "localhost:8000"}, '"localhost:8000" is no base URL; write one like http'),
+        ({"base_url": "http://a:99999/v1"}, "the base URL is none"),
+        ({"base_url": "http://me:sk-secret@a/v1"}, "the base URL has a user name, a password or a query"),
+        ({"base_url": "http://a/v1?key=sk-secret"}, "the base URL has a user name, a password or a query"),
+    ],
+)
+def test_settings_out_of_range_are_told(wrong: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        Settings(**wrong)
+    assert str(caught.value).startswith(sentence)
+    assert "sk-secret" not in str(caught.value)
+
+
+def test_seed_counts_on_with_the_number_of_the_reply() -> None:
+    assert Settings(seed=7).seed_of(3) == 10
+    assert Settings().seed_of(3) is None

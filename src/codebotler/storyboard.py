@@ -1,22 +1,47 @@
-"""What a robot did, drawn step by step and room by room."""
+"""What a robot did, step by step: as plain data, and drawn room by room."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
-from typing import Any
+from typing import Any, Literal
 
 from rich.console import RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from roboeval.tables import grid, shortened, visible
+from codebotler.terminal import shortened, visible
+from codebotler.trace import Event, Trace
 
 DID = {"say": "said", "pick": "picked up", "place": "put down"}
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20
+
+
+def steps_of(trace: Trace, room: Callable[[str], str | None] | None = None) -> list[dict[str, Any]]:
+    """The events of a trace as plain data, counted from 1.
+
+    Args:
+        trace: of a run.
+        room: tells which room a request to drive finds; without it, no step says where it happened.
+    """
+    return [_step_data(number, event, room) for number, event in enumerate(trace, 1)]
+
+
+def _step_data(number: int, event: Event, room: Callable[[str], str | None] | None) -> dict[str, Any]:
+    data: dict[str, Any] = {"step": number, "kind": event.kind, "text": event.text}
+    if room is not None:
+        data["place"] = event.place
+        if event.kind == "goto":
+            data["to"] = room(event.text)
+    if event.found is not None:
+        data["found"] = event.found
+    if event.kind == "ask":
+        data["options"] = [o.text if o.is_text else {"no text": o.text} for o in event.options]
+        data["answer"] = event.answer
+    return data
 
 
 def storyboard(steps: Sequence[Mapping[str, Any]], needed: set[int | None]) -> Table:
@@ -84,3 +109,11 @@ def _options(options: Sequence[str | Mapping[str, str]]) -> str:
     shown = [shortened(o) if isinstance(o, str) else f"{shortened(o['no text'])} (no text)" for o in options]
     left = len(shown) - MOST_OPTIONS
     return f"[{' | '.join(shown[:MOST_OPTIONS] + [f'{left:,} more'] * (left > 0))}]"
+
+
+def grid(*justify: Literal["left", "right"]) -> Table:
+    """A table without lines; numbers stand on the right and are never broken."""
+    table = Table.grid(padding=(0, 2, 0, 0))
+    for side in justify:
+        table.add_column(justify=side, no_wrap=side == "right", overflow="fold")
+    return table

@@ -1,0 +1,106 @@
+"""What `codebotler generate` does: asks a model, checks, asks again, and says what is going on."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from codebotler.check import check
+from codebotler.generation import Attempt, Generation, generate
+from codebotler.models.base import Model
+from codebotler.models.paced import Paced
+from codebotler.prompts import Prompt
+from codebotler.simulator.engine import Lanes
+from codebotler.terminal import note, visible
+from codebotler.world import World
+
+
+def generated(
+    model: Model,
+    prompt: Prompt,
+    *,
+    world: World | None = None,
+    retries: int = 0,
+    repair: bool = False,
+    record: Path | None = None,
+) -> Generation:
+    """Have a model write a program, and say beside the results what is wrong with each attempt.
+
+    Args:
+        model: who is asked; it is closed at the end.
+        prompt: what is asked.
+        world: where the program is to run; without it, the rooms are those that the program goes to.
+        retries: how many times a rejected program is asked for again, at least 0.
+        repair: whether to ask again with the program and its problems.
+        record: a file that gets a line of JSON for every attempt.
+
+    Raises:
+        ModelError: no whole reply came.
+        EngineError: no isolated process could be started.
+        OSError: the record cannot be written.
+    """
+    rooms = None if world is None else [room.name for room in world.rooms]
+    start = None if world is None else world.robot
+    with recorder(record, model.name) as note_down, Lanes(1) as lanes:
+
+        def problems(program: str) -> list[str]:
+            found = check(program, rooms=rooms, start=start, lanes=lanes)
+            return [problem.sentence for problem in found.problems]
+
+        def tried(attempt: Attempt) -> None:
+            note_down(attempt)
+            _tell(attempt, retries + 1)
+
+        async def asked() -> Generation:
+            try:
+                paced = Paced(model, concurrency=1)
+                return await generate(paced, prompt, problems, retries=retries, repair=repair, tried=tried)
+            finally:
+                await model.close()
+
+        return asyncio.run(asked())
+
+
+@contextmanager
+def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None]]:
+    """What adds attempts to a file, each when it has ended; nothing is added if no file is named.
+
+    Args:
+        path: the file.
+        model: the name of who is asked.
+    """
+    if path is None:
+        yield lambda _: None
+        return
+    with path.open("a", encoding="utf-8", errors="backslashreplace") as file:
+
+        def add(attempt: Attempt) -> None:
+            file.write(json.dumps(attempt.data(model), ensure_ascii=False) + "\n")
+            file.flush()
+
+        yield add
+
+
+def _tell(attempt: Attempt, most: int) -> None:
+    which = f"attempt {attempt.number + 1} of {most}" if most > 1 else "the program"
+    if attempt.problems:
+        note(f"{which} has {'problems' if len(attempt.problems) > 1 else 'a problem'}:")
+        for problem in attempt.problems:
+            note(f"  {visible(problem)}")
+    elif attempt.number:
+        note(f"{which} is accepted")
+
+
+def in_words(prompt: Prompt, model: str) -> str:
+    """What a model is asked: the messages of a chat, or the one text that base models go on from.
+
+    Args:
+        prompt: what is asked.
+        model: the name of the model, which tells in which way it is asked.
+    """
+    if model.partition(":")[0] == "completions":
+        return prompt.text.removesuffix("\n")
+    return "\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages)

@@ -1,0 +1,47 @@
+"""From the name of a model to the model."""
+
+from __future__ import annotations
+
+from codebotler.badinput import BadInput
+from codebotler.models.base import Model, Settings
+from codebotler.models.recorded import Recital, recorded_model
+
+KINDS = (
+    "recorded, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
+    "completions:NAME with --base-url, or hf:PATH"
+)
+EXTRA = 'pip install "codebotler[transformers]"'
+
+
+def open_model(name: str, settings: Settings) -> Model:
+    """The model of a name, ready to be asked.
+
+    Args:
+        name: `recorded`, `recorded:hasty`, `provider:name` as pydantic-ai spells it, `completions:name` for
+            an endpoint of text completions, or `hf:PATH` for a folder or a name on the Hugging Face hub.
+        settings: how it is to be asked.
+
+    Raises:
+        BadInput: there is no such model, a key is not in the environment, or something is not installed.
+    """
+    kind, _, rest = name.partition(":")
+    if kind == "recorded":
+        return Recital(recorded_model(name))
+    if not kind or not rest.strip():
+        raise BadInput(f'"{name}" names no model; write {KINDS}')
+    # Each of these imports a large library, which only who uses it should wait for.
+    match kind:
+        case "completions":
+            from codebotler.models.completions import Completions  # noqa: PLC0415 - see above
+
+            return Completions(rest, settings)
+        case "hf":
+            try:
+                from codebotler.models.local import Local  # noqa: PLC0415 - see above
+            except ImportError:
+                raise BadInput(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
+            return Local(rest, settings)
+        case _:
+            from codebotler.models.chat import Chat  # noqa: PLC0415 - see above
+
+            return Chat(name, settings)

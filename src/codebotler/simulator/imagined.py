@@ -1,0 +1,353 @@
+"""A robot in an imagined world: its rooms are known, and all else is drawn when the program first asks."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from hashlib import blake2b
+
+from codebotler.simulator import robot as real
+from codebotler.simulator.robot import (
+    Behaviour,
+    RobotError,
+    SimulatedRobot,
+    Thing,
+    found_in,
+    is_found_by_itself,
+)
+from codebotler.simulator.rules import Rules
+from codebotler.skills import SKILLS, SkillTable
+from codebotler.trace import Option
+from codebotler.world import Room, World
+
+AS_WRITTEN = Rules(literals="as-written")
+"""The rules for a program that a robot is to run: nothing in it is changed."""
+
+SOMEBODY = "somebody"
+PEOPLE = frozenset(
+    {
+        *("", SOMEBODY, "someone", "anybody", "anyone", "everybody", "everyone", "all"),
+        *("person", "persons", "people", "human", "humans", "human being"),
+        *("another person", "other person", "other people"),
+    }
+)
+"""Words that mean whoever is there."""
+
+_ARTICLE = re.compile(r"(?:the|an?|any|some)\s+")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is known of a world before anything in it is imagined.
+
+    Args:
+        rooms: their names, in the order in which the robot knows them.
+        start: the one in which the robot starts.
+        guessed: whether nobody said which rooms there are. Names are then plain texts, and no regexes; and
+            driving to a place that is not among them finds it.
+    """
+
+    rooms: tuple[str, ...]
+    start: str
+    guessed: bool = False
+
+    @classmethod
+    def of(cls, world: World) -> Plan:
+        """The rooms of a world, and where the robot starts in it."""
+        return cls(tuple(room.name for room in world.rooms), world.robot)
+
+    def room(self, request: str) -> str | None:
+        """The room that a request finds; None if there is no such room."""
+        if not self.guessed:
+            return next((room for room in self.rooms if found_in(room, request)), None)
+        wanted = request.strip()
+        same = [room for room in self.rooms if room.casefold() == wanted.casefold()]
+        within = (room for room in self.rooms if room.casefold() in wanted.casefold())
+        return same[0] if same else next(within, wanted or None)
+
+
+@dataclass(frozen=True)
+class Lot:
+    """How the facts of one imagined world are drawn: each from its own name, in whatever order.
+
+    Args:
+        seed: any whole number.
+        sample: the number of this world among those of the same seed.
+        strict: whether what the program never looked for is drawn, too; else it is as the program takes it.
+    """
+
+    seed: int = 0
+    sample: int = 0
+    strict: bool = False
+
+    def draw(self, count: int, *fact: str) -> int:
+        """One of the numbers from 0 to `count - 1` for a fact."""
+        texts = [str(self.seed), str(self.sample), *fact]
+        named = "".join(f"{len(text)}:{text}" for text in texts).encode(errors="surrogatepass")
+        return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One drawing of lots.
+
+    Args:
+        count: how many there were.
+        fact: what was drawn for.
+        drawn: which one, from 0.
+    """
+
+    count: int
+    fact: tuple[str, ...]
+    drawn: int
+
+
+@dataclass(frozen=True)
+class Fact:
+    """Something that was settled about an imagined world.
+
+    Args:
+        sentence: it, in words.
+        by_lot: whether it was drawn; else the program took it for granted, and so it was.
+    """
+
+    sentence: str
+    by_lot: bool
+
+
+@dataclass
+class Scene:
+    """What a program has found out about one room; names are those that `meant` gives.
+
+    Args:
+        missed: who or what it looked for, and was not there.
+        gone: what it has taken away.
+        people: who is there.
+    """
+
+    missed: set[str] = field(default_factory=set)
+    gone: set[str] = field(default_factory=set)
+    people: set[str] = field(default_factory=set)
+
+    def lacks(self, name: str) -> bool:
+        """Whether it is known not to be there; what a longer request did not find, a part of it does not."""
+        return name in self.missed or any(name in missed for missed in self.missed if name != SOMEBODY)
+
+
+@dataclass
+class Hope:
+    """How often a program looked for somebody or something.
+
+    Args:
+        vain: the rooms and the times at which it found nothing.
+        found: the rooms in which it found what it looked for.
+    """
+
+    vain: set[tuple[str, float]] = field(default_factory=set)
+    found: set[str] = field(default_factory=set)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether it waited for it, or searched more than one room for it, and never found it."""
+        return len(self.vain) > 1 and not self.found
+
+
+class ImaginedRobot(SimulatedRobot):
+    """A robot in a world that is drawn while the program runs; a fact once drawn stays true.
+
+    What the program looks for is there or not by chance. What it never looked for is as it takes it to be:
+    somebody answers, and what it picks up lies there. Answers are drawn from what a question offers.
+
+    A search takes for granted that there is one of what it searches, somewhere or at some time. Where the
+    lots fell otherwise, `excuses` tells which errors are owed to that, so that nobody blames the program.
+
+    Args:
+        plan: the rooms, which are certain.
+        lot: how facts are drawn.
+        rules: how requests find rooms.
+        skills: the skills that can be called.
+        behaviours: what each skill does, by name.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        lot: Lot,
+        rules: Rules = AS_WRITTEN,
+        skills: SkillTable = SKILLS,
+        behaviours: Mapping[str, Behaviour] | None = None,
+    ) -> None:
+        does = IMAGINED if behaviours is None else behaviours
+        super().__init__(World(tuple(map(Room, plan.rooms)), plan.start), rules, skills, does)
+        self.plan, self.lot = plan, lot
+        self.only_looks |= {name for name, behaviour in does.items() if behaviour is look}
+        if does.get("go_to") is drive:
+            sure = (room for room in plan.rooms if plan.guessed or is_found_by_itself(room))
+            self.surely = tuple(("go_to", room) for room in sure)
+        self.things = defaultdict(list)
+        self.answers = defaultdict(list)  # of nobody whom a world file would name
+        self.scenes: defaultdict[str, Scene] = defaultdict(Scene)
+        self.told: dict[tuple[str, ...], str] = {}
+        self.facts: list[Fact] = []
+        self.draws: list[Draw] = []
+        self.hopes: defaultdict[str, Hope] = defaultdict(Hope)
+        self.excuses: set[str] = set()
+
+    @contextmanager
+    def excused(self, *, when: bool) -> Iterator[None]:
+        """Remember what an error says that is owed to the lots and not to the program."""
+        try:
+            yield
+        except RobotError as error:
+            if when and not self.lot.strict:
+                self.excuses.add(str(error))
+            raise
+
+    @property
+    def scene(self) -> Scene:
+        """What the program has found out about the room that the robot is in."""
+        return self.scenes[self.room]
+
+    def is_here(self, name: str) -> bool | None:
+        """Whether somebody or something is in this room, as `meant` names it; None if nothing says so yet."""
+        if name in self.scene.people or any(thing.is_meant_by(name) for thing in self.things[self.room]):
+            return True
+        return False if self.scene.lacks(name) else None
+
+    def draw(self, count: int, *fact: str) -> int:
+        """Draw for a fact, and remember it."""
+        drawn = self.lot.draw(count, *fact)
+        self.draws.append(Draw(count, fact, drawn))
+        return drawn
+
+    def drawn(self, name: str) -> bool:
+        """Draw whether somebody or something is in this room."""
+        return self.draw(2, "is here", self.room, name) == 1
+
+    def settle(self, name: str, *, here: bool, by_lot: bool) -> None:
+        """Let somebody or something be in this room or not, from now on."""
+        if name == SOMEBODY:
+            who = SOMEBODY if here else "nobody"
+            self.facts.append(Fact(f'{who} is in "{self.room}"', by_lot))
+        else:
+            self.facts.append(Fact(f'"{brief(name)}" is {"" if here else "not "}in "{self.room}"', by_lot))
+        if not here:
+            self.scene.missed.add(name)
+
+
+def meant(request: str) -> str:
+    """Who or what a request means: without an article, and the same for all words for people."""
+    name = " ".join(request.casefold().split())
+    name = name.removeprefix(found[0]) if (found := _ARTICLE.match(name)) else name
+    return SOMEBODY if name in PEOPLE else name
+
+
+def drive(robot: ImaginedRobot, location: str) -> None:
+    """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
+    room = robot.plan.room(location)
+    if room is None:
+        real.go_to(robot, location)
+        return
+    robot.record("goto", location)
+    robot.room = room
+
+
+def look(robot: ImaginedRobot, entity: str) -> bool:
+    """Look for an object or for somebody; whether they are there is drawn at the first look."""
+    name = meant(entity)
+    here = robot.is_here(name)
+    if here is None and name in robot.scene.gone:
+        here = False
+        robot.scene.missed.add(name)
+    if here is None:
+        here = robot.drawn(name)
+        robot.settle(name, here=here, by_lot=True)
+        if here and name == SOMEBODY:
+            robot.scene.people.add(name)
+        elif here:
+            robot.things[robot.room].append(Thing(name, is_pattern=False))
+    if here:
+        robot.hopes[name].found.add(robot.room)
+    else:
+        robot.hopes[name].vain.add((robot.room, robot.now))
+    robot.record("check", entity, found=here)
+    return here
+
+
+def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
+    """Ask somebody, who is there unless the program saw that they are not; they choose by chance."""
+    who = meant(person)
+    if not options or not _answers(robot, who):
+        lost = robot.hopes[who].is_lost or robot.hopes[SOMEBODY].is_lost
+        with robot.excused(when=bool(options) and lost):
+            return real.ask(robot, person, question, options)
+    robot.record("ask", question, options)
+    asked = (robot.room, who, question.strip())
+    texts = [option.text for option in options]
+    if robot.told.get(asked) not in texts:
+        drawn = texts[robot.draw(len(texts), "answer", *asked)]
+        robot.told[asked] = drawn
+        robot.facts.append(Fact(f'the answer to "{brief(question)}" is "{brief(drawn)}"', by_lot=True))
+    chosen = texts.index(robot.told[asked])
+    robot.amend(texts[chosen])
+    return chosen
+
+
+def _answers(robot: ImaginedRobot, who: str) -> bool:
+    here = robot.is_here(who)
+    if here is None and robot.scene.lacks(SOMEBODY):
+        here = False
+    if here is None:
+        here = robot.drawn(who) if robot.lot.strict else True
+        robot.settle(who, here=here, by_lot=robot.lot.strict)
+    if here:
+        robot.scene.people |= {who, SOMEBODY}
+    return here
+
+
+def pick(robot: ImaginedRobot, obj: str) -> None:
+    """Take an object, which is there unless the program saw that it is not."""
+    name = meant(obj)
+    if robot.held is None and robot.is_here(name) is None and _lies_there(robot, name):
+        robot.things[robot.room].append(Thing(name, is_pattern=False))
+    hope = robot.hopes[name]
+    again = robot.held is not None and meant(robot.held) == name and len(hope.found) > 1
+    with robot.excused(when=again or hope.is_lost):
+        real.pick(robot, obj)
+    robot.scene.gone.add(name)
+
+
+def _lies_there(robot: ImaginedRobot, name: str) -> bool:
+    if name in robot.scene.gone:  # it may have been one of several, if nobody has looked since
+        return not robot.lot.strict
+    here = robot.drawn(name) if robot.lot.strict else True
+    robot.settle(name, here=here, by_lot=robot.lot.strict)
+    return here
+
+
+def place(robot: ImaginedRobot, obj: str) -> None:
+    """Put down what the robot holds, which must be named exactly as it was picked up."""
+    with robot.excused(when=robot.held is None and robot.hopes[meant(obj)].is_lost):
+        real.place(robot, obj)
+
+
+IMAGINED: Mapping[str, Behaviour] = {
+    **real.BEHAVIOURS,
+    "go_to": drive,
+    "is_in_room": look,
+    "ask": ask,
+    "pick": pick,
+    "place": place,
+}
+"""What each of the eight skills does in an imagined world."""
+
+BRIEF = 80
+
+
+def brief(text: str) -> str:
+    """A text of a program, on one line and without what is too long for a sentence."""
+    line = " ".join(text.split())
+    return line if len(line) <= BRIEF else f"{line[:BRIEF]}..."

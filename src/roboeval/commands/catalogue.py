@@ -1,0 +1,63 @@
+"""The command about the tasks of a suite."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.commands.options import JsonOption, SuiteOption, cores, load
+from roboeval.terminal import fail, note, print_json, print_rich, watched
+
+if TYPE_CHECKING:
+    from roboeval.suite import Suite
+
+
+def tasks(
+    task: Annotated[str | None, typer.Argument(help="Show this task.")] = None,
+    suite: SuiteOption = "paper",
+    lint: Annotated[bool, typer.Option("--lint", help="Look for faults; status 1 if there are any.")] = False,
+    accepted: Annotated[
+        bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
+    ] = False,
+    new: Annotated[
+        str | None, typer.Option(help="Start a task of this name in the folder of --suite.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """List a suite's tasks, show one, lint them, start a new one."""
+    from roboeval.catalogue import new_task, suite_data, suite_view, task_view
+
+    if new is not None:
+        if suite == "paper":
+            fail("name the folder of your own suite with --suite; the suite of the paper stays as it is")
+        note(f"fill in {new_task(Path(suite), new)}; `roboeval tasks {new} --suite {suite}` shows it")
+        return
+    if accepted and not lint:
+        fail("--accepted is about what --lint finds; add --lint")
+    known = load(suite)
+    if lint:
+        if json:
+            fail("--lint prints for people only; leave --json out")
+        lint_tasks(known, task, accepted=accepted)
+    elif json:
+        print_json(suite_data(known, None if task is None else known.task(task).name))
+    elif task is not None:
+        print_rich(task_view(known.task(task)))
+    else:
+        print_rich(suite_view(known))
+
+
+def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
+    """Print what the linter finds in all tasks or one; status 1 if anything is open."""
+    from roboeval.findings import render
+    from roboeval.lint import lint
+    from roboeval.trials import tried
+
+    wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
+    linted = (lint(one, tried(one, suite, workers=cores())) for one in wanted)
+    findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
+    print(render(findings, accepted=accepted))
+    if any(finding.accepted is None for finding in findings):
+        raise SystemExit(1)

@@ -1,0 +1,234 @@
+"""Commands that have a model write programs: generate, and run, which judges them as well."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from contextlib import ExitStack
+from datetime import timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Self
+
+import typer
+
+from codebotler.cli import STOPPED
+from roboeval.commands.judging import evaluate
+from roboeval.commands.options import JsonOption, SuiteOption, TasksOption, command, load, named
+from roboeval.terminal import metered, note
+
+if TYPE_CHECKING:
+    from roboeval.generate import Progress
+
+ModelOption = Annotated[
+    str,
+    typer.Option(
+        help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, completions:NAME, "
+        "or hf:PATH."
+    ),
+]
+OutOption = Annotated[
+    Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
+]
+NumOption = Annotated[int, typer.Option(min=1, help="Completions for each prompt.")]
+TemperatureOption = Annotated[float, typer.Option(help="How far the model strays from the likeliest.")]
+TopPOption = Annotated[float, typer.Option(help="The share of likely tokens that are drawn from.")]
+MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
+SeedOption = Annotated[int | None, typer.Option(help="Fix the random numbers, where a model takes a seed.")]
+TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
+BaseUrlOption = Annotated[
+    str | None, typer.Option(help="Where the model is served, such as http://localhost:8000/v1.")
+]
+ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]
+RateOption = Annotated[float | None, typer.Option(min=0.001, help="Send no more requests in a minute.")]
+BudgetOption = Annotated[
+    int | None, typer.Option(min=1, help="Stop when this command has used so many tokens.")
+]
+
+
+def generate(
+    model: ModelOption = "recorded",
+    out: OutOption = None,
+    num_completions: NumOption = 50,
+    temperature: TemperatureOption = 0.2,
+    top_p: TopPOption = 0.95,
+    max_tokens: MaxTokensOption = 512,
+    seed: SeedOption = None,
+    suite: SuiteOption = "paper",
+    tasks: TasksOption = None,
+    concurrency: ConcurrencyOption = 8,
+    requests_per_minute: RateOption = None,
+    token_budget: BudgetOption = None,
+    timeout: TimeoutOption = 60.0,
+    base_url: BaseUrlOption = None,
+) -> None:
+    """Have a model write programs for a suite; the same command goes on after any interruption."""
+    path = generated(
+        model,
+        out,
+        num_completions,
+        temperature,
+        top_p,
+        max_tokens,
+        seed,
+        suite,
+        tasks,
+        concurrency,
+        requests_per_minute,
+        token_budget,
+        timeout,
+        base_url,
+    )
+    note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
+
+
+def run(
+    model: ModelOption = "recorded",
+    out: OutOption = None,
+    num_completions: NumOption = 50,
+    temperature: TemperatureOption = 0.2,
+    top_p: TopPOption = 0.95,
+    max_tokens: MaxTokensOption = 512,
+    seed: SeedOption = None,
+    suite: SuiteOption = "paper",
+    tasks: TasksOption = None,
+    concurrency: ConcurrencyOption = 8,
+    requests_per_minute: RateOption = None,
+    token_budget: BudgetOption = None,
+    timeout: TimeoutOption = 60.0,
+    base_url: BaseUrlOption = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
+    ] = None,
+    require_isolation: Annotated[
+        bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
+    ] = False,
+    json: JsonOption = False,
+) -> None:
+    """Have a model write programs for a suite, judge them, and print the tables."""
+    path = generated(
+        model,
+        out,
+        num_completions,
+        temperature,
+        top_p,
+        max_tokens,
+        seed,
+        suite,
+        tasks,
+        concurrency,
+        requests_per_minute,
+        token_budget,
+        timeout,
+        base_url,
+    )
+    evaluate(
+        str(path),
+        suite=suite,
+        tasks=tasks,
+        workers=workers,
+        require_isolation=require_isolation,
+        json=json,
+    )
+
+
+def generated(
+    name: str,
+    out: Path | None,
+    num_completions: int,
+    temperature: float,
+    top_p: float,
+    max_tokens: int,
+    seed: int | None,
+    suite: str,
+    tasks: str | None,
+    concurrency: int,
+    requests_per_minute: float | None,
+    token_budget: int | None,
+    timeout: float,
+    base_url: str | None,
+) -> Path:
+    """Make or complete a run, and say where it is; ends with status 1 if completions are missing."""
+    from codebotler.models.base import Settings
+    from codebotler.models.open import open_model
+    from roboeval.generate import Pace, generate_run
+    from roboeval.order import Order
+    from roboeval.run import Run, tasks_to_judge
+
+    known = load(suite)
+    order = Order(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
+    settings = Settings(
+        temperature=temperature,
+        top_p=top_p,
+        max_tokens=max_tokens,
+        seed=seed,
+        timeout=timeout,
+        base_url=base_url,
+    )
+    pace = Pace(concurrency, requests_per_minute, token_budget)
+    model = open_model(name, settings)
+    run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", model.name).strip("-.")))
+    meter = Meter()
+    try:
+        with meter:
+            progress = generate_run(run, order, model, settings, pace, begun=meter.begin, told=meter.tell)
+    except KeyboardInterrupt:
+        note(f"roboeval: {meter.after_a_stop()}")
+        raise SystemExit(STOPPED) from None
+    if progress.missing is not None:
+        note(f"roboeval: {progress.missing}; the same command goes on where it was")
+        raise SystemExit(1)
+    return run.path
+
+
+class Meter:
+    """Tells how far a run has come: how fast, with how many tokens, and how long the rest takes."""
+
+    def __init__(self) -> None:
+        self._bar = ExitStack()
+        self._draw: Callable[[int, str], None] | None = None
+        self._progress: Progress | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()
+
+    def begin(self, progress: Progress) -> None:
+        """Say what there is already, and start the bar."""
+        from roboeval.records import how_many
+
+        self._progress = progress
+        if progress.found:
+            note(f"{progress.found:,} of {how_many(progress.total)} are there already")
+        if progress.twice:
+            note(f"{requests(progress.twice)} under way when this was interrupted, which may be paid twice")
+        self._draw = self._bar.enter_context(metered("generating", progress.total, progress.found))
+
+    def tell(self, progress: Progress) -> None:
+        """Show how far it has come."""
+        if self._draw is not None:
+            self._draw(progress.done, state(progress))
+
+    def after_a_stop(self) -> str:
+        """What Ctrl-C left behind, and how to go on."""
+        from roboeval.records import how_many
+
+        if self._progress is None:
+            return "stopped before the first request; give the same command again"
+        kept = f"{self._progress.done:,} of {how_many(self._progress.total)} are kept"
+        lost = self._progress.under_way
+        paid = f"; {requests(lost)} under way, which may be paid twice" if lost else ""
+        return f"stopped; {kept}{paid}; the same command goes on where it was"
+
+
+def requests(count: int) -> str:
+    """Such as `1 request was` or `8 requests were`."""
+    return "1 request was" if count == 1 else f"{count:,} requests were"
+
+
+def state(progress: Progress) -> str:
+    """How fast a run grows, with how many tokens so far, and how long the rest takes."""
+    tokens = f"{progress.used.total:,} tokens" if progress.used.total else ""
+    left = f"{timedelta(seconds=round(progress.seconds_left))} left"
+    return ", ".join(filter(None, (f"{progress.rate:.1f} a second", tokens, left)))

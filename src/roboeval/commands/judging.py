@@ -1,0 +1,244 @@
+"""Commands that judge completions and show the verdicts: evaluate, show, export, import."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+
+import typer
+
+from codebotler.cli import STOPPED
+from roboeval.commands.options import (
+    AblationOption,
+    JsonOption,
+    RunArgument,
+    SuiteOption,
+    TasksOption,
+    command,
+    cores,
+    load,
+    named,
+    open_evaluation,
+    options_of,
+)
+from roboeval.terminal import fail, note, print_json, print_rich, watched
+
+if TYPE_CHECKING:
+    from roboeval.evaluation import Scope
+    from roboeval.records import Key
+    from roboeval.suite import Suite
+
+
+def evaluate(
+    source: Annotated[
+        str, typer.Argument(help="A run, a .jsonl, a folder or zip of .py completions, or recorded:NAME.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(help="Keep completions and verdicts in this run.", parser=named("a run"))
+    ] = None,
+    suite: SuiteOption = "paper",
+    tasks: TasksOption = None,
+    ablation: AblationOption = False,
+    redo: Annotated[bool, typer.Option("--redo", help="Start over.")] = False,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
+    ] = None,
+    worlds: Annotated[int | None, typer.Option(help="Judge in this many generated worlds.")] = None,
+    engine: Annotated[str, typer.Option(help="local or ray.")] = "local",
+    require_isolation: Annotated[
+        bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
+    ] = False,
+    json: JsonOption = False,
+) -> None:
+    """Say of every completion whether it does what was asked."""
+    from roboeval.evaluate import evaluate as judge_all
+    from roboeval.evaluation import Scope
+    from roboeval.resume import evaluate_run
+    from roboeval.run import Run, open_source, tasks_to_judge
+
+    refuse_what_comes_later(worlds, engine)
+    judged_by = load(suite)
+    wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
+    if left:
+        note(f"without ablation, and so not judged: {', '.join(left)}")
+    tally = Tally()
+    run = None if out is None else Run(out)
+    try:
+        opened = open_source(source, judged_by)
+        run = run or opened.run
+        scope = Scope.of(watched(opened.read(), "reading"), wanted)
+        if scope.total == 0:
+            fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
+        if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
+            run.keep(opened)
+        how = How(ablated=ablation, workers=workers or cores(), require_isolation=require_isolation)
+        rows = (
+            judge_all(opened.of(wanted), judged_by, **how)
+            if run is None
+            else evaluate_run(run, judged_by, tasks=wanted, redo=redo, **how)
+        )
+        counted = watched(tally.of(rows), "judging", scope.total)
+        print_summary(counted, judged_by, scope, title=source, ablated=ablation, as_json=json)
+    except KeyboardInterrupt:
+        note(f"roboeval: {tally.after_a_stop(is_kept=run is not None, redo=redo)}")
+        raise SystemExit(STOPPED) from None
+    if run is not None:
+        again = command("show", run.path, *tally.first_failed, suite=suite, ablated=ablation)
+        does = "says why that one fails" if tally.first_failed else "prints these tables again"
+        note(f"verdicts are in {run.path}; `{again}` {does}")
+
+
+def show(
+    run: RunArgument,
+    what: Annotated[str | None, typer.Argument(help="TASK, TASK/PROMPT or TASK/PROMPT/INDEX.")] = None,
+    suite: SuiteOption = "paper",
+    ablation: AblationOption = False,
+    k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Print a run's tables, or show why a completion fails."""
+    from roboeval.show import view, view_data
+    from roboeval.tables import parse_selection
+
+    judged_by = load(suite)
+    evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
+    selection = parse_selection(what, judged_by)
+    if selection.task is None:
+        ks = sorted({1, *(k or [])})
+        rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
+        print_summary(
+            rows,
+            judged_by,
+            evaluation.scope,
+            title=str(run),
+            ablated=ablation,
+            as_json=json,
+            k=ks,
+            stale=evaluation.stale,
+        )
+    else:
+        if k:
+            fail(f"--k is about a whole run; leave {selection} out, or --k")
+        if ablation:
+            note("ablation: only common sense was required")
+        selected = selection.rows(watched(evaluation.rows(), "reading", evaluation.scope.total))
+        if json:
+            data = view_data(selection, selected, evaluation.judged(), judged_by, ablated=ablation)
+            print_json({**data, "ablation": ablation})
+        else:
+            print_rich(view(selection, selected, evaluation.judged(), judged_by, ablated=ablation))
+    again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite, ablated=ablation)
+    if (complaint := evaluation.complaint()) is not None:
+        note(f"{complaint}; `{again} --redo` judges what stands there")
+    if (unfinished := evaluation.unfinished()) is not None:
+        note(f"{unfinished}; `{again}` goes on")
+
+
+def export(
+    run: RunArgument,
+    format: Annotated[  # noqa: A002 - the option's name
+        str | None, typer.Option(help="csv or parquet; by default what --out ends in, or else csv.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The file; by default beside the verdicts.", parser=named("a file"))
+    ] = None,
+    suite: SuiteOption = "paper",
+    ablation: AblationOption = False,
+) -> None:
+    """Write a run's verdicts as one flat table."""
+    from codebotler.badinput import BadInput
+    from roboeval.export import kind_of, table, write
+    from roboeval.run import Run, evaluation_key
+
+    kind = format or kind_of(out)
+    judged_by = load(suite)
+    evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
+    frame = table(watched(evaluation.rows(), "reading", evaluation.scope.total), evaluation.judged())
+    again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite, ablated=ablation)
+    if (complaint := evaluation.complaint()) is not None:
+        raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
+    if (unfinished := evaluation.unfinished()) is not None:
+        note(f"{unfinished}, and only these are in the table; `{again}` goes on")
+    path = out or Run(run).rows(evaluation_key(judged_by, ablated=ablation)).with_suffix(f".{kind}")
+    write(frame, path, kind)
+    note(f"the table is in {path}")
+
+
+def import_(
+    path: Annotated[str, typer.Argument(help="A .jsonl, or a folder or zip of .py completions.")],
+    out: Annotated[Path, typer.Option(help="The run to make.", parser=named("a run"))],
+    suite: SuiteOption = "paper",
+) -> None:
+    """Make a run of completions from elsewhere."""
+    from roboeval.records import how_many
+    from roboeval.run import Run, open_source
+
+    known = load(suite)
+    count = Run(out).keep(open_source(path, known))
+    again = command("evaluate", out, suite=suite)
+    they = ("is", "it") if count == 1 else ("are", "them")
+    note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
+
+
+def refuse_what_comes_later(worlds: int | None, engine: str) -> None:
+    """End with a sentence about options that are promised and not there yet, or never were."""
+    if engine not in {"local", "ray"}:
+        fail(f'there is no engine "{engine}"; there is local, and ray is not there yet')
+    if worlds is not None or engine != "local":
+        asked = f"--engine {engine}" if worlds is None else "--worlds"
+        fail(f"{asked} is not there yet; leave it out to judge in the suite's own worlds, on this machine")
+
+
+class How(TypedDict):
+    """How completions are judged."""
+
+    ablated: bool
+    workers: int
+    require_isolation: bool
+
+
+class Tally:
+    """Passes rows on, and remembers what there is to say at the end."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first_failed: tuple[str, ...] = ()
+
+    def of(self, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+        """Pass rows on."""
+        for row in rows:
+            self.count += 1
+            if not row["passed"] and not self.first_failed:
+                self.first_failed = (f"{row['task']}/{row['prompt']}/{row['index']}",)
+            yield row
+
+    def after_a_stop(self, *, is_kept: bool, redo: bool) -> str:
+        """What Ctrl-C left behind, and how to go on."""
+        if not is_kept:
+            return "stopped; nothing is kept (with --out RUN, what was judged would be)"
+        if self.count == 0:
+            return "stopped before judging; give the same command again"
+        return f"stopped; the same command {'without --redo ' * redo}goes on where it was"
+
+
+def print_summary(
+    rows: Iterable[dict[str, Any]],
+    suite: Suite,
+    scope: Scope,
+    *,
+    title: str,
+    ablated: bool,
+    as_json: bool,
+    k: Sequence[int] = (1,),
+    stale: Iterable[Key] = (),
+) -> None:
+    """Print the tables of an evaluation."""
+    from roboeval.records import name_of
+    from roboeval.summary import render, summary, summary_data
+
+    counted = summary(rows, suite, k=k, scope=scope, ablated=ablated)
+    if as_json:
+        print_json({**summary_data(counted), "stale": list(map(name_of, stale))})
+    else:
+        print_rich(render(counted, title=title))

@@ -1,0 +1,93 @@
+"""What the commands of RoboEval share: their options, and how they find what a user names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.terminal import fail, note
+
+if TYPE_CHECKING:
+    from roboeval.evaluation import Evaluation
+    from roboeval.suite import Suite
+
+
+def named(what: str) -> Callable[[str], Path]:
+    """A reader of paths that refuses the empty one, which would be the current folder."""
+
+    def path(text: str) -> Path:
+        return Path(text) if text else fail(f"nothing is named; name {what}")
+
+    return path
+
+
+RunArgument = Annotated[Path, typer.Argument(help="A run.", parser=named("a run"))]
+SuiteOption = Annotated[str, typer.Option(help="A suite that ships with the package, or a folder.")]
+TasksOption = Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")]
+AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common sense only.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+def load(suite: str) -> Suite:
+    """Read a suite by name or folder."""
+    from roboeval.suite import load_suite
+
+    if suite == "plus" and not Path(suite).exists():
+        fail('the suite "plus" is not there yet; leave --suite out to judge by the suite of the paper')
+    return load_suite(suite)
+
+
+def command(verb: str, *arguments: object, suite: str, ablated: bool = False) -> str:
+    """A command for the user to paste."""
+    import shlex
+
+    words = ["roboeval", verb, *map(str, arguments)]
+    words += [] if suite == "paper" else ["--suite", suite]
+    return shlex.join([*words, "--ablation"] if ablated else words)
+
+
+def options_of(evaluation: Evaluation, suite: Suite) -> list[str]:
+    """What else a command needs to go on with an evaluation."""
+    from roboeval.run import tasks_to_judge
+
+    tasks = evaluation.scope.tasks
+    if tasks in {None, tasks_to_judge(suite, None, ablated=bool(evaluation.head.get("ablation")))[0]}:
+        return []
+    return ["--tasks", ",".join(sorted(tasks or ()))]
+
+
+def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) -> Evaluation:
+    """An evaluation that a user names."""
+    from codebotler.badinput import BadInput
+    from roboeval.evaluation import Evaluation
+    from roboeval.run import Run, evaluation_key
+
+    folder, key = Run(run), evaluation_key(suite, ablated=ablated)
+    if not folder.completions.is_file():
+        raise BadInput("is no run: it holds no completions.jsonl", file=run)
+    if not folder.rows(key).is_file():
+        others = folder.judged_by()
+        if others and suite.name not in others:
+            judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
+            raise BadInput(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run)
+        again = command("evaluate", run, suite=suite_name, ablated=ablated)
+        raise BadInput(f"has not been judged; `{again}` does it", file=run)
+    evaluation = Evaluation(folder, key)
+    if not folder.programs(key).is_file():
+        again = command("evaluate", run, *options_of(evaluation, suite), suite=suite_name, ablated=ablated)
+        raise BadInput(
+            f"is missing, so that nobody knows which programs were judged; `{again}` judges them again",
+            file=folder.programs(key),
+        )
+    if evaluation.head.get("digest") != suite.digest:
+        note("the suite has changed since this run was judged; explanations may be missing")
+    return evaluation
+
+
+def cores() -> int:
+    """How many programs to run at the same time."""
+    return os.cpu_count() or 1

@@ -1,0 +1,281 @@
+"""A server on loopback that speaks chat and text completions as OpenAI's does, and misbehaves on demand.
+
+`python server.py` serves until its standard input ends, and prints its URL first.
+"""
+
+import asyncio
+import contextlib
+import json
+import sys
+import threading
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from types import TracebackType
+from typing import Any, Self
+
+TASK = "def task_program():\n"
+CHUNK = 24  # characters of a streamed piece
+HUGE = 1_000_000
+PAGE = "<html><body>This is a proxy. Please log in.</body></html>"
+
+
+class Fault(Enum):
+    """How the server may misbehave."""
+
+    TOO_MANY = auto()
+    TOO_MANY_FOR_A_WHILE = auto()
+    NO_MONEY = auto()
+    SERVER_ERROR = auto()
+    SLOW = auto()
+    STALLED = auto()
+    HUNG_UP = auto()
+    CUT = auto()
+    CUT_IN_ORDER = auto()
+    ERROR_IN_STREAM = auto()
+    INVALID_JSON = auto()
+    NOTHING = auto()
+    WRONG_TYPE = auto()
+    UNAUTHORIZED = auto()
+    NOT_FOUND = auto()
+    TOO_LONG = auto()
+    EMPTY = auto()
+    WITHOUT_CODE = auto()
+    HUGE = auto()
+
+
+REFUSALS: dict[Fault | None, tuple[int, str, str | None]] = {
+    Fault.TOO_MANY: (429, "Too many requests.", "rate_limit_exceeded"),
+    Fault.TOO_MANY_FOR_A_WHILE: (429, "Too many requests.", "rate_limit_exceeded"),
+    Fault.NO_MONEY: (429, "You exceeded your current quota.", "insufficient_quota"),
+    Fault.SERVER_ERROR: (500, "Something went wrong.", None),
+    Fault.UNAUTHORIZED: (401, "Incorrect API key provided: {key}.", "invalid_api_key"),
+    Fault.NOT_FOUND: (404, "The model does not exist.", "model_not_found"),
+    Fault.TOO_LONG: (400, "The maximum context length is 2048 tokens.", "context_length_exceeded"),
+}
+BODIES: dict[Fault | None, tuple[bytes, str]] = {
+    Fault.NOTHING: (b"", "text/event-stream"),
+    Fault.WRONG_TYPE: (PAGE.encode(), "text/html"),
+}
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a client sent.
+
+    Args:
+        path: below the base URL, such as `/chat/completions`.
+        headers: with names in lower case.
+        body: the parsed JSON.
+    """
+
+    path: str
+    headers: dict[str, str]
+    body: dict[str, Any]
+
+    @property
+    def is_chat(self) -> bool:
+        return self.path.startswith("/chat")
+
+
+def program(request: Request) -> str:
+    """A reply with a program, which says the seed that was sent."""
+    body = f'    go_to("lobby")\n    say("reply {request.body.get("seed", 0)}")\n'
+    return f"Here it is.\n\n```python\n{TASK}{body}```\n" if request.is_chat else body
+
+
+@dataclass
+class Server:
+    """A server in a thread of its own.
+
+    Args:
+        answer: what the model replies to a request.
+        fault: how it misbehaves at a request, which is asked where `faults` are used up.
+        retry_after: what `Retry-After` says, in seconds.
+        delay: how many seconds it is slow.
+    """
+
+    answer: Callable[[Request], str] = program
+    fault: Callable[[Request], Fault | None] = lambda _request: None
+    retry_after: float = 1
+    delay: float = 30.0
+    faults: deque[Fault | None] = field(default_factory=deque)
+    """How it misbehaves at the next requests."""
+    requests: list[Request] = field(default_factory=list)
+    """All that were answered, in whatever way."""
+    open: int = 0
+    """How many requests are being answered."""
+    most_open: int = 0
+    url: str = ""
+
+    def __enter__(self) -> Self:
+        self._loop = asyncio.new_event_loop()
+        started = threading.Event()
+        self._thread = threading.Thread(target=self._run, args=(started,), daemon=True)
+        self._thread.start()
+        started.wait()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._loop.call_soon_threadsafe(self._main.cancel)
+        self._thread.join()
+
+    def _run(self, started: threading.Event) -> None:
+        self._main = self._loop.create_task(self._serve(started))
+        with contextlib.suppress(asyncio.CancelledError):
+            self._loop.run_until_complete(self._main)
+        for task in asyncio.all_tasks(self._loop):
+            task.cancel()
+        self._loop.run_until_complete(self._closed())
+        self._loop.close()
+
+    async def _serve(self, started: threading.Event) -> None:
+        server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
+        self.url = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}/v1"
+        started.set()
+        async with server:
+            await asyncio.Event().wait()
+
+    @staticmethod
+    async def _closed() -> None:
+        """Let the other tasks end, and what they closed be closed."""
+        others = asyncio.all_tasks() - {asyncio.current_task()}
+        await asyncio.gather(*others, return_exceptions=True)
+        await asyncio.sleep(0)
+
+    async def _connected(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(ConnectionError, asyncio.IncompleteReadError, asyncio.CancelledError):
+            while await self._answered(reader, writer):
+                await writer.drain()
+        writer.close()
+
+    async def _answered(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
+        """Answer a request; whether the connection goes on."""
+        first, *lines = (await reader.readuntil(b"\r\n\r\n")).decode().split("\r\n")
+        headers = {name.lower(): value for name, _, value in (line.partition(": ") for line in lines)}
+        body = json.loads(await reader.readexactly(int(headers.get("content-length", 0))) or b"{}")
+        request = Request(first.split()[1].removeprefix("/v1"), headers, body)
+        fault = self.faults.popleft() if self.faults else self.fault(request)
+        self.requests.append(request)
+        self.open += 1
+        self.most_open = max(self.most_open, self.open)
+        try:
+            return await _Answer(self, request, fault, writer).given()
+        finally:
+            self.open -= 1
+
+
+@dataclass
+class _Answer:
+    server: Server
+    request: Request
+    fault: Fault | None
+    writer: asyncio.StreamWriter
+
+    async def given(self) -> bool:
+        """Answer; whether the connection goes on."""
+        if self.fault is Fault.HUNG_UP:
+            return False
+        if self.fault in REFUSALS:
+            return self._refused(*REFUSALS[self.fault])
+        if self.fault in BODIES:
+            return self._body(200, *BODIES[self.fault])
+        if self.fault is Fault.SLOW:
+            await asyncio.sleep(self.server.delay)
+        if self.request.body.get("stream"):
+            return await self._streamed()
+        whole = json.dumps(self._object(self._text(), "stop") | {"usage": self._usage()}).encode()
+        return self._body(200, whole[:40] if self.fault is Fault.INVALID_JSON else whole, "application/json")
+
+    def _text(self) -> str:
+        match self.fault:
+            case Fault.EMPTY:
+                return ""
+            case Fault.WITHOUT_CODE:
+                return "I am afraid that I cannot help with that."
+            case Fault.HUGE:
+                return ("    say('again')\n" * HUGE)[:HUGE]
+        return self.server.answer(self.request)
+
+    def _refused(self, status: int, message: str, code: str | None) -> bool:
+        key = self.request.headers.get("authorization", "")
+        error = {"message": message.format(key=key), "type": "error", "param": None, "code": code}
+        again = f"Retry-After: {self.server.retry_after}\r\n"
+        extra = again if self.fault is Fault.TOO_MANY_FOR_A_WHILE else ""
+        return self._body(status, json.dumps({"error": error}).encode(), "application/json", extra)
+
+    def _body(self, status: int, body: bytes, kind: str, extra: str = "") -> bool:
+        self._head(status, kind, f"Content-Length: {len(body)}\r\n{extra}")
+        self.writer.write(body)
+        return True
+
+    def _head(self, status: int, kind: str, extra: str) -> None:
+        # The key comes back, as from a server that is careless with it.
+        echo = f"X-Echo: {self.request.headers.get('authorization', '')}\r\n"
+        self.writer.write(f"HTTP/1.1 {status} X\r\nContent-Type: {kind}\r\n{echo}{extra}\r\n".encode())
+
+    async def _streamed(self) -> bool:
+        self._head(200, "text/event-stream", "Transfer-Encoding: chunked\r\n")
+        async for event in self._events():
+            data = f"data: {event}\n\n".encode()
+            self.writer.write(b"%x\r\n%s\r\n" % (len(data), data))
+            await self.writer.drain()
+        if self.fault is Fault.CUT:
+            return False
+        self.writer.write(b"0\r\n\r\n")
+        return True
+
+    async def _events(self) -> AsyncIterator[str]:
+        pieces = [*self._pieces()]
+        for number, piece in enumerate(pieces):
+            if number == len(pieces) // 2:
+                match self.fault:
+                    case Fault.CUT | Fault.CUT_IN_ORDER:
+                        return
+                    case Fault.INVALID_JSON:
+                        yield '{"choices": [{"te'
+                    case Fault.ERROR_IN_STREAM:
+                        yield json.dumps({"error": {"message": "The engine died.", "code": 500}})
+                        return
+                    case Fault.STALLED:
+                        await asyncio.sleep(self.server.delay)
+            yield json.dumps(self._object(piece, None))
+        yield json.dumps(self._object("", "stop"))
+        if self.request.body.get("stream_options", {}).get("include_usage"):
+            yield json.dumps(self._object("", None) | {"choices": [], "usage": self._usage()})
+        yield "[DONE]"
+
+    def _pieces(self) -> Iterator[str]:
+        text = self._text()
+        size = max(CHUNK, len(text) // 64)
+        for start in range(0, len(text), size):
+            yield text[start : start + size]
+
+    def _object(self, text: str, finish_reason: str | None) -> dict[str, Any]:
+        streamed = bool(self.request.body.get("stream"))
+        choice: dict[str, Any] = {"index": 0, "finish_reason": finish_reason, "logprobs": None}
+        if self.request.is_chat:
+            kind = "chat.completion.chunk" if streamed else "chat.completion"
+            choice["delta" if streamed else "message"] = {"role": "assistant", "content": text}
+        else:
+            kind = "text_completion"
+            choice["text"] = text
+        model = self.request.body.get("model", "")
+        return {"id": "1", "object": kind, "created": 1_700_000_000, "model": model, "choices": [choice]}
+
+    def _usage(self) -> dict[str, int]:
+        asked, said = len(json.dumps(self.request.body)) // 4, len(self._text()) // 4
+        return {"prompt_tokens": asked, "completion_tokens": said, "total_tokens": asked + said}
+
+
+def main() -> None:
+    with Server() as server:
+        print(server.url, flush=True)  # noqa: T201 - whoever started it waits for this line
+        sys.stdin.read()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,162 @@
+"""codebotler generate as a person meets it: the program on stdout and nothing else."""
+
+import json
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from roboeval.suite import Suite
+from server import Fault, Request, Server
+
+KEY = "sk-verysecret0123456789abcdefghijkl"
+LOST = "```python\ndef task_program():\n    go_to('the moon')\n```\n"
+FINE = "```python\ndef task_program():\n    go_to('kitchen')\n```\n"
+WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    status: int
+    out: str
+    err: str
+
+
+def codebotler(*arguments: str, cwd: Path | None = None, after: str = "") -> Ended:
+    """Run a command, with something of bash after it."""
+    program = shlex.join([sys.executable, "-m", "codebotler.cli"])
+    ended = subprocess.run(
+        ["bash", "-c", f"{program} {shlex.join(arguments)} {after.replace('codebotler', program)}"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=cwd,
+        env={**os.environ, "OPENAI_API_KEY": KEY, "COLUMNS": "100"},
+    )
+    return Ended(ended.returncode, ended.stdout, ended.stderr)
+
+
+def instruction(suite: Suite) -> str:
+    return suite.tasks["StaplerDelivery"].prompts[0]
+
+
+def lost_at_first(request: Request) -> str:
+    return LOST if request.body["seed"] == 0 else FINE
+
+
+def written(server: Server, *more: str, cwd: Path) -> Ended:
+    (cwd / "world.yaml").write_text(WORLD)
+    model = ("--model", "openai:tiny", "--base-url", server.url, "--seed", "0", "--world", "world.yaml")
+    return codebotler("generate", "Go to the kitchen.", *model, *more, cwd=cwd)
+
+
+def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, paper: Suite) -> None:
+    world = tmp_path / "world.yaml"
+    world.write_text(paper.tasks["StaplerDelivery"].scenarios[0].world.to_yaml())
+    alone = codebotler("generate", instruction(paper), "--model", "recorded")
+    assert (alone.status, alone.err) == (0, "")
+    compile(alone.out, "program", "exec")
+    assert alone.out.startswith("def task_program():\n")
+    piped = codebotler("generate", instruction(paper), after=f"| codebotler check - --world {world}")
+    assert (piped.status, piped.err) == (0, "")
+    assert piped.out.startswith("accepted: no problem in the program")
+
+
+def test_an_instruction_that_nobody_recorded() -> None:
+    ended = codebotler("generate", "Bring me the moon.")
+    assert (ended.status, ended.out) == (2, "")
+    assert ended.err.startswith(
+        'codebotler: recorded:careful has no program for "Bring me the moon."; the clos'
+    )
+    assert ended.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("instruction", ["", "  \n"])
+def test_no_instruction(instruction: str) -> None:
+    assert codebotler("generate", instruction) == (
+        2,
+        "",
+        "codebotler: the instruction is empty; say what the robot is to do\n",
+    )
+
+
+def test_a_program_with_problems_is_printed_with_status_1(tmp_path: Path) -> None:
+    with Server(answer=lost_at_first) as server:
+        ended = written(server, cwd=tmp_path)
+    assert ended.status == 1
+    assert ended.out == "def task_program():\n    go_to('the moon')\n"
+    assert ended.err == (
+        'the program has a problem:\n  line 2: GoToInvalidLocation: there is no room "the moon"\n'
+    )
+    assert len(server.requests) == 1
+
+
+def test_rejection_sampling_asks_again_and_records_both_attempts(tmp_path: Path) -> None:
+    with Server(answer=lost_at_first) as server:
+        ended = written(server, "--retries", "3", "--record", "attempts.jsonl", cwd=tmp_path)
+    assert ended.status == 0
+    assert ended.out == "def task_program():\n    go_to('kitchen')\n"
+    assert ended.err.splitlines() == [
+        "attempt 1 of 4 has a problem:",
+        '  line 2: GoToInvalidLocation: there is no room "the moon"',
+        "attempt 2 of 4 is accepted",
+    ]
+    first, second = server.requests
+    assert first.body["messages"] == second.body["messages"]
+    assert "kitchen" in json.dumps(first.body["messages"][-1])
+    text = (tmp_path / "attempts.jsonl").read_text()
+    rows = [json.loads(line) for line in text.splitlines()]
+    assert [len(row["problems"]) for row in rows] == [1, 0]
+    assert [row["raw_reply"] for row in rows] == [LOST, FINE]
+    assert KEY not in text + ended.out + ended.err
+
+
+def test_a_repair_carries_the_program_and_the_problem_in_words(tmp_path: Path) -> None:
+    with Server(answer=lost_at_first) as server:
+        ended = written(server, "--repair", cwd=tmp_path)
+    assert (ended.status, len(server.requests)) == (0, 2)
+    said = json.dumps(server.requests[1].body["messages"][-2:])
+    assert "go_to('the moon')" in said
+    assert "there is no room" in said
+    assert len(server.requests[1].body["messages"]) == len(server.requests[0].body["messages"]) + 2
+
+
+def test_retries_end(tmp_path: Path) -> None:
+    with Server(answer=lambda _: LOST) as server:
+        ended = written(server, "--retries", "2", cwd=tmp_path)
+    assert (ended.status, len(server.requests)) == (1, 3)
+    assert ended.err.splitlines()[-2].startswith("attempt 3 of 3 has a problem")
+
+
+def test_a_refused_key_is_one_sentence(tmp_path: Path) -> None:
+    with Server(fault=lambda _: Fault.UNAUTHORIZED) as server:
+        ended = written(server, "--record", "attempts.jsonl", cwd=tmp_path)
+    assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1)
+    assert "401" in ended.err
+    assert KEY not in ended.err
+
+
+def test_the_prompt_is_shown_without_a_key_or_a_server() -> None:
+    chat = codebotler("generate", "Go to the kitchen.", "--model", "anthropic:claude", "--show-prompt")
+    assert (chat.status, chat.err) == (0, "")
+    assert chat.out.startswith("--- system\n")
+    assert chat.out.endswith("--- user\nGo to the kitchen.\n")
+    base = codebotler("generate", "Go to the kitchen.", "--model", "completions:x", "--show-prompt")
+    assert base.out.endswith("# Instruction: Go to the kitchen.\ndef task_program():\n")
+
+
+def test_a_world_that_is_none(tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text("rooms: 3\n")
+    ended = codebotler("generate", "Go.", "--world", "world.yaml", cwd=tmp_path)
+    assert (ended.status, ended.out) == (2, "")
+    assert ended.err.startswith("codebotler: world.yaml")
+
+
+def test_a_record_that_cannot_be_written(tmp_path: Path, paper: Suite) -> None:
+    ended = codebotler("generate", instruction(paper), "--record", "no/such/folder", cwd=tmp_path)
+    assert ended == (2, "", "codebotler: no/such/folder: No such file or directory\n")

@@ -1,0 +1,256 @@
+"""generate, run and resample as a person meets them."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from command_line import ENVIRONMENT, refused, roboeval
+from server import Fault, Server
+
+KEY = "sk-verysecret0123456789abcdefghijkl"
+WITH_KEY = {**ENVIRONMENT, "OPENAI_API_KEY": KEY}
+TASKS = "LunchTime,SayGoodDay"
+
+
+def keys(run: Path) -> list[tuple[str, int, int]]:
+    rows = [json.loads(line) for line in (run / "completions.jsonl").read_text().splitlines()]
+    return [(row["task"], row["prompt"], row["index"]) for row in rows]
+
+
+def served(url: str, *more: str, model: str = "completions:tiny", tasks: str = TASKS) -> list[str]:
+    options = ["--model", model, "--base-url", url, "--tasks", tasks, "--out", "run", *more]
+    return ["generate", *options]
+
+
+# --- with a recorded model
+
+
+def test_from_nothing_to_tables(tmp_path: Path) -> None:
+    words = ["run", "--model", "recorded:hasty", "--num-completions", "3"]
+    ended = roboeval(*words, cwd=tmp_path)
+    assert ended.status == 0
+    assert "runs/recorded-hasty (programs written by hand)" in ended.out
+    assert re.search(r"pass@1 over all prompts: 0\.\d{3} \(95% interval .*, 80 prompts\)", ended.out)
+    run = tmp_path / "runs" / "recorded-hasty"
+    assert len(set(keys(run))) == 240
+    assert (run / "evaluations" / "paper.jsonl").read_bytes().count(b"\n") == 240
+    again = roboeval(*words, cwd=tmp_path)
+    assert (again.status, again.out) == (0, ended.out)
+    assert "240 of 240 completions are there already" in again.err
+
+
+def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
+    ended = roboeval("generate", "--tasks", "LunchTime", "--num-completions", "1", cwd=tmp_path)
+    assert (ended.status, ended.out) == (0, "")
+    assert ended.err == (
+        "the completions are in runs/recorded-careful; "
+        "`roboeval evaluate runs/recorded-careful` judges them\n"
+    )
+    assert sorted(path.name for path in (tmp_path / "runs" / "recorded-careful").iterdir()) == [
+        ".lock",
+        "completions.jsonl",
+        "run.json",
+    ]
+
+
+def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
+    assert roboeval("generate", "--num-completions", "1", cwd=tmp_path).status == 0
+    assert refused("generate", "--num-completions", "1", "--temperature", "0.7", cwd=tmp_path) == (
+        "runs/recorded-careful/run.json: the completions were asked for with another temperature "
+        "(0.2, now 0.7); name another folder to begin anew"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("--model", "nonsense"), '"nonsense" names no model; write recorded, '),
+        (("--tasks", "Nonsense"), 'the suite "paper" has no task "Nonsense"; its tasks are '),
+        (("--temperature", "-1"), "the temperature is -1, but it must be between 0 and 100"),
+        (("--num-completions", "0"), "invalid value for '--num-completions': "),
+        (("--concurrency", "0"), "invalid value for '--concurrency': "),
+        (("--out", ""), "nothing is named; name a run"),
+        (("--base-url", "http://me:secret@localhost/v1"), "the base URL has a user name, a password or"),
+    ],
+)
+def test_what_is_asked_wrongly_leaves_nothing(tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
+    assert refused("generate", *words, cwd=tmp_path).startswith(sentence)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_suite_that_nobody_recorded(tmp_path: Path) -> None:
+    roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
+    sentence = refused("generate", "--suite", "mine", cwd=tmp_path)
+    assert sentence.startswith('recorded:careful has no program for "')
+    assert not (tmp_path / "runs").exists()
+
+
+# --- with a served model
+
+
+def test_a_wrong_key_is_one_sentence_and_stands_nowhere(tmp_path: Path) -> None:
+    with Server(fault=lambda _: Fault.UNAUTHORIZED) as server:
+        for model in ("completions:tiny", "openai:tiny"):
+            ended = roboeval(*served(server.url, model=model), cwd=tmp_path, environment=WITH_KEY)
+            assert ended.status == 2
+            assert ended.err.count("\n") == 1
+            assert "401" in ended.err
+            assert KEY not in ended.err
+    assert any(KEY in request.headers["authorization"] for request in server.requests)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("model", ["completions:tiny", "openai:tiny"])
+def test_the_key_is_in_no_file_of_a_run(tmp_path: Path, model: str) -> None:
+    replies = ["hello", f"Your key is {KEY}.\n\n```python\ndef task_program():\n    say('{KEY}')\n```\n"]
+    faults = [Fault.UNAUTHORIZED, Fault.SERVER_ERROR, Fault.CUT, Fault.INVALID_JSON, Fault.WRONG_TYPE]
+    with Server(answer=lambda request: replies[int(request.body.get("seed", 0)) % 2]) as server:
+        server.faults.extend([None, *faults])
+        ended = roboeval(
+            *served(server.url, "--num-completions", "2", "--seed", "0", model=model),
+            cwd=tmp_path,
+            environment=WITH_KEY,
+        )
+    assert ended.status == 1  # one request was refused for good
+    assert "1 completion is missing" in ended.err
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert len(keys(tmp_path / "run")) == 19
+    assert len(files) >= 3
+    for text in (ended.out, ended.err, *(path.read_text() for path in files)):
+        assert KEY not in text
+        assert KEY[3:] not in text
+
+
+def test_a_budget_stops_with_a_sentence_and_goes_on_later(tmp_path: Path) -> None:
+    with Server() as server:
+        words = served(server.url, "--num-completions", "2", "--concurrency", "1")
+        ended = roboeval(*words, "--token-budget", "5000", cwd=tmp_path)
+        assert ended.status == 1
+        assert ended.out == ""
+        assert re.fullmatch(
+            r"roboeval: \d+ completions are missing: the token budget of 5,000 is spent: [\d,]+ tokens are "
+            r"used; the same command goes on where it was\n",
+            ended.err,
+        )
+        before = keys(tmp_path / "run")
+        assert 0 < len(before) < 20
+        ended = roboeval(*words, cwd=tmp_path)
+        assert ended.status == 0
+        assert f"{len(before)} of 20 completions are there already" in ended.err
+    assert len(server.requests) == len(set(keys(tmp_path / "run"))) == 20
+
+
+def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_path: Path) -> None:
+    times, lost = 3, 0
+    with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
+        words = served(server.url, "--num-completions", "20", "--concurrency", "4", "--seed", "0")
+        for kill in range(times):
+            with subprocess.Popen(
+                [sys.executable, "-m", "roboeval.cli", *words], cwd=tmp_path, stderr=subprocess.DEVNULL
+            ) as process:
+                while len(server.requests) < 15 * (kill + 1) + 4 * kill and process.poll() is None:
+                    time.sleep(0.005)
+                time.sleep(0.03 * kill)
+                process.send_signal(signal.SIGKILL)
+            rows = (tmp_path / "run" / "completions.jsonl").read_bytes().count(b"\n")
+            under_way = len(server.requests) - lost - rows
+            assert 0 <= under_way <= 4
+            lost += under_way
+        ended = roboeval(*words, cwd=tmp_path)
+    assert ended.status == 0
+    assert Counter(keys(tmp_path / "run")).most_common(1)[0][1] == 1
+    assert len(keys(tmp_path / "run")) == 200
+    assert re.search(r"^[1-4] requests? w\w+ under way when this was interrupted, ", ended.err, re.MULTILINE)
+    twice = json.loads((tmp_path / "run" / "run.json").read_text())["possibly_paid_twice"]
+    assert len(server.requests) - 200 == lost
+    assert lost <= twice <= lost + times  # a request that was noted need not have arrived
+
+
+def test_control_c_says_what_is_kept(tmp_path: Path) -> None:
+    with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
+        words = served(server.url, "--concurrency", "4")
+        process = subprocess.Popen(
+            [sys.executable, "-m", "roboeval.cli", *words],
+            cwd=tmp_path,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        while len(server.requests) < 10 and process.poll() is None:
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate()
+    assert process.returncode == 130
+    said = re.fullmatch(
+        r"roboeval: stopped; (\d+) of 500 completions are kept; [1-4] requests? w\w+ under way, which may be "
+        r"paid twice; the same command goes on where it was\n",
+        err,
+    )
+    assert said is not None, err
+    assert len(keys(tmp_path / "run")) == int(said[1])
+
+
+def test_one_in_ten_requests_fails_over_both_protocols(tmp_path: Path) -> None:
+    faults = [
+        Fault.SERVER_ERROR,
+        Fault.TOO_MANY,
+        Fault.CUT,
+        Fault.INVALID_JSON,
+        Fault.HUNG_UP,
+        Fault.WRONG_TYPE,
+    ]
+    for model in ("completions:tiny", "openai:tiny"):
+        with Server() as server:
+            server.faults.extend(fault for bad in faults for fault in [*[None] * 9, bad])
+            words = served(server.url, "--num-completions", "8", model=model)
+            words[words.index("run")] = model.partition(":")[0]
+            ended = roboeval(*words, cwd=tmp_path)
+        run = tmp_path / model.partition(":")[0]
+        assert ended.status == 0, ended.err
+        assert len(keys(run)) == len(set(keys(run))) == 80
+        assert len(server.requests) == 80 + len(faults)
+        assert json.loads((run / "run.json").read_text())["possibly_paid_twice"] == 0
+
+
+# --- resampling
+
+
+def test_resampling_checks_once_and_prints_both_figures(tmp_path: Path) -> None:
+    words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--tasks", TASKS, "--out", "run"]
+    assert roboeval(*words, cwd=tmp_path).status == 0
+    table = roboeval("resample", "run", cwd=tmp_path)
+    assert table.status == 0
+    lines = [line.split() for line in table.out.splitlines() if re.match(r" +\d+ ", line)]
+    assert [line[0] for line in lines] == ["0", "2", "4", "8", "100"]
+    data = json.loads(roboeval("resample", "run", "--json", cwd=tmp_path).out)
+    assert [f"{limit['pass@1']['mean']:.3f}" for limit in data["limits"]] == [line[1] for line in lines]
+    evaluated = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
+    assert data["limits"][0]["pass@1"] == evaluated["pass@1"]
+    assert data["limits"][-1]["accepted"] > data["limits"][0]["accepted"]
+    checks = tmp_path / "run" / "checks" / "paper.jsonl"
+    whole = checks.read_bytes()
+    assert 1 < whole.count(b"\n") <= 30
+    checks.write_bytes(whole[:-20])
+    assert json.loads(roboeval("resample", "run", "--json", cwd=tmp_path).out) == data
+    assert checks.read_bytes() == whole
+    lies = [{**json.loads(line), "problems": []} for line in whole.splitlines()]
+    checks.write_text("".join(json.dumps(line) + "\n" for line in lies))
+    trusting = json.loads(roboeval("resample", "run", "--json", cwd=tmp_path).out)
+    assert trusting["limits"][0]["accepted"] == 1  # what stands there is not checked again ...
+    other = json.loads(roboeval("resample", "run", "--json", "--samples", "6", cwd=tmp_path).out)
+    assert other["limits"][0]["accepted"] < 1  # ... unless it was checked otherwise
+    assert roboeval("resample", "run", "--retries", "1", cwd=tmp_path).out.count("%") == 6
+
+
+def test_resampling_needs_a_judged_run(tmp_path: Path) -> None:
+    roboeval("generate", "--num-completions", "1", "--tasks", "LunchTime", "--out", "run", cwd=tmp_path)
+    assert refused("resample", "run", cwd=tmp_path) == (
+        "run: has not been judged; `roboeval evaluate run` does it"
+    )
+    assert refused("resample", "nothing", cwd=tmp_path).startswith("nothing: is no run")
