@@ -141,7 +141,7 @@ class Unwalled(Bare):
         try:
             return self.robot.perform(name, given)
         except RobotError as error:
-            self.errors.append(error)
+            self.errors.append(error.with_traceback(None))  # which would keep the program's frames alive
         finally:
             sys.setrecursionlimit(limit)
         last = self.errors[-1]

@@ -8,21 +8,22 @@ if TYPE_CHECKING:
     from codebotler.world import World
 
 
-def run(program: str, world: World) -> Outcome:
+def run(program: str, world: World, *, require_isolation: bool = False) -> Outcome:
     """Run one program in one world by the paper's rules; `engine.run` is quicker for many.
 
     Args:
         program: its source, which need not even parse.
         world: the initial state.
+        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Returns:
         how the run ended, with the trace of what the robot did.
 
     Raises:
-        EngineError: no isolated process could be started.
+        EngineError: no isolated process could be started, or a wall is missing that is required.
     """
     # The closed processes import this package, and must stay small.
     from codebotler.simulator.engine import run as run_pairs  # noqa: PLC0415 - so only now
 
-    (outcome,) = run_pairs([(program, world)], workers=1)
+    (outcome,) = run_pairs([(program, world)], workers=1, require_isolation=require_isolation)
     return outcome

@@ -49,7 +49,8 @@ class Child:
             channel.setsockopt(socket.SOL_SOCKET, direction, SILENCE_FOR_KERNEL)
         self._closes = closes
         self._buffer = bytearray()
-        self._patience = LONGEST
+        self.patience = LONGEST
+        """For how many seconds it will still be waited for."""
 
     @cached_property
     def pid(self) -> int:
@@ -141,8 +142,8 @@ class Child:
             self._be_patient(began)
 
     def _be_patient(self, since: float) -> None:
-        self._patience -= min(time.monotonic() - since, SILENCE)  # the rest is this process's own delay
-        if self._patience < 0:
+        self.patience -= min(time.monotonic() - since, SILENCE)  # the rest is this process's own delay
+        if self.patience < 0:
             raise TimeoutError
 
     def kill(self) -> None:
@@ -169,7 +170,7 @@ class Child:
 
     def rest(self) -> None:
         """Wait anew: what it was asked has been answered."""
-        self._patience = LONGEST
+        self.patience = LONGEST
 
     def was_closed(self) -> bool:
         """Whether its walls were closed, as far as can be seen; also told of the dead, until the next run."""
@@ -199,9 +200,7 @@ def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, Run
     """
     match -status:
         case signal.SIGXCPU:
-            return Status.TIMEOUT, RunError(
-                "TimeoutError", f"{seconds:,} seconds of processor time in one step"
-            )
+            return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} seconds of processor time")
         case signal.SIGSYS:
             return Status.KILLED, RunError(
                 "ForbiddenCall", "the program asked the kernel for what is forbidden"

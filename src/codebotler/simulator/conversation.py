@@ -209,7 +209,7 @@ class Conversation:
         line = final.get("line")
         match final:
             case {"end": "again"} if not self._may_import:
-                raise ImportsMoreError
+                raise ImportsMoreError(self.child.patience)
             case {"end": "finished"}:
                 return Outcome(Status.FINISHED, self.robot.trace)
             case {"end": "timeout"}:
@@ -271,7 +271,15 @@ def _option(value: object) -> Option:
 
 
 class ImportsMoreError(Exception):
-    """The program imports what is not there; it must be run again where it is."""
+    """The program imports what is not there; it must be run again where it is.
+
+    Args:
+        patience: for how many seconds it may then be waited for.
+    """
+
+    def __init__(self, patience: float) -> None:
+        super().__init__(patience)
+        self.patience = patience
 
 
 @dataclass

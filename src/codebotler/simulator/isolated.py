@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import IO
@@ -52,6 +53,21 @@ ONE_AT_A_TIME = threading.Lock()
 @cache
 def written_codes() -> IO[bytes]:
     """Make the file, in memory where the system can do that: a disk may be full."""
+    file: IO[bytes] = (  # closed at the end of this process
+        os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
+    )
+    atexit.register(file.close)
+    file.write(written(code_of))
+    file.flush()
+    return file
+
+
+def written(code_of: Callable[[str, str], bytes]) -> bytes:
+    """The codes of all modules that isolated processes run, by name, as one message.
+
+    Args:
+        code_of: compiles the source of a module, given its name.
+    """
     simulator, package = __package__, __package__ + ".sandbox"
     sources = dict.fromkeys((simulator.partition(".")[0], simulator), "")
     sources[package] = (SANDBOX / "__init__.py").read_text(encoding="utf-8")
@@ -59,14 +75,8 @@ def written_codes() -> IO[bytes]:
         sources[f"{package}.{path.stem}"] = path.read_text(encoding="utf-8")
     for name in NEEDED:
         sources[name] = inspect.getsource(importlib.import_module(name))
-    file: IO[bytes] = (  # closed at the end of this process
-        os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
-    )
-    atexit.register(file.close)
-    by_name = {name: code_of(source, name) for name, source in sources.items()}
-    file.write(marshal.dumps(by_name, WITHOUT_REFERENCES))
-    file.flush()
-    return file
+    codes = {name: code_of(source, name) for name, source in sources.items()}
+    return marshal.dumps(codes, WITHOUT_REFERENCES)
 
 
 NEEDED = ("__future__", "types")

@@ -105,20 +105,24 @@ class Lane:
             prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
             if isinstance(prepared, Outcome):
                 return prepared
-            if not prepared.imports:
-                try:
-                    return self._converse(ZYGOTE, prepared, robot)
-                except ImportsMoreError:
-                    robot = new_robot()
-            return self._converse(LIBRARY_ZYGOTE, prepared, robot)
+            if prepared.imports:
+                return self._converse(LIBRARY_ZYGOTE, prepared, robot)
+            try:
+                return self._converse(ZYGOTE, prepared, robot)
+            except ImportsMoreError as error:
+                return self._converse(LIBRARY_ZYGOTE, prepared, new_robot(), patience=error.patience)
         except (LostChildError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
             self.close()
             raise LostChildError(str(error)) from None
 
-    def _converse(self, role: str, prepared: Prepared, robot: Robot) -> Outcome:
+    def _converse(
+        self, role: str, prepared: Prepared, robot: Robot, *, patience: float | None = None
+    ) -> Outcome:
         child = self._zygote(role).fork()
+        if patience is not None:
+            child.patience = patience
         return Conversation(child, prepared.code, robot, may_import=role != ZYGOTE).outcome()
 
     def _zygote(self, role: str) -> Zygote:

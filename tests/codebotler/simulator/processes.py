@@ -25,15 +25,16 @@ def children_of(pid: int) -> set[int]:
     return found
 
 
+def lives(pid: int) -> bool:
+    """Whether a process has not ended; one that waits to be buried has."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
 def are_gone(pids: set[int]) -> bool:
     """Whether processes end within a few seconds; one that waits to be buried counts as ended."""
-
-    def lives(pid: int) -> bool:
-        try:
-            return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] != "Z"
-        except OSError:
-            return False
-
     for _ in range(200):
         if not any(map(lives, pids)):
             return True

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -11,23 +12,27 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import count, islice, takewhile
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import pytest
 
+from codebotler.simulator import isolated
 from codebotler.simulator.child import Child
+from codebotler.simulator.conversation import OVERRUN, Answer, Conversation
 from codebotler.simulator.engine import EngineError, Lanes, run
 from codebotler.simulator.isolated import codes
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.skills import SKILLS, SkillTable
-from codebotler.trace import Outcome, Status
+from codebotler.trace import Outcome, RunError, Status
 from codebotler.world import Room, World
 from processes import are_gone, children_of, zygotes
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
 OTHER = World((Room("elsewhere"),), "elsewhere")
 AS_WRITTEN = Rules(literals="as-written")
+FUTEX = {"x86_64": 202, "aarch64": 98}
 
 
 def saying(text: str) -> str:
@@ -435,6 +440,47 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
     lane.close()
 
 
+WAITING_TWICE = """
+def task_program():
+    library = sys.modules["_ctypes"].dlopen(None, 0)
+    call = sys.modules["_ctypes"].dlsym(library, "syscall")
+    word, second = bytes(8), (0).to_bytes(8, "little") + (900_000_000).to_bytes(8, "little")
+    for _ in range(3):
+        sys.modules["_ctypes"].call_function(call, (FUTEX, word, 0, 0, second))
+        sum(range(3_000_000))  # else it is seen to wait
+    if "json" not in sys.modules:
+        __import__("json")
+    say("a")
+"""
+
+
+@pytest.mark.skipif(platform.machine() not in FUTEX, reason="the number of futex is not known here")
+def test_program_that_is_run_again_is_not_waited_for_as_long_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 4.0)
+    (outcome,) = run([(WAITING_TWICE.replace("FUTEX", str(FUTEX[platform.machine()])), WORLD)], workers=1)
+    assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
+
+
+def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    answered: list[list[object]] = []
+    answer = Conversation._answer
+
+    def counted(self: Conversation, name: str, values: list[object], now: float) -> Answer:
+        answered.append(values)
+        return answer(self, name, values, now)
+
+    monkeypatch.setattr(Conversation, "_answer", counted)
+    frame = b'["say",["!"],0.0,0]'
+    program = (
+        "import os\n"
+        f"frame = {len(frame).to_bytes(4, 'big') + frame!r}\n"
+        "def task_program():\n    for _ in range(5_000): os.write(3, frame)\n"
+    )
+    (outcome,) = run([(program, WORLD)], workers=1)
+    assert outcome.status == Status.TIMEOUT
+    assert answered.count(["!"]) == 1_000 + OVERRUN + 1
+
+
 def test_child_that_is_killed_from_outside_is_told_so() -> None:
     def say(robot: SimulatedRobot, message: str) -> None:
         robot.record("say", message)
@@ -512,6 +558,41 @@ def test_macos_is_less_isolated_and_says_so_with_the_platform_patched(
     ]
     with pytest.raises(EngineError, match="only Linux"):
         list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))
+
+
+LIKE_MACOS = """
+import os, posix, resource, sys, sysconfig
+sysconfig.get_config_vars()  # they lie in a file that is named by the platform
+sys.platform = "darwin"
+for name in ("waitid", "setresuid", "setresgid"):
+    delattr(os, name)
+    delattr(posix, name)
+set_limit = resource.setrlimit
+
+def with_fewer(kind, limits):
+    if kind == resource.RLIMIT_AS:
+        raise ValueError("current limit exceeds maximum limit")
+    set_limit(kind, limits)
+
+resource.setrlimit = with_fewer
+"""
+
+
+def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def code_of(source: str, name: str) -> bytes:
+        prelude = LIKE_MACOS if name == "codebotler.simulator.sandbox" else ""
+        return isolated.code_of(source.replace('"""The isolated', prelude + '"""The isolated', 1), name)
+
+    with TemporaryFile() as file:
+        monkeypatch.setattr(isolated, "codes", lambda: file)
+        file.write(isolated.written(code_of))
+        file.flush()
+        programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
+        outcomes = list(run([(program, WORLD) for program in programs], workers=1))
+    assert [said(outcome) for outcome in outcomes[:2]] == [["a"], ["b"]]
+    assert outcomes[2].error == RunError("Crash", "the process ended by itself (signal 6)")
 
 
 # --- what an attack found

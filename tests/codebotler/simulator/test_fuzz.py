@@ -35,6 +35,19 @@ FUZZ = settings(
 )
 RULES = Rules(limits=Limits(ticks=2_000, calls=60))
 
+CLOSED_BY_AN_ERROR = """
+def spoken():
+    try:
+        yield
+    finally:
+        say("closed")
+
+def task_program():
+    waiting = spoken()
+    next(waiting)
+    pick("nothing")
+"""
+
 DEEP = """
 deepest = 0
 
@@ -138,6 +151,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     @given(programs(deep=False), st.sampled_from(WORLDS))
     @example("def task_program():\n    say(undefined_name)\n", WORLDS[0])
     @example(DEEP, WORLDS[0])
+    @example(CLOSED_BY_AN_ERROR, WORLDS[0])
     def check(source: str, world: World) -> None:
         note(source)
         outcome = seen[source, world] = outcome_of(lanes, source, world)

@@ -124,6 +124,8 @@ def asked_for(door: socket) -> int:
 
 def end_of(pid: int) -> int:
     """Wait for the end of a child; its status, or minus the signal."""
+    if sys.platform != "linux":  # where `waitid` is new in Python 3.13
+        return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     if ended is None:
         return 0

@@ -95,7 +95,11 @@ def forget_the_shell() -> None:
         _signal.signal(number, _signal.SIG_DFL)
     _signal.pthread_sigmask(_signal.SIG_SETMASK, ())
     _, hard = getrlimit(RLIMIT_STACK)
-    setrlimit(RLIMIT_STACK, (STACK if hard < 0 else min(STACK, hard), hard))
+    try:
+        setrlimit(RLIMIT_STACK, (STACK if hard < 0 else min(STACK, hard), hard))
+    except (ValueError, OSError):
+        if sys.platform == "linux":
+            raise
 
 
 if __name__ == "__main__":

@@ -30,6 +30,7 @@ def simulate_surroundings(run: Run) -> None:
             getpid=staticmethod(lambda: 1),
             getppid=staticmethod(lambda: 0),
             cpu_count=staticmethod(lambda: 1),
+            sysconf=staticmethod(lambda name, /: -1),  # noqa: ARG005 - as theirs; of a machine nothing is known
             sched_getaffinity=staticmethod(lambda process, /: {0}),  # noqa: ARG005 - as theirs
             times=staticmethod(lambda: os.times_result((run.now, 0.0, 0.0, 0.0, run.now))),
         )
@@ -45,7 +46,7 @@ def forbid_watching() -> None:
     def forbidden(*_: object) -> None:
         raise PermissionError(1, "a program cannot watch its own execution")
 
-    sys.settrace = sys.setprofile = forbidden
+    vars(sys).update(settrace=forbidden, setprofile=forbidden, addaudithook=forbidden)
     vars(sys).pop("monitoring", None)  # new in Python 3.12
 
 

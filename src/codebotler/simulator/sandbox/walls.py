@@ -43,10 +43,14 @@ def enclose(seccomp: Filter | None, seconds: int) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Set one limit of this process for ever; some systems have fewer of them."""
+    """Set one limit of this process for ever; other systems have fewer of them, or take no small one."""
     kind = getattr(resource, "RLIMIT_" + name, None)
-    if kind is not None:
-        resource.setrlimit(kind, (value, value))
+    try:
+        if kind is not None:
+            resource.setrlimit(kind, (value, value))
+    except (ValueError, OSError):
+        if sys.platform == "linux":
+            raise
 
 
 def limit_time(seconds: int) -> None:
@@ -56,10 +60,15 @@ def limit_time(seconds: int) -> None:
 
 def become_nobody() -> None:
     """Give up being root, whom RLIMIT_NPROC does not bind; whoever is not root stays who they are."""
-    if os.geteuid() == 0:
-        os.setgroups([])
+    if os.geteuid() != 0:
+        return
+    os.setgroups([])
+    if sys.platform == "linux":
         os.setresgid(NOBODY, NOBODY, NOBODY)
         os.setresuid(NOBODY, NOBODY, NOBODY)
+    else:
+        os.setregid(NOBODY, NOBODY)
+        os.setreuid(NOBODY, NOBODY)
 
 
 def die_with_parent() -> None:

@@ -1,0 +1,146 @@
+"""The walls that the engine puts up, as the kernel tells of its processes while a program runs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import BEHAVIOURS, SimulatedRobot
+from codebotler.simulator.sandbox.walls import NOBODY
+from codebotler.world import Room, World
+from processes import children_of, lives
+
+WORLD = World((Room("start_loc"),), "start_loc")
+ROOT = os.geteuid() == 0
+USER = NOBODY if ROOT else os.geteuid()
+ROLES = ("preparer", "zygote", "library-zygote", "child", "child with the library")
+CLOSED = ("preparer", "child", "child with the library")
+MEGABYTES = 512 * 1024**2
+NEVER = {"Max core file size": "0", "Max file size": "0", "Max locked memory": "0", "Max msgqueue size": "0"}
+LIMITS = {**NEVER, "Max address space": str(MEGABYTES)}
+CLOSED_LIMITS = {**LIMITS, "Max processes": "0", "Max open files": "4"}
+ENVIRONMENT = {"PYTHONHASHSEED", "TZ", "LC_ALL", "PYTHONUTF8", "LD_BIND_NOW"}
+
+
+@dataclass(frozen=True)
+class Enclosed:
+    """One process of the engine, as the kernel tells of it.
+
+    Args:
+        limits: soft and hard, by name.
+        status: the lines of its status, by name.
+        owner: who owns the list of its memory, which is root where nobody else may look into it.
+        descriptors: what is open; None where only root may know.
+        environment: the names in it; None where only root may know.
+    """
+
+    limits: dict[str, tuple[str, str]]
+    status: dict[str, str]
+    owner: int
+    descriptors: set[int] | None
+    environment: set[str] | None
+
+    @classmethod
+    def of(cls, pid: int) -> Enclosed:
+        folder = Path(f"/proc/{pid}")
+        limits = {
+            line[:26].strip(): (line[26:47].strip(), line[47:68].strip())
+            for line in (folder / "limits").read_text(encoding="ascii").splitlines()
+        }
+        lines = (folder / "status").read_text(encoding="ascii").splitlines()
+        status = {name: value.strip() for name, _, value in (line.partition(":") for line in lines)}
+        descriptors = {int(path.name) for path in (folder / "fd").iterdir()} if ROOT else None
+        strings = (folder / "environ").read_bytes().decode().split("\0") if ROOT else None
+        environment = {text.partition("=")[0] for text in strings if text} if strings else None
+        return cls(limits, status, (folder / "maps").stat().st_uid, descriptors, environment)
+
+
+@pytest.fixture(scope="module")
+def enclosed() -> Iterator[dict[str, Enclosed]]:
+    """The processes of a lane by role, looked at while a program speaks."""
+    found: dict[str, Enclosed] = {}
+    os.environ["A_SECRET"] = "hush"
+    lane = Lane()
+
+    def say(_robot: SimulatedRobot, message: str) -> None:
+        preparer = lane._preparer._child
+        assert preparer is not None
+        found["preparer"] = Enclosed.of(preparer.pid)
+        for role, zygote in lane._zygotes.items():
+            found[role] = Enclosed.of(zygote.pid)
+            for pid in filter(lives, children_of(zygote.pid)):
+                found[message] = Enclosed.of(pid)
+
+    def new_robot() -> SimulatedRobot:
+        return SimulatedRobot(WORLD, behaviours={**BEHAVIOURS, "say": say})
+
+    program = "def task_program():\n    say('child')\n"
+    lane.run(program, new_robot)
+    lane.run("import json\n" + program.replace("'child'", "'child with the library'"), new_robot)
+    yield found
+    lane.close()
+    del os.environ["A_SECRET"]
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_rights_are_given_up(enclosed: dict[str, Enclosed], role: str) -> None:
+    process = enclosed[role]
+    assert process.status["Uid"].split() == [str(USER)] * 4
+    if ROOT:
+        assert process.status["Gid"].split() == [str(NOBODY)] * 4
+        assert process.status["Groups"] == ""
+    assert process.status["NoNewPrivs"] == "1"
+    assert process.owner == 0, "its memory can be looked into"
+    assert {name: process.limits[name] for name in LIMITS} == {n: (v, v) for n, v in LIMITS.items()}
+
+
+@pytest.mark.parametrize("role", CLOSED)
+def test_what_runs_or_parses_programs_is_closed(enclosed: dict[str, Enclosed], role: str) -> None:
+    process = enclosed[role]
+    assert process.status["Seccomp"] == "2"
+    wanted = {**{name: (value, value) for name, value in CLOSED_LIMITS.items()}, "Max cpu time": ("5", "6")}
+    assert {name: process.limits[name] for name in wanted} == wanted
+
+
+@pytest.mark.skipif(not ROOT, reason="only root may ask the kernel what another process has open")
+@pytest.mark.parametrize("role", CLOSED)
+def test_nothing_is_open_but_the_channel(enclosed: dict[str, Enclosed], role: str) -> None:
+    assert enclosed[role].descriptors == {0, 1, 2, 3}
+
+
+@pytest.mark.skipif(not ROOT, reason="only root may ask the kernel for another process's environment")
+@pytest.mark.parametrize("role", ROLES)
+def test_nothing_of_the_engines_environment_is_handed_on(enclosed: dict[str, Enclosed], role: str) -> None:
+    assert enclosed[role].environment == ENVIRONMENT
+
+
+# --- what the kernel does not tell of another process
+
+ASKED = """
+import ctypes, os, sys
+from codebotler.simulator.sandbox import forking, walls
+{deed}
+signal = ctypes.c_int()
+ctypes.CDLL(None).prctl(2, ctypes.byref(signal))  # PR_GET_PDEATHSIG
+os._exit(100 + signal.value + 50 * ctypes.CDLL(None).prctl(3))  # PR_GET_DUMPABLE
+"""
+DEEDS = {
+    "pass": 150,
+    "os.geteuid = lambda: 1000; walls.give_up_rights()": 109,  # whoever was root is not dumpable anyhow
+    "forking.go_behind_walls(1, None, 5, os.getppid().to_bytes(8, 'big'))": 159,
+    "forking.go_behind_walls(1, None, 5, (os.getppid() + 1).to_bytes(8, 'big'))": 1,  # orphaned before that
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can be asked")
+@pytest.mark.parametrize("deed", DEEDS)
+def test_process_ends_with_its_parent_and_hides_its_memory(deed: str) -> None:
+    process = subprocess.run([sys.executable, "-c", ASKED.format(deed=deed)], check=False, timeout=30)
+    assert process.returncode == DEEDS[deed]
