@@ -18,7 +18,7 @@ from codebotler.models.base import ModelError, Settings
 from roboeval.generate import Pace, Progress, generate_run
 from roboeval.inflight import InFlight
 from roboeval.order import Order
-from roboeval.records import read_completions, read_rows, to_line
+from roboeval.records import Appender, read_completions, read_rows, to_line
 from roboeval.run import Run
 from roboeval.suite import Suite
 from scripted_model import Scripted
@@ -137,6 +137,26 @@ def test_each_completion_is_in_the_file_when_it_is_told_of(tmp_path: Path, paper
     assert told == list(range(1, 31))
 
 
+def test_a_completion_counts_only_once_it_is_on_the_disk(
+    tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run(tmp_path / "run")
+    on_disk = [0]
+    sync = Appender.sync
+
+    def noted(file: Appender) -> None:
+        lines = file.path.read_bytes().count(b"\n")
+        sync(file)
+        if file.path == run.completions:
+            on_disk[0] = lines
+
+    def tell(progress: Progress) -> None:
+        assert on_disk[0] >= progress.done
+
+    monkeypatch.setattr(Appender, "sync", noted)
+    assert generated(run, paper, Scripted(seconds=0.001), told=tell).missing is None
+
+
 # --- what goes on and what does not
 
 
@@ -232,6 +252,12 @@ def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: 
     assert (len(model.asked), keys(run)) == (2, expected(3))
     assert about(run)["ended"] is not None
     assert about(run)["possibly_paid_twice"] == 0
+
+
+def test_a_model_that_fails_now_and_then_is_not_given_up(tmp_path: Path, paper: Suite) -> None:
+    model = Scripted(fails=lambda number: REFUSED if number % 3 else None)
+    progress = generated(Run(tmp_path / "run"), paper, model, pace=Pace(concurrency=1))
+    assert (len(model.asked), progress.done, progress.stopped) == (30, 10, None)
 
 
 @pytest.mark.parametrize(("concurrency", "most"), [(1, 3), (8, 15)])
