@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
@@ -106,6 +107,12 @@ def test_key_within_another_one_leaves_no_rest(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setenv("A_KEY", "abcdefgh")
     monkeypatch.setenv("B_KEY", "abcdefgh-ijklmnop")
     assert redacted("it is abcdefgh-ijklmnop.") == f"it is {HIDDEN}."
+
+
+@pytest.mark.parametrize("spelling", [ODD, json.dumps(ODD)[1:-1], repr(f"'{ODD}")[3:-1], quote(ODD, safe="")])
+def test_key_is_removed_however_it_is_spelt(monkeypatch: pytest.MonkeyPatch, spelling: str) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", ODD)
+    assert redacted(f"a {spelling} b") == f"a {HIDDEN} b"
 
 
 def test_short_values_are_no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
