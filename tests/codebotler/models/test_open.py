@@ -8,6 +8,8 @@ from codebotler.badinput import BadInput
 from codebotler.models.base import Settings
 from codebotler.models.open import open_model
 
+KNOWN = "name one that pydantic-ai knows, such as openai-chat, anthropic or google"
+COMMAND = 'pip install "pydantic-ai-slim[groq]"'
 URL = "http://127.0.0.1:9/v1"
 
 
@@ -34,14 +36,12 @@ def _without_keys(monkeypatch: pytest.MonkeyPatch) -> None:
         (
             "nobody:m",
             None,
-            'there is no provider "nobody"; '
-             "name one that pydantic-ai knows, such as openai-chat, anthropic or google",
+            f'there is no provider "nobody"; {KNOWN}',
         ),
         (
             "groq:m",
             None,
-            "groq:m needs a library that is not installed; install it with: "
-             'pip install "pydantic-ai-slim[groq]"',
+            f"groq:m needs a library that is not installed; install it with: {COMMAND}",
         ),
         (
             "deepseek:m",
