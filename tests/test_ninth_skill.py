@@ -7,6 +7,7 @@ import pytest
 
 from codebotler.badinput import BadInput
 from codebotler.program import Problem, Program
+from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
@@ -129,6 +130,12 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others(tmp_
     path = tmp_path / "outcome.yaml"
     path.write_text(outcome_yaml(outcome, table))
     assert read_outcome(path, table) == outcome
+
+
+def test_models_are_told_of_it() -> None:
+    prompt = prompt_for("Wave at alice.", skills=TABLE)
+    for text in (prompt.messages[0].text, prompt.text):
+        assert 'def wave(person: str) -> None:\n    """Wave at a person in the room."""' in text
 
 
 def test_static_check_knows_it() -> None:
