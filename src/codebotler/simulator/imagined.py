@@ -258,7 +258,8 @@ class ImaginedRobot(SimulatedRobot):
 
     def is_here(self, name: str) -> bool | None:
         """Whether somebody or something is in this room, as `meant` names it; None if nothing says so yet."""
-        if name in self.scene.people or any(thing.is_meant_by(name) for thing in self.things[self.room]):
+        things = self.things[self.room] if name != SOMEBODY else []
+        if name in self.scene.people or any(thing.is_meant_by(name) for thing in things):
             return True
         return False if self.scene.lacks(name) else None
 
@@ -277,10 +278,10 @@ class ImaginedRobot(SimulatedRobot):
     def settle(self, name: str, *, here: bool, by_lot: bool) -> None:
         """Let somebody or something be in this room or not, from now on."""
         if name == SOMEBODY:
-            who = SOMEBODY if here else "nobody"
-            self.facts.append(Fact(f'{who} is in "{self.room}"', by_lot))
+            told = f"{SOMEBODY} is" if here else "nobody is"
         else:
-            self.facts.append(Fact(f'"{brief(name)}" is {"" if here else "not "}in "{self.room}"', by_lot))
+            told = f'"{brief(name)}" is' if here else f'"{brief(name)}" is not'
+        self.facts.append(Fact(f'{told} in "{brief(self.room)}"', by_lot))
         if not here:
             self.scene.missed.add(name)
 
@@ -294,11 +295,10 @@ def meant(request: str) -> str:
 
 def drive(robot: ImaginedRobot, location: str) -> None:
     """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
+    robot.record("goto", location)
     room = robot.plan.room(location)
     if room is None:
-        real.go_to(robot, location)
-        return
-    robot.record("goto", location)
+        raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
     robot.room = room
 
 
