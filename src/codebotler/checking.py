@@ -57,7 +57,7 @@ def check_view(found: Check, program: str, name: str) -> RenderableType:
     lines = program.split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
-    parts += [Text(), _rooms(found)]
+    parts += [Text(), _rooms(found), *_in_vain(found)]
     if found.samples:
         parts += [Text(), *_sample(_telling(found), found)]
     return Group(*parts)
@@ -97,6 +97,15 @@ def _rooms(found: Check) -> Text:
         return Text(f"rooms: {rooms}", "dim")
     told = f"rooms, taken from the program itself: {rooms}"
     return Text(f"{told}\nwhether it misspells one shows only with --world FILE", "yellow")
+
+
+def _in_vain(found: Check) -> Iterator[Text]:
+    count = sum(sample.in_vain for sample in found.samples)
+    if 0 < count < len(found.samples):
+        often = f"{count} of {len(found.samples)} worlds"
+        yield Text(
+            f"in {often} the robot waits or searches in vain, which is not held against the program", "dim"
+        )
 
 
 def _telling(found: Check) -> Sample:
