@@ -2,10 +2,10 @@
 
     python bench/faulty_server.py [COMPLETIONS OF EACH PROMPT]
 
-`roboeval generate` asks for 80 prompts x 50 completions from a server of this process, over both protocols. Of the
-requests, one in ten meets an error, a refusal, a stream that breaks off, or nonsense. What is printed is the time
-from start to end, and the processor time of the command for each completion: with the client, the retries, and
-a reply on the disk before it counts. bench/generate.py says what of it the client takes.
+`roboeval generate` asks for 80 prompts x 50 completions from a server of this process, over both protocols.
+Of the requests, one in ten meets an error, a refusal, a stream that breaks off, or nonsense. What is printed
+is the time from start to end, and the processor time of the command for each completion: with the client, the
+retries, and a reply on the disk before it counts. bench/generate.py says what of it the client takes.
 """
 
 import json
@@ -60,8 +60,8 @@ def main() -> None:
             print(
                 f"{model}: {len(keys)} completions, {len(set(keys))} different ones of {80 * each}, by "
                 f"{len(server.requests)} requests of which {failed} failed, in "
-                f"{time.perf_counter() - start:.1f} s; {1000 * used / len(keys):.1f} ms of processor time each; "
-                f"{twice} possibly paid twice"
+                f"{time.perf_counter() - start:.1f} s; {1000 * used / len(keys):.1f} ms of processor time "
+                f"each; {twice} possibly paid twice"
             )
 
 
