@@ -68,11 +68,6 @@ class Progress:
         return (self.done - self.found) / max(time.monotonic() - self._started, 0.001)
 
     @property
-    def seconds_left(self) -> float:
-        """How long the rest takes at this rate, once a first completion has come."""
-        return (self.total - self.done) / self.rate if self.done > self.found else float("inf")
-
-    @property
     def missing(self) -> str | None:
         """What is missing at the end, and why, in a sentence; None if nothing is."""
         left = self.total - self.done
