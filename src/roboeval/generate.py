@@ -253,11 +253,18 @@ class _Asking:
             raise ModelError(f"the reply is too long to be kept: {len(line):,} bytes", may_pass=True)
         self._file.append(line)
         self._in_flight.kept(key)
-        await self._sync()
+        try:
+            await self._sync()
+        except asyncio.CancelledError:  # it is in the file, which is brought to the disk as it is closed
+            self._count(reply)
+            raise
         self._failed_in_a_row = 0
-        self._progress.used.add(row["usage"])
-        self._progress.done += 1
+        self._count(reply)
         self._told(self._progress)
+
+    def _count(self, reply: Reply) -> None:
+        self._progress.used.add(asdict(reply.usage))
+        self._progress.done += 1
 
     async def _sync(self) -> None:
         self._written += 1

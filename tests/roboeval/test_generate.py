@@ -412,6 +412,29 @@ def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path,
     assert not run.in_flight.exists()
 
 
+def test_an_interruption_counts_what_waits_for_the_disk(
+    tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run(tmp_path / "run")
+    seen: list[Progress] = []
+    sync = Appender.sync
+
+    def interrupted(file: Appender) -> None:
+        if file.path == run.completions and file.path.read_bytes().count(b"\n") > 10:
+            monkeypatch.undo()
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(0.2)
+        sync(file)
+
+    monkeypatch.setattr(Appender, "sync", interrupted)
+    order = Order(paper, SMALL, 3)
+    with pytest.raises(KeyboardInterrupt):
+        generate_run(run, order, Scripted(seconds=0.01), Settings(), Pace(), begun=seen.append)
+    (progress,) = seen
+    assert progress.done == len(rows(run)) > 10
+    assert progress.under_way > 0
+
+
 def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper: Suite) -> None:
     run, log = Run(tmp_path / "run"), tmp_path / "log"
     limit = (
