@@ -39,6 +39,7 @@ lint: $(VENV)/linted
 bench: $(VENV)/installed
 	$(BIN)/python bench/evaluate.py
 	$(BIN)/python bench/completions.py
+	$(BIN)/python bench/check.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"
