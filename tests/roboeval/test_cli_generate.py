@@ -268,7 +268,8 @@ def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> 
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:4]))
     ended = roboeval("resample", "run", "--json", cwd=tmp_path)
     assert ended.err == (
-        "4 of 10 completions judged, and only these count; `roboeval evaluate run --tasks LunchTime` goes on\n"
+        "4 of 10 completions judged, and only these count; "
+        "`roboeval evaluate run --tasks LunchTime` goes on\n"
     )
     assert sum(prompt["completions"] for prompt in json.loads(ended.out)["prompts"]) == 4
     completions = tmp_path / "run" / "completions.jsonl"
