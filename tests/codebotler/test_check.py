@@ -8,7 +8,7 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.check import MORE, Check, Sample, Settings, check, check_on
 from codebotler.simulator.engine import Lanes
-from codebotler.simulator.imagined import Plan
+from codebotler.simulator.imagined import Lot, Plan
 from codebotler.simulator.lane import Lane
 from codebotler.trace import Status
 
@@ -111,6 +111,22 @@ def test_an_error_after_some_answers_only_is_told_with_them(checks: Checks) -> N
     assert problem.where == 'the answer to "Tea?" is "No"'
 
 
+def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
+    always = next(
+        name
+        for name in map(str, range(10_000))
+        if all(Lot(0, n).is_there("start_loc", name) for n in range(8))
+    )
+    found = checks(
+        f"is_in_room('{always}')",
+        "if ask('', 'Tea?', ['Yes', 'No']) == 'No':",
+        "    place('tea')",
+        samples=8,
+    )
+    assert f'"{always}" is in "start_loc"' in found.samples[0].world
+    assert [problem.where for problem in found.problems] == ['the answer to "Tea?" is "No"']
+
+
 def test_a_line_is_blamed_once(checks: Checks) -> None:
     found = checks("say(a, b)", "go_to('lab'); say(c)")
     assert [(p.line, p.kind) for p in found.problems] == [(2, "NameError"), (3, "NameError")]
@@ -204,6 +220,18 @@ def test_a_search_takes_for_granted_that_there_is_one(checks: Checks) -> None:
         assert checks(*lines, seed=seed, samples=2).problems == ()
 
 
+def test_a_search_that_goes_on_takes_for_granted_that_there_is_only_one(checks: Checks) -> None:
+    lines = (
+        "for room in get_all_rooms():",
+        "    go_to(room)",
+        "    if is_in_room('bag'):",
+        "        pick('bag')",
+        "place('bag')",
+    )
+    for seed in range(10):
+        assert checks(*lines, rooms=ROOMS[:3], seed=seed, samples=2).problems == ()
+
+
 def test_one_look_is_no_search(checks: Checks) -> None:
     lines = ("go_to('kitchen')", "if is_in_room('mug'):", "    pick('mug')", "place('mug')")
     (problem,) = checks(*lines).problems
@@ -224,6 +252,8 @@ def test_rooms_are_guessed_from_the_program(checks: Checks) -> None:
 def test_a_program_that_visits_every_room_has_some_to_visit(checks: Checks) -> None:
     found = checks("for room in get_all_rooms():", "    go_to(room)", rooms=None)
     assert found.rooms == ("room 1", "room 2", "start_loc")
+    found = checks("for room in get_all_rooms():", "    if room != 'lab':", "        go_to(room)", rooms=None)
+    assert found.rooms == ("lab", "room 1", "room 2", "start_loc")
 
 
 def test_where_the_robot_starts(lanes: Lanes) -> None:
@@ -233,6 +263,7 @@ def test_where_the_robot_starts(lanes: Lanes) -> None:
         return check(source, rooms=rooms, start=start, lanes=lanes).samples[0].outcome.trace[0].text
 
     assert said(ROOMS) == "start_loc"
+    assert said(("lab", "start_loc")) == "start_loc"
     assert said(("lab", "hall")) == "lab"
     assert said(("lab", "hall"), "hall") == "hall"
     assert said(()) == "start_loc"

@@ -122,6 +122,26 @@ def test_json_for_machines(files: Path) -> None:
     assert codebotler(*arguments, "--workers", "2")[1] == out
 
 
+def test_the_robot_starts_where_the_world_says(files: Path) -> None:
+    (files / "start.yaml").write_text("robot: hall\nrooms: [lab, hall]\n")
+    (files / "say.py").write_text("def task_program():\n    say(get_current_location())\n")
+    out = codebotler("check", files / "say.py", "--world", files / "start.yaml")[1]
+    assert '1      said "hall"\n' in out
+
+
+def test_a_world_in_which_all_goes_well_is_shown_if_there_is_one(files: Path) -> None:
+    lines = (
+        "def task_program():",
+        '    if ask("", "Tea?", ["Yes", "No"]) == "No":',
+        '        say("oh")',
+        '        place("tea")',
+    )
+    (files / "tea.py").write_text("\n".join(lines))
+    out = codebotler("check", files / "tea.py")[1]
+    assert out.startswith("rejected: 1 problem")
+    assert out.endswith('asked "Tea?" [Yes | No] → Yes\n')
+
+
 def test_strict_and_seed_reach_the_check(files: Path) -> None:
     (files / "asks.py").write_text('def task_program():\n    ask("", "Tea?", ["Yes", "No"])\n')
     assert codebotler("check", files / "asks.py")[0] == 0

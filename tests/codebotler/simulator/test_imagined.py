@@ -122,6 +122,18 @@ def test_all_words_for_people_mean_the_same() -> None:
     assert meant("anne") == "anne"
 
 
+def test_a_thing_is_nobody() -> None:
+    robots = (robot_in(sample=number) for number in range(40))
+    assert {look(robot, "person") for robot in robots if look(robot, "body")} == {True, False}
+
+
+def test_looking_changes_nothing_so_that_a_program_need_not_wait_for_it() -> None:
+    robot = robot_in()
+    assert robot.only_looks == {"is_in_room", "get_all_rooms", "get_current_location"}
+    assert robot.never_fails == {"say"}
+    assert robot.surely == tuple(("go_to", room) for room in PLAN.rooms)
+
+
 def test_an_object_picked_up_is_gone_and_put_down_is_there() -> None:
     robot = where("mug", there=True)
     robot.perform("pick", ["mug"])
@@ -288,6 +300,24 @@ def test_a_search_that_found_it_once_excuses_nothing() -> None:
     robot = searched("alice", in_kitchen=True, in_lab=False)
     assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
     assert robot.excuses == set()
+
+
+def test_found_once_in_a_long_search_excuses_nothing() -> None:
+    robot = searched("alice", in_kitchen=False, in_lab=True)
+    while not robot.scene.lacks("alice"):
+        robot = searched("alice", in_kitchen=False, in_lab=True, seed=robot.lot.seed + 1)
+        robot.perform("go_to", ["start_loc"])
+        look(robot, "alice")
+    assert len(robot.hopes["alice"].vain) == 2
+    assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
+    assert robot.excuses == set()
+
+
+@pytest.mark.parametrize(("sought", "placed"), [("my blue mug", "mug"), ("mug", "the blue mug")])
+def test_a_search_by_a_longer_or_a_shorter_name_is_one_too(sought: str, placed: str) -> None:
+    robot = searched(sought, in_kitchen=False, in_lab=False)
+    assert failure(robot, "place", placed) == "PlaceNoObject"
+    assert len(robot.excuses) == 1
 
 
 def test_waiting_in_vain_excuses_asking() -> None:
