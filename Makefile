@@ -45,6 +45,9 @@ lint: $(VENV)/linted
 bench: $(VENV)/installed
 	$(BIN)/python bench/evaluate.py
 	$(BIN)/python bench/completions.py
+	$(BIN)/python bench/generate.py
+	$(BIN)/python bench/faulty_server.py
+	$(BIN)/python bench/check.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"

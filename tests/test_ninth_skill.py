@@ -6,9 +6,12 @@ from pathlib import Path
 import pytest
 
 from codebotler.badinput import BadInput
+from codebotler.check import check
 from codebotler.program import Problem, Program
+from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
+from codebotler.simulator.imagined import IMAGINED
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
 from codebotler.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
 from codebotler.trace import Event, Option, Outcome, RunError, Status
@@ -129,6 +132,23 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others(tmp_
     path = tmp_path / "outcome.yaml"
     path.write_text(outcome_yaml(outcome, table))
     assert read_outcome(path, table) == outcome
+
+
+def test_models_are_told_of_it() -> None:
+    prompt = prompt_for("Wave at alice.", skills=TABLE)
+    for text in (prompt.messages[0].text, prompt.text):
+        assert 'def wave(person: str) -> None:\n    """Wave at a person in the room."""' in text
+
+
+def test_a_check_in_imagined_worlds_knows_it() -> None:
+    def wave_at_anybody(robot: SimulatedRobot, person: str) -> None:
+        robot.record("wave", person)
+
+    does = {**IMAGINED, "wave": wave_at_anybody}
+    found = check(PROGRAMS["waves"], rooms=["hall", "lab"], skills=TABLE, behaviours=does)
+    assert found.problems == ()
+    assert found.data(TABLE)["samples"][0]["trace"][1] == ["wave", "alice"]
+    assert [problem.kind for problem in check(PROGRAMS["waves"]).problems] == ["NameError", "NameError"]
 
 
 def test_static_check_knows_it() -> None:

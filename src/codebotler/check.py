@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
+from codebotler.badinput import BadInput
 from codebotler.drives import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.program import Problem as Flaw
 from codebotler.program import Program, listed, parsed
 from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.imagined import AS_WRITTEN, Draw, Fact, ImaginedRobot, Lot, Plan
+from codebotler.simulator.imagined import AS_WRITTEN, Draw, Fact, ImaginedRobot, Lot, Plan, brief
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rules import Rules
@@ -82,7 +84,7 @@ class Sample:
 
     def is_as_in(self, lot: Lot) -> bool:
         """Whether the same run in another world would meet the same facts, and so be the same."""
-        return all(lot.draw(draw.count, *draw.fact) == draw.drawn for draw in self.draws)
+        return all(draw.is_drawn_by(lot) for draw in self.draws)
 
     @property
     def lots(self) -> tuple[str, ...]:
@@ -206,6 +208,7 @@ def check(
         lanes: what runs programs, for who checks many; without it, it is started and ended.
 
     Raises:
+        BadInput: the name of a room is no regular expression.
         EngineError: no isolated process could be started.
     """
     settings = Settings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
@@ -326,12 +329,12 @@ def _checked(program: str, plan: Plan, settings: Settings, runner: Runner) -> Ch
 def _samples(plan: Plan, settings: Settings, runner: Runner) -> list[Sample]:
     """The runs in so many worlds, and in more where the program waits or searches in vain in all of them."""
     first = Lot(settings.seed, 0, settings.strict)
-    lots = [replace(first, sample=number) for number in range(settings.samples + MORE)]
-    ran = runner.runs(plan, lots[: settings.samples])
-    for lot in lots[settings.samples :]:
+    ran = runner.runs(plan, [replace(first, sample=number) for number in range(settings.samples)])
+    for more in range(MORE):
         if not all(sample.in_vain for sample in ran):
             break
-        ran += runner.runs(plan, [lot])
+        # Who waits in many places needs luck to see the end of it; a search, that not all is full of things.
+        ran += runner.runs(plan, [replace(first, sample=len(ran), lucky=more % 2 == 1)])
     return ran
 
 
@@ -340,6 +343,8 @@ def _samples(plan: Plan, settings: Settings, runner: Runner) -> list[Sample]:
 
 def _plan(program: str, rooms: Sequence[str] | None, start: str | None, skills: SkillTable) -> Plan:
     if rooms is not None:
+        for room in rooms:
+            _expect_regex(room)
         names = tuple(dict.fromkeys(rooms)) or (start or START,)
         start = start or (START if START in names else names[0])
         return Plan(names if start in names else (*names, start), start)
@@ -348,6 +353,13 @@ def _plan(program: str, rooms: Sequence[str] | None, start: str | None, skills: 
     if len(named) < len(SOME_ROOMS) and lists_rooms(program):
         named += [room for room in SOME_ROOMS if room not in named]
     return Plan((*named, start), start, guessed=True)
+
+
+def _expect_regex(room: str) -> None:
+    try:
+        re.compile(room)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise BadInput(f'the room "{room}" is no valid regular expression: {error}') from None
 
 
 def _widened(plan: Plan, ran: Iterable[Sample]) -> Plan:
@@ -382,9 +394,10 @@ def _flaws(program: str, plan: Plan, skills: SkillTable) -> tuple[Problem, ...]:
 
 
 def _no_room(request: str, plan: Plan) -> str:
-    closest = difflib.get_close_matches(request.lower(), plan.rooms, n=1)
+    name = brief(request)
+    closest = difflib.get_close_matches(name.lower(), plan.rooms, n=1)
     hint = f'; the closest is "{closest[0]}"' if closest else ""
-    return f'there is no room "{request}"{hint}'
+    return f'there is no room "{name}"{hint}'
 
 
 def _failures(ran: Sequence[Sample], plan: Plan) -> Iterator[Problem]:
@@ -392,12 +405,13 @@ def _failures(ran: Sequence[Sample], plan: Plan) -> Iterator[Problem]:
     in_vain = all(sample.in_vain for sample in ran)
     groups: dict[tuple[int | None, str], list[Sample]] = {}
     for sample in ran:
-        if sample.outcome.error is not None and (in_vain or not sample.in_vain):
-            groups.setdefault((sample.outcome.line, sample.outcome.error.kind), []).append(sample)
-    for (line, kind), same in groups.items():
-        yield Problem(
-            kind, _message(same, ran, plan), line, _where(same, ran), tuple(sample.number for sample in same)
-        )
+        outcome = sample.outcome
+        if outcome.error is not None and (in_vain or not sample.in_vain):
+            line = None if outcome.status is Status.TIMEOUT else outcome.line  # any of those where it waits
+            groups.setdefault((line, outcome.error.kind), []).append(sample)
+    for (_, kind), same in groups.items():
+        numbers = tuple(sample.number for sample in same)
+        yield Problem(kind, _message(same, ran, plan), same[0].outcome.line, _where(same, ran), numbers)
 
 
 def _message(same: Sequence[Sample], ran: Sequence[Sample], plan: Plan) -> str:
@@ -405,7 +419,8 @@ def _message(same: Sequence[Sample], ran: Sequence[Sample], plan: Plan) -> str:
     first = same[0].outcome
     assert first.error is not None
     if first.status is Status.TIMEOUT:
-        often = f"in each of {len(ran)} imagined worlds " if same[0].draws else ""
+        all_or_some = "each" if len(same) == len(ran) else str(len(same))
+        often = f"in {all_or_some} of {len(ran)} imagined worlds " if same[0].draws else ""
         return f"the program never ends: {often}it reached a limit, {first.error.message}"
     if first.error.kind == "GoToInvalidLocation" and first.trace and first.trace[-1].kind == "goto":
         return _no_room(first.trace[-1].text, plan)

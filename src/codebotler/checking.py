@@ -34,10 +34,11 @@ def read_program(name: str) -> str:
         BadInput: there is no such file, or nothing in it.
     """
     if name != "-":
-        path = Path(name)
-        text = read_text(path) if name else ""
+        if not name:
+            raise BadInput("nothing is named; name a file, or - for standard input")
+        text = read_text(Path(name))
         if not text.strip():
-            raise BadInput("there is no program in it", file=path if name else "the empty name")
+            raise BadInput("there is no program in it", file=name)
         return text
     text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
     if not text.strip():
@@ -57,7 +58,7 @@ def check_view(found: Check, program: str, name: str) -> RenderableType:
     lines = program.split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
-    parts += [Text(), _rooms(found)]
+    parts += [Text(), _rooms(found), *_in_vain(found)]
     if found.samples:
         parts += [Text(), *_sample(_telling(found), found)]
     return Group(*parts)
@@ -71,10 +72,12 @@ def _verdict(found: Check, name: str) -> Text:
         what = "1 problem" if count == 1 else f"{count} problems"
         verdict = Text.assemble(("rejected", "bold red"), f": {what} in {visible(name)}")
     if not found.samples:
-        return verdict.append("; it was not run")
-    if not any(sample.draws for sample in found.samples):
-        return verdict.append("; it runs in the same way in every world")
-    return verdict.append(f"; run in {len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}")
+        ran = "it was not run"
+    elif not any(sample.draws for sample in found.samples):
+        ran = "it does the same in every world"
+    else:
+        ran = f"run in {len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}"
+    return verdict.append(f"\n{ran}", "dim")
 
 
 def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
@@ -97,6 +100,15 @@ def _rooms(found: Check) -> Text:
         return Text(f"rooms: {rooms}", "dim")
     told = f"rooms, taken from the program itself: {rooms}"
     return Text(f"{told}\nwhether it misspells one shows only with --world FILE", "yellow")
+
+
+def _in_vain(found: Check) -> Iterator[Text]:
+    count = sum(sample.in_vain for sample in found.samples)
+    if 0 < count < len(found.samples):
+        often = f"{count} of {len(found.samples)} worlds"
+        yield Text(
+            f"in {often} the robot waits or searches in vain, which is not held against the program", "dim"
+        )
 
 
 def _telling(found: Check) -> Sample:

@@ -19,8 +19,8 @@ from roboeval.suite import Suite
 class Checks:
     """What the check says of programs of a run.
 
-    A program is checked as its task's robot would be: it knows the rooms and nothing else, and the rules of
-    the suite hold. What was checked otherwise, or by another version, is forgotten.
+    Of the world, the rooms are known and nothing else: those of the first world of the task. The rules of the
+    suite hold. What was checked otherwise, or by another version, is forgotten.
 
     Args:
         run: where results are kept.

@@ -68,11 +68,6 @@ class Progress:
         return (self.done - self.found) / max(time.monotonic() - self._started, 0.001)
 
     @property
-    def seconds_left(self) -> float:
-        """How long the rest takes at this rate, once a first completion has come."""
-        return (self.total - self.done) / self.rate if self.done > self.found else float("inf")
-
-    @property
     def missing(self) -> str | None:
         """What is missing at the end, and why, in a sentence; None if nothing is."""
         left = self.total - self.done
@@ -258,11 +253,18 @@ class _Asking:
             raise ModelError(f"the reply is too long to be kept: {len(line):,} bytes", may_pass=True)
         self._file.append(line)
         self._in_flight.kept(key)
-        await self._sync()
+        try:
+            await self._sync()
+        except asyncio.CancelledError:  # it is in the file, which is brought to the disk as it is closed
+            self._count(reply)
+            raise
         self._failed_in_a_row = 0
-        self._progress.used.add(row["usage"])
-        self._progress.done += 1
+        self._count(reply)
         self._told(self._progress)
+
+    def _count(self, reply: Reply) -> None:
+        self._progress.used.add(asdict(reply.usage))
+        self._progress.done += 1
 
     async def _sync(self) -> None:
         self._written += 1

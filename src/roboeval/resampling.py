@@ -19,6 +19,7 @@ from rich.text import Text
 
 from codebotler.terminal import visible
 from roboeval.metrics import Estimate, clustered_interval
+from roboeval.records import Key
 from roboeval.tables import Row
 
 LIMITS = (0, 2, 4, 8, 100)
@@ -100,17 +101,12 @@ class Prompt:
     trials: tuple[Trial, ...]
 
 
-def by_prompt(rows: Iterable[Row], accepted: Iterable[bool]) -> tuple[Prompt, ...]:
-    """Put together what was judged and what was checked.
-
-    Args:
-        rows: of an evaluation.
-        accepted: for each row, in order, whether the check accepts its program.
-    """
-    trials: defaultdict[tuple[str, int], list[Trial]] = defaultdict(list)
-    for row, good in zip(rows, accepted, strict=True):
-        trials[row["task"], row["prompt"]].append(Trial(good, ran(row), row["passed"]))
-    return tuple(Prompt(*key, tuple(those)) for key, those in sorted(trials.items()))
+def by_prompt(trials: Iterable[tuple[Key, Trial]]) -> tuple[Prompt, ...]:
+    """Put the completions of each prompt together, in the order of tasks and prompts."""
+    together: defaultdict[tuple[str, int], list[Trial]] = defaultdict(list)
+    for (task, prompt, _), trial in trials:
+        together[task, prompt].append(trial)
+    return tuple(Prompt(*key, tuple(those)) for key, those in sorted(together.items()))
 
 
 @dataclass(frozen=True)

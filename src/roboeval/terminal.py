@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from time import monotonic
 from typing import NoReturn, TypeVar
 
@@ -45,7 +46,7 @@ def metered(doing: str, total: int | None = None, done: int = 0) -> Iterator[Cal
         TimeRemainingColumn(),
     )
     of_all = "" if total is None else f" of {total:,}"
-    started = monotonic()
+    before, started = done, monotonic()
     next_line = started + QUIET_S
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         job = progress.add_task(doing, total=total, completed=done, more="")
@@ -54,10 +55,16 @@ def metered(doing: str, total: int | None = None, done: int = 0) -> Iterator[Cal
             nonlocal next_line
             progress.update(job, completed=done, more=more)
             if not console.is_terminal and monotonic() >= next_line:
-                note(", ".join(filter(None, (f"{doing}: {done:,}{of_all}", more))))
+                left = _left(done - before, total and total - done, monotonic() - started)
+                note(", ".join(filter(None, (f"{doing}: {done:,}{of_all}", more, left))))
                 next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
 
         yield tell
+
+
+def _left(done: int, to_do: int | None, seconds: float) -> str:
+    """How long the rest takes, at the rate so far."""
+    return f"{timedelta(seconds=round(seconds * to_do / done))} left" if done and to_do else ""
 
 
 def fail(sentence: str) -> NoReturn:

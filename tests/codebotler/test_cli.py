@@ -1,26 +1,66 @@
-"""The command line of CodeBotler: so far its help and its version."""
+"""The command line of CodeBotler: its help and version, and how `check` reads, says and ends."""
 
+import json
+import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from codebotler.cli import app, obey
 
+GOOD = """def task_program():
+    go_to("kitchen")
+    if is_in_room("mug"):
+        pick("mug")
+        go_to("start_loc")
+        place("mug")
+"""
+BAD = """def task_program():
+    go_to("kitchn")
+    say(mesage)
+    is_in_room("person")
+    ask("person", "Tea?", ["Yes", "No"])
+"""
+WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
 
-def codebotler(*arguments: str) -> tuple[int, str, str]:
+
+def codebotler(*arguments: str | Path, given: str | None = None) -> tuple[int, str, str]:
     ended = subprocess.run(
-        [sys.executable, "-m", "codebotler.cli", *arguments], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "codebotler.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        input=given,
+        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
     )
     return ended.returncode, ended.stdout, ended.stderr
 
 
+def refused(*arguments: str | Path, given: str | None = None) -> str:
+    """The one sentence with which a command refuses; nothing but it is printed."""
+    status, out, err = codebotler(*arguments, given=given)
+    assert (status, out) == (2, "")
+    assert err.startswith("codebotler: ")
+    assert err.count("\n") == 1
+    return err.removeprefix("codebotler: ").rstrip("\n")
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    for name, text in (("good.py", GOOD), ("bad.py", BAD), ("world.yaml", WORLD)):
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
 @pytest.mark.parametrize("arguments", [(), ("--help",)])
-def test_help_offers_no_command_while_there_is_none(arguments: tuple[str, ...]) -> None:
+def test_help_lists_the_commands(arguments: tuple[str, ...]) -> None:
     status, out, err = codebotler(*arguments)
     assert (status, err) == (0, "")
-    assert out.startswith("Usage: codebotler [OPTIONS]\n")
+    assert out.startswith("Usage: codebotler [OPTIONS] COMMAND [ARGS]...\n")
+    assert re.search(r"^  check +Look for problems", out, re.MULTILINE)
 
 
 def test_the_version() -> None:
@@ -28,10 +68,123 @@ def test_the_version() -> None:
 
 
 def test_what_is_no_command_is_one_sentence() -> None:
-    status, out, err = codebotler("dance")
-    assert (status, out) == (2, "")
-    assert err.startswith("codebotler: got unexpected extra argument")
-    assert err.count("\n") == 1
+    assert refused("dance").startswith("no such command 'dance'")
+
+
+# --- check
+
+
+def test_an_accepted_program(files: Path) -> None:
+    status, out, err = codebotler("check", files / "good.py", "--world", files / "world.yaml")
+    assert (status, err) == (0, "")
+    first, ran, *rest = out.split("\n")
+    assert first == f"accepted: no problem in {files / 'good.py'}"
+    assert ran == "run in 5 imagined worlds"
+    assert rest[:3] == ["", 'rooms: "start_loc", "kitchen"', ""]
+    assert rest[3] == 'what the robot would do, where "mug" is in "kitchen"'
+    assert [line.split() for line in rest[4:6]] == [
+        ["1", "start_loc", "→", "kitchen"],
+        ["2", "looked", "for", '"mug":', "found"],
+    ]
+    assert '5      put down "mug"' in rest
+
+
+def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
+    status, out, err = codebotler("check", files / "bad.py", "--world", files / "world.yaml")
+    assert (status, err) == (1, "")
+    assert out.startswith(f"rejected: 2 problems in {files / 'bad.py'}\nit does the same in every world\n")
+    assert (
+        'line 2: GoToInvalidLocation: there is no room "kitchn"; the closest is "kitchen"\n'
+        "  1 | def task_program():\n"
+        '> 2 |     go_to("kitchn")\n'
+        "  3 |     say(mesage)\n"
+    ) in out
+    assert "line 3: NameError: the name mesage is not defined\n" in out
+    assert '"kitchn"  failed: there is no such room' in out
+
+
+def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
+    status, out, _ = codebotler("check", files / "bad.py")
+    assert status == 1
+    assert 'rooms, taken from the program itself: "kitchn", "start_loc"\n' in out
+    assert "--world FILE" in out
+    assert "taken from" not in codebotler("check", files / "good.py", "--world", files / "world.yaml")[1]
+
+
+def test_json_for_machines(files: Path) -> None:
+    arguments = ("check", files / "bad.py", "--json", "--seed", "3", "--samples", "4")
+    status, out, err = codebotler(*arguments)
+    assert (status, err) == (1, "")
+    data = json.loads(out)
+    assert (data["accepted"], data["rooms_are_guessed"], data["seed"]) == (False, True, 3)
+    assert [(p["kind"], p["line"]) for p in data["problems"]] == [("NameError", 3)]
+    assert len(data["samples"]) == 4
+    assert codebotler(*arguments, "--workers", "2")[1] == out
+
+
+def test_the_robot_starts_where_the_world_says(files: Path) -> None:
+    (files / "start.yaml").write_text("robot: hall\nrooms: [lab, hall]\n")
+    (files / "say.py").write_text("def task_program():\n    say(get_current_location())\n")
+    out = codebotler("check", files / "say.py", "--world", files / "start.yaml")[1]
+    assert '1      said "hall"\n' in out
+
+
+def test_a_world_in_which_all_goes_well_is_shown_if_there_is_one(files: Path) -> None:
+    lines = (
+        "def task_program():",
+        '    if ask("", "Tea?", ["Yes", "No"]) == "No":',
+        '        say("oh")',
+        '        place("tea")',
+    )
+    (files / "tea.py").write_text("\n".join(lines))
+    out = codebotler("check", files / "tea.py")[1]
+    assert out.startswith("rejected: 1 problem")
+    assert out.endswith('asked "Tea?" [Yes | No] → Yes\n')
+
+
+def test_strict_and_seed_reach_the_check(files: Path) -> None:
+    (files / "asks.py").write_text('def task_program():\n    ask("", "Tea?", ["Yes", "No"])\n')
+    assert codebotler("check", files / "asks.py")[0] == 0
+    status, out, _ = codebotler("check", files / "asks.py", "--strict", "--samples", "20")
+    assert status == 1
+    assert 'where nobody is in "start_loc"' in out
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [GOOD, f"Sure!\n\n```python\n{GOOD}```\nEnjoy.\n", "    " + GOOD.split("\n", 1)[1].lstrip(" ")],
+)
+def test_standard_input_may_be_a_whole_reply(reply: str) -> None:
+    status, out, _ = codebotler("check", "-", given=reply)
+    assert (status, out.split("\n")[0]) == (0, "accepted: no problem in the program")
+
+
+def test_lines_on_standard_input_are_counted_as_they_stand() -> None:
+    assert "line 5: NameError" in codebotler("check", "-", given="\n\n" + BAD)[1]
+
+
+def test_what_cannot_be_checked_is_refused_in_a_sentence(files: Path) -> None:
+    assert refused("check", files / "gone.py") == f"{files / 'gone.py'}: there is no such file"
+    assert refused("check", "fetch me a mug") == "fetch me a mug: there is no such file"
+    assert refused("check", files) == f"{files}: is a folder; name a file"
+    assert refused("check", "") == "nothing is named; name a file, or - for standard input"
+    assert refused("check", "-", given=" \n").startswith("standard input: nothing came")
+    (files / "empty.py").write_text("\n")
+    assert refused("check", files / "empty.py") == f"{files / 'empty.py'}: there is no program in it"
+    (files / "bytes.py").write_bytes(b"def \xff")
+    assert refused("check", files / "bytes.py").endswith("is no UTF-8 text; save it as UTF-8")
+    assert refused("check", files / "good.py", "--world", files / "no.yaml").endswith("there is no such file")
+    (files / "wrong.yaml").write_text("robot: hall\nrooms: [lab]\n")
+    sentence = refused("check", files / "good.py", "--world", files / "wrong.yaml")
+    assert sentence.startswith(f"{files / 'wrong.yaml'}, line 1: ")
+    assert "samples" in refused("check", files / "good.py", "--samples", "0")
+
+
+def test_what_a_terminal_would_obey_is_shown(files: Path) -> None:
+    (files / "odd.py").write_text('def task_program():\n    say("a\x1b[31mb")\n    go_to("\x1b[2J")\n')
+    out = codebotler("check", files / "odd.py", "--world", files / "world.yaml")[1]
+    assert "\x1b" not in out
+    assert "\\x1b[2J" in out
 
 
 def test_windows_is_told_of_wsl_with_the_platform_patched(

@@ -254,3 +254,26 @@ def test_resampling_needs_a_judged_run(tmp_path: Path) -> None:
         "run: has not been judged; `roboeval evaluate run` does it"
     )
     assert refused("resample", "nothing", cwd=tmp_path).startswith("nothing: is no run")
+
+
+def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> None:
+    words = ["generate", "--model", "recorded:hasty", "--num-completions", "2", "--tasks", TASKS]
+    assert roboeval(*words, "--out", "run", cwd=tmp_path).status == 0
+    assert roboeval("evaluate", "run", "--tasks", "LunchTime", cwd=tmp_path).status == 0
+    data = json.loads(roboeval("resample", "run", "--json", cwd=tmp_path).out)
+    assert [prompt["task"] for prompt in data["prompts"]] == ["LunchTime"] * 5
+    checked = (tmp_path / "run" / "checks" / "paper.jsonl").read_text()
+    assert "SayGoodDay" not in checked
+    rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
+    rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:4]))
+    ended = roboeval("resample", "run", "--json", cwd=tmp_path)
+    assert ended.err == (
+        "4 of 10 completions judged, and only these count; "
+        "`roboeval evaluate run --tasks LunchTime` goes on\n"
+    )
+    assert sum(prompt["completions"] for prompt in json.loads(ended.out)["prompts"]) == 4
+    completions = tmp_path / "run" / "completions.jsonl"
+    changed = [json.loads(line) for line in completions.read_text().splitlines()]
+    changed = [row | {"program": row["program"] + "#"} for row in changed]
+    completions.write_text("".join(json.dumps(row) + "\n" for row in changed))
+    assert refused("resample", "run", cwd=tmp_path).endswith("--redo` judges what stands there")

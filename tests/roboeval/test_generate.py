@@ -18,7 +18,7 @@ from codebotler.models.base import ModelError, Settings
 from roboeval.generate import Pace, Progress, generate_run
 from roboeval.inflight import InFlight
 from roboeval.order import Order
-from roboeval.records import read_completions, read_rows, to_line
+from roboeval.records import Appender, read_completions, read_rows, to_line
 from roboeval.run import Run
 from roboeval.suite import Suite
 from scripted_model import Scripted
@@ -137,6 +137,26 @@ def test_each_completion_is_in_the_file_when_it_is_told_of(tmp_path: Path, paper
     assert told == list(range(1, 31))
 
 
+def test_a_completion_counts_only_once_it_is_on_the_disk(
+    tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run(tmp_path / "run")
+    on_disk = [0]
+    sync = Appender.sync
+
+    def noted(file: Appender) -> None:
+        lines = file.path.read_bytes().count(b"\n")
+        sync(file)
+        if file.path == run.completions:
+            on_disk[0] = lines
+
+    def tell(progress: Progress) -> None:
+        assert on_disk[0] >= progress.done
+
+    monkeypatch.setattr(Appender, "sync", noted)
+    assert generated(run, paper, Scripted(seconds=0.001), told=tell).missing is None
+
+
 # --- what goes on and what does not
 
 
@@ -232,6 +252,12 @@ def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: 
     assert (len(model.asked), keys(run)) == (2, expected(3))
     assert about(run)["ended"] is not None
     assert about(run)["possibly_paid_twice"] == 0
+
+
+def test_a_model_that_fails_now_and_then_is_not_given_up(tmp_path: Path, paper: Suite) -> None:
+    model = Scripted(fails=lambda number: REFUSED if number % 3 else None)
+    progress = generated(Run(tmp_path / "run"), paper, model, pace=Pace(concurrency=1))
+    assert (len(model.asked), progress.done, progress.stopped) == (30, 10, None)
 
 
 @pytest.mark.parametrize(("concurrency", "most"), [(1, 3), (8, 15)])
@@ -332,6 +358,14 @@ def started(
     return process
 
 
+def wait_for_notes(log: Path, count: int) -> None:
+    """Wait until the model has noted so much."""
+    deadline = time.monotonic() + 30
+    while (log.read_bytes().count(b"\n") if log.exists() else 0) < count:
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
 def asked_of(log: Path, pid: int, suite: Suite) -> set[tuple[str, int, int]]:
     """The completions that a process asked for, as the model noted it."""
     prompts = {
@@ -349,8 +383,10 @@ def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Su
     lost: Counter[tuple[str, int, int]] = Counter()
     kills = 0
     for _ in range(5):
+        notes = log.read_bytes().count(b"\n") if log.exists() else 0
         process = started(run, log, count=60)
-        time.sleep(chance.uniform(0.05, 0.3))
+        wait_for_notes(log, notes + chance.randint(10, 100))
+        time.sleep(chance.uniform(0, 0.01))
         process.kill()
         kills += process.wait() == -signal.SIGKILL
         process.communicate()
@@ -360,19 +396,19 @@ def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Su
         # A request is noted before the model hears of it, so that at most those being sent are counted too.
         assert len(under_way) <= InFlight(run.in_flight).read(done, 0) <= 5
         lost.update(under_way)
-    assert kills >= 3
+    assert kills == 5
     generated(run, paper, Scripted(), count=60)
     assert Counter(keys(run)) == Counter(expected(60))
     assert 0 < sum(lost.values()) <= about(run)["possibly_paid_twice"] <= sum(lost.values()) + kills
-    notes = [json.loads(line) for line in log.read_text().splitlines()]
-    asked = Counter((told, index) for what, told, index, _ in notes if what == "asked")
+    lines = map(json.loads, log.read_text().splitlines())
+    asked = Counter((told, index) for what, told, index, _ in lines if what == "asked")
     assert sum(n - 1 for n in asked.values()) <= about(run)["possibly_paid_twice"]
 
 
 def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
     run, log = Run(tmp_path / "run"), tmp_path / "log"
     process = started(run, log, count=60, seconds=0.05)
-    time.sleep(0.5)
+    wait_for_notes(log, 50)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=20)
     assert b"KeyboardInterrupt" in err
@@ -384,6 +420,29 @@ def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path,
     assert about(run)["possibly_paid_twice"] == len(under_way)
     assert Counter(keys(run)) == Counter(expected(60))
     assert not run.in_flight.exists()
+
+
+def test_an_interruption_counts_what_waits_for_the_disk(
+    tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run(tmp_path / "run")
+    seen: list[Progress] = []
+    sync = Appender.sync
+
+    def interrupted(file: Appender) -> None:
+        if file.path == run.completions and file.path.read_bytes().count(b"\n") > 10:
+            monkeypatch.undo()
+            signal.raise_signal(signal.SIGINT)
+            time.sleep(0.2)
+        sync(file)
+
+    monkeypatch.setattr(Appender, "sync", interrupted)
+    order = Order(paper, SMALL, 3)
+    with pytest.raises(KeyboardInterrupt):
+        generate_run(run, order, Scripted(seconds=0.01), Settings(), Pace(), begun=seen.append)
+    (progress,) = seen
+    assert progress.done == len(rows(run)) > 10
+    assert progress.under_way > 0
 
 
 def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper: Suite) -> None:

@@ -8,7 +8,6 @@ import pytest
 from roboeval.resampling import (
     LIMITS,
     Chances,
-    Prompt,
     Trial,
     by_prompt,
     chances,
@@ -89,14 +88,14 @@ def test_what_runs_at_all(verdicts: list[dict[str, Any]], expected: bool) -> Non
     assert ran({**row(0, 0), "verdicts": verdicts}) is expected
 
 
-def small() -> tuple[Prompt, ...]:
-    rows = [row(0, i, None if i == 0 else ("PythonError", "NameError")) for i in range(4)]
-    rows += [row(1, i, ("PythonError", "NameError")) for i in range(4)]
-    return by_prompt(rows, [i == 0 for i in range(4)] + [False] * 4)
+PROMPTS = by_prompt(
+    [(("Visit", 1, i), REJECTED) for i in range(4)]
+    + [(("Visit", 0, i), GOOD if i == 0 else REJECTED) for i in range(4)]
+)
 
 
 def test_limits_over_prompts() -> None:
-    none, hundred = resampled(small(), 0), resampled(small(), 100)
+    none, hundred = resampled(PROMPTS, 0), resampled(PROMPTS, 100)
     assert none.passed.mean == pytest.approx(1 / 8)
     assert none.prompts == {0.25: 1 / 2, 0.5: 0, 0.75: 0, 1.0: 0}
     assert hundred.passed.mean == pytest.approx(1 / 2)
@@ -105,7 +104,7 @@ def test_limits_over_prompts() -> None:
 
 
 def test_data_of_both_figures() -> None:
-    data = curve_data(small(), LIMITS)
+    data = curve_data(PROMPTS, LIMITS)
     assert [limit["retries"] for limit in data["limits"]] == [0, 2, 4, 8, 100]
     assert data["prompts"][0]["pass@1"]["2"] == pytest.approx(1 - (3 / 4) ** 3)
     assert data["prompts"][1] == {
@@ -123,7 +122,7 @@ def test_data_of_both_figures() -> None:
 
 
 def test_the_table_names_prompts_without_hope() -> None:
-    shown = printed(render(small(), LIMITS, title="runs/x"))
+    shown = printed(render(PROMPTS, LIMITS, title="runs/x"))
     assert "no completion of 1 prompt is accepted" in shown
     assert [line.split()[:2] for line in shown.splitlines() if line.strip()[:1].isdigit()] == [
         ["0", "0.125"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,9 +11,11 @@ from urllib.parse import urlsplit
 
 from codebotler.badinput import BadInput
 from codebotler.prompts import Prompt
+from codebotler.reply import program_of
 
 Heard: TypeAlias = Callable[[str], None]
 
+HUGE = 20_000  # characters
 NOT_IN_URL = "keys belong into the environment, not into a URL, which is recorded with a run"
 
 
@@ -100,6 +103,13 @@ class Reply:
     usage: Usage
     latency_s: float
     finish_reason: str | None
+
+
+async def program_in(text: str) -> str:
+    """The program that a text means; a huge text takes seconds, in which other replies go on coming in."""
+    if len(text) < HUGE:
+        return program_of(text).source
+    return (await asyncio.to_thread(program_of, text)).source
 
 
 def unheard(_piece: str) -> None:

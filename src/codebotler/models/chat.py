@@ -28,11 +28,10 @@ from pydantic_ai.providers import Provider, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings
 
 from codebotler.badinput import BadInput
-from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, unheard
-from codebotler.models.faults import brief, broken_off, fault, late, refused
+from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
+from codebotler.models.faults import brief, broken_off, fault, late, refused, retry_after
 from codebotler.models.redaction import guard_logs, redacted
 from codebotler.prompts import Message, Prompt
-from codebotler.reply import program_of
 
 OWN_SERVER = "openai-chat"  # what servers of one's own speak
 VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")
@@ -92,7 +91,7 @@ class Chat:
         except Exception as error:  # noqa: BLE001 - libraries of many providers, each with errors of its own
             raise self._told(error) from None
         text = redacted(response.text or "")
-        program = program_of(text).source
+        program = await program_in(text)
         return Reply(text, program, _usage(response), time.monotonic() - start, response.finish_reason)
 
     async def close(self) -> None:
@@ -121,11 +120,12 @@ class Chat:
         if isinstance(error, exceptions.ModelTimeoutError | exceptions.ModelRequestTimeout):
             return late(self.name, self.settings.timeout)
         if isinstance(error, exceptions.ModelHTTPError):
+            peace = retry_after(error.headers or {})
             return refused(
                 self.name,
                 error.status_code,
                 error.body,
-                retry_after=error.retry_after,
+                retry_after=error.retry_after if peace is None else peace,
                 hopeless=isinstance(error, exceptions.ModelQuotaExceededError),
             )
         if isinstance(error, exceptions.ModelAPIError):

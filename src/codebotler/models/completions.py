@@ -11,11 +11,10 @@ import openai
 from openai.types import Completion
 
 from codebotler.badinput import BadInput
-from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
 from codebotler.models.faults import broken_off, fault, late, refused, retry_after
 from codebotler.models.redaction import guard_logs, redacted
 from codebotler.prompts import Prompt
-from codebotler.reply import program_of
 
 KEY = "OPENAI_API_KEY"
 NO_KEY = "none"  # servers of one's own ask for no key, but the client wants one
@@ -69,7 +68,7 @@ class Completions:
         if finish_reason is None:
             raise broken_off(self.name, begun=bool(text))
         text = redacted(text)
-        program = program_of(prompt.program_from(text)).source
+        program = await program_in(prompt.program_from(text))
         return Reply(text, program, usage, time.monotonic() - start, finish_reason)
 
     async def close(self) -> None:

@@ -15,12 +15,11 @@ import torch
 import transformers
 
 from codebotler.badinput import BadInput
-from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
 from codebotler.models.faults import brief, fault
 from codebotler.models.redaction import guard_logs
 from codebotler.prompts import Message, Prompt
 from codebotler.prompts.rendering import task_end
-from codebotler.reply import program_of
 
 BATCH = 32  # requests in one go, if so many wait
 GATHER = 0.01  # seconds in which requests that are made together come in
@@ -122,7 +121,7 @@ class Local:
         if self._worker is None or self._worker.done():
             self._worker = loop.create_task(self._work())
         text, usage, finish_reason = await job.reply
-        program = program_of(text if self.is_chat else prompt.program_from(text)).source
+        program = await program_in(text if self.is_chat else prompt.program_from(text))
         return Reply(text, program, usage, time.monotonic() - start, finish_reason)
 
     async def close(self) -> None:

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import SequenceMatcher
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated
 
@@ -83,8 +83,7 @@ class Recital:
         Raises:
             ModelError: nobody recorded the instruction; the sentence names the closest that were.
         """
-        known = {_words(instruction): instruction for instruction in self.recorded.replies}
-        instruction = known.get(_words(prompt.instruction))
+        instruction = self._known.get(_words(prompt.instruction))
         if instruction is None:
             raise ModelError(self._unknown(prompt.instruction), may_pass=False)
         program = self.recorded.reply(instruction, number).program
@@ -93,6 +92,10 @@ class Recital:
 
     async def close(self) -> None:
         """Nothing is held."""
+
+    @cached_property
+    def _known(self) -> Mapping[tuple[str, ...], str]:
+        return {_words(instruction): instruction for instruction in self.recorded.replies}
 
     def _unknown(self, instruction: str) -> str:
         closest = " or ".join(

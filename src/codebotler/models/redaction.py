@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import re
+from urllib.parse import quote
 
 SECRET = re.compile(r"key|token|secret|passw|credential", re.IGNORECASE)  # in the name of a variable
 SHORTEST = 8  # what is shorter is no key, and would be found everywhere
@@ -31,7 +33,8 @@ LOGGERS = (
 def redacted(text: str) -> str:
     """A text without the values of variables that hold keys, and without what has the shape of a key."""
     for secret in _secrets():
-        text = text.replace(secret, HIDDEN)
+        for spelling in (secret, json.dumps(secret)[1:-1], repr(secret)[1:-1], quote(secret, safe="")):
+            text = text.replace(spelling, HIDDEN)
     return SHAPED.sub(HIDDEN, text)
 
 

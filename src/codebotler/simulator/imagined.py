@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import blake2b
+from typing import TypeAlias
 
 from codebotler.simulator import robot as real
 from codebotler.simulator.robot import (
@@ -77,11 +78,13 @@ class Lot:
         seed: any whole number.
         sample: the number of this world among those of the same seed.
         strict: whether what the program never looked for is drawn, too; else it is as the program takes it.
+        lucky: whether who or what is looked for is there in seven of eight cases, instead of every second.
     """
 
     seed: int = 0
     sample: int = 0
     strict: bool = False
+    lucky: bool = False
 
     def draw(self, count: int, *fact: str) -> int:
         """One of the numbers from 0 to `count - 1` for a fact."""
@@ -89,20 +92,53 @@ class Lot:
         named = "".join(f"{len(text)}:{text}" for text in texts).encode(errors="surrogatepass")
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
 
+    def is_there(self, room: str, name: str) -> bool:
+        """Whether somebody or something is in a room, by chance."""
+        return self.draw(EIGHTS, "is there", room, name) < (EIGHTS - 1 if self.lucky else EIGHTS // 2)
+
+
+EIGHTS = 8
+
 
 @dataclass(frozen=True)
-class Draw:
-    """One drawing of lots.
+class Presence:
+    """What was drawn on whether somebody or something is in a room.
 
     Args:
-        count: how many there were.
-        fact: what was drawn for.
-        drawn: which one, from 0.
+        room: the room.
+        name: who or what, as `meant` names it.
+        drawn: whether it is there.
+    """
+
+    room: str
+    name: str
+    drawn: bool
+
+    def is_drawn_by(self, lot: Lot) -> bool:
+        """Whether the same would be drawn in another world."""
+        return lot.is_there(self.room, self.name) == self.drawn
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What was drawn for the answer to a question.
+
+    Args:
+        count: how many options there were.
+        fact: the question.
+        drawn: the position of the option that was chosen.
     """
 
     count: int
     fact: tuple[str, ...]
     drawn: int
+
+    def is_drawn_by(self, lot: Lot) -> bool:
+        """Whether the same would be drawn in another world."""
+        return lot.draw(self.count, *self.fact) == self.drawn
+
+
+Draw: TypeAlias = Presence | Answer
 
 
 @dataclass(frozen=True)
@@ -196,6 +232,15 @@ class ImaginedRobot(SimulatedRobot):
         self.hopes: defaultdict[str, Hope] = defaultdict(Hope)
         self.excuses: set[str] = set()
 
+    def hope(self, name: str) -> Hope:
+        """How often the program looked for somebody or something, also by a longer or a shorter name."""
+        found = Hope()
+        for looked, hope in self.hopes.items():
+            if looked == name or (SOMEBODY not in {looked, name} and (looked in name or name in looked)):
+                found.vain |= hope.vain
+                found.found |= hope.found
+        return found
+
     @contextmanager
     def excused(self, *, when: bool) -> Iterator[None]:
         """Remember what an error says that is owed to the lots and not to the program."""
@@ -213,27 +258,30 @@ class ImaginedRobot(SimulatedRobot):
 
     def is_here(self, name: str) -> bool | None:
         """Whether somebody or something is in this room, as `meant` names it; None if nothing says so yet."""
-        if name in self.scene.people or any(thing.is_meant_by(name) for thing in self.things[self.room]):
+        things = self.things[self.room] if name != SOMEBODY else []
+        if name in self.scene.people or any(thing.is_meant_by(name) for thing in things):
             return True
         return False if self.scene.lacks(name) else None
 
-    def draw(self, count: int, *fact: str) -> int:
-        """Draw for a fact, and remember it."""
-        drawn = self.lot.draw(count, *fact)
-        self.draws.append(Draw(count, fact, drawn))
-        return drawn
-
     def drawn(self, name: str) -> bool:
         """Draw whether somebody or something is in this room."""
-        return self.draw(2, "is here", self.room, name) == 1
+        here = self.lot.is_there(self.room, name)
+        self.draws.append(Presence(self.room, name, here))
+        return here
+
+    def answered(self, count: int, *question: str) -> int:
+        """Draw the answer to a question, by its position among so many."""
+        drawn = self.lot.draw(count, *question)
+        self.draws.append(Answer(count, question, drawn))
+        return drawn
 
     def settle(self, name: str, *, here: bool, by_lot: bool) -> None:
         """Let somebody or something be in this room or not, from now on."""
         if name == SOMEBODY:
-            who = SOMEBODY if here else "nobody"
-            self.facts.append(Fact(f'{who} is in "{self.room}"', by_lot))
+            told = f"{SOMEBODY} is" if here else "nobody is"
         else:
-            self.facts.append(Fact(f'"{brief(name)}" is {"" if here else "not "}in "{self.room}"', by_lot))
+            told = f'"{brief(name)}" is' if here else f'"{brief(name)}" is not'
+        self.facts.append(Fact(f'{told} in "{brief(self.room)}"', by_lot))
         if not here:
             self.scene.missed.add(name)
 
@@ -247,11 +295,10 @@ def meant(request: str) -> str:
 
 def drive(robot: ImaginedRobot, location: str) -> None:
     """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
+    robot.record("goto", location)
     room = robot.plan.room(location)
     if room is None:
-        real.go_to(robot, location)
-        return
-    robot.record("goto", location)
+        raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
     robot.room = room
 
 
@@ -281,14 +328,14 @@ def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option,
     """Ask somebody, who is there unless the program saw that they are not; they choose by chance."""
     who = meant(person)
     if not options or not _answers(robot, who):
-        lost = robot.hopes[who].is_lost or robot.hopes[SOMEBODY].is_lost
+        lost = robot.hope(who).is_lost or robot.hope(SOMEBODY).is_lost
         with robot.excused(when=bool(options) and lost):
             return real.ask(robot, person, question, options)
     robot.record("ask", question, options)
     asked = (robot.room, who, question.strip())
     texts = [option.text for option in options]
     if robot.told.get(asked) not in texts:
-        drawn = texts[robot.draw(len(texts), "answer", *asked)]
+        drawn = texts[robot.answered(len(texts), "answer", *asked)]
         robot.told[asked] = drawn
         robot.facts.append(Fact(f'the answer to "{brief(question)}" is "{brief(drawn)}"', by_lot=True))
     chosen = texts.index(robot.told[asked])
@@ -313,7 +360,7 @@ def pick(robot: ImaginedRobot, obj: str) -> None:
     name = meant(obj)
     if robot.held is None and robot.is_here(name) is None and _lies_there(robot, name):
         robot.things[robot.room].append(Thing(name, is_pattern=False))
-    hope = robot.hopes[name]
+    hope = robot.hope(name)
     again = robot.held is not None and meant(robot.held) == name and len(hope.found) > 1
     with robot.excused(when=again or hope.is_lost):
         real.pick(robot, obj)
@@ -330,7 +377,7 @@ def _lies_there(robot: ImaginedRobot, name: str) -> bool:
 
 def place(robot: ImaginedRobot, obj: str) -> None:
     """Put down what the robot holds, which must be named exactly as it was picked up."""
-    with robot.excused(when=robot.held is None and robot.hopes[meant(obj)].is_lost):
+    with robot.excused(when=robot.held is None and robot.hope(meant(obj)).is_lost):
         real.place(robot, obj)
 
 

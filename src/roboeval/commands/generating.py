@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from contextlib import ExitStack
-from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Self
 
@@ -228,7 +227,6 @@ def requests(count: int) -> str:
 
 
 def state(progress: Progress) -> str:
-    """How fast a run grows, with how many tokens so far, and how long the rest takes."""
+    """How fast a run grows, and with how many tokens so far."""
     tokens = f"{progress.used.total:,} tokens" if progress.used.total else ""
-    left = f"{timedelta(seconds=round(progress.seconds_left))} left"
-    return ", ".join(filter(None, (f"{progress.rate:.1f} a second", tokens, left)))
+    return ", ".join(filter(None, (f"{progress.rate:.1f} a second", tokens)))

@@ -37,26 +37,29 @@ def resample(
     """What asking again for programs that a check rejects would have given, from a judged run."""
     from codebotler.badinput import BadInput
     from roboeval.checks import Checks
-    from roboeval.resampling import LIMITS, by_prompt, curve_data, render
+    from roboeval.resampling import LIMITS, Trial, by_prompt, curve_data, ran, render
     from roboeval.run import Run
+    from roboeval.tables import key_of
 
     judged_by = load(suite)
     evaluation = open_evaluation(run, judged_by, suite, ablated=False)
-    rows = list(watched(evaluation.rows(), "reading", evaluation.scope.total))
+    rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
+    ended = {key_of(row): (ran(row), bool(row["passed"])) for row in rows}
     again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite)
     if (complaint := evaluation.complaint()) is not None:
         raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
-    if not rows:
+    if not ended:
         raise BadInput(f"no completion has been judged; `{again}` goes on", file=run)
     if (unfinished := evaluation.unfinished()) is not None:
         note(f"{unfinished}, and only these count; `{again}` goes on")
-    programs = {c.key: (c.task, c.program_sha256) for c in evaluation.judged()}
+    programs = {c.key: (c.task, c.program_sha256) for c in evaluation.judged() if c.key in ended}
     checks = Checks(Run(run), judged_by, samples=samples, seed=seed)
-    wanted = (c for c in evaluation.judged() if evaluation.scope.selects(c.task))
-    for _ in watched(checks.add(wanted, workers=workers or cores()), "checking", len(set(programs.values()))):
+    checked = checks.add((c for c in evaluation.judged() if c.key in ended), workers=workers or cores())
+    for _ in watched(checked, "checking", len(set(programs.values()))):
         pass
-    accepted = [not checks.problems[programs[row["task"], row["prompt"], row["index"]]] for row in rows]
-    prompts = by_prompt(rows, accepted)
+    prompts = by_prompt(
+        (key, Trial(not checks.problems[programs[key]], *outcome)) for key, outcome in ended.items()
+    )
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
         print_json({"suite": judged_by.name, "samples": samples, "seed": seed, **curve_data(prompts, limits)})

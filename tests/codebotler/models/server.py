@@ -8,6 +8,7 @@ import contextlib
 import json
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
@@ -68,11 +69,13 @@ class Request:
         path: below the base URL, such as `/chat/completions`.
         headers: with names in lower case.
         body: the parsed JSON.
+        at: when it came, in seconds of a clock that only goes on.
     """
 
     path: str
     headers: dict[str, str]
     body: dict[str, Any]
+    at: float = field(default_factory=time.monotonic)
 
     @property
     def is_chat(self) -> bool:
@@ -94,12 +97,16 @@ class Server:
         fault: how it misbehaves at a request, which is asked where `faults` are used up.
         retry_after: what `Retry-After` says, in seconds.
         delay: how many seconds it is slow.
+        pause: how many seconds it takes for any reply.
+        counts: whether it says how many tokens it used.
     """
 
     answer: Callable[[Request], str] = program
     fault: Callable[[Request], Fault | None] = lambda _request: None
-    retry_after: float = 1
+    retry_after: float | str = 1
     delay: float = 30.0
+    pause: float = 0.0
+    counts: bool = True
     faults: deque[Fault | None] = field(default_factory=deque)
     """How it misbehaves at the next requests."""
     requests: list[Request] = field(default_factory=list)
@@ -183,8 +190,7 @@ class _Answer:
             return self._refused(*REFUSALS[self.fault])
         if self.fault in BODIES:
             return self._body(200, *BODIES[self.fault])
-        if self.fault is Fault.SLOW:
-            await asyncio.sleep(self.server.delay)
+        await asyncio.sleep(self.server.delay if self.fault is Fault.SLOW else self.server.pause)
         if self.request.body.get("stream"):
             return await self._streamed()
         whole = json.dumps(self._object(self._text(), "stop") | {"usage": self._usage()}).encode()
@@ -244,7 +250,7 @@ class _Answer:
                         await asyncio.sleep(self.server.delay)
             yield json.dumps(self._object(piece, None))
         yield json.dumps(self._object("", "stop"))
-        if self.request.body.get("stream_options", {}).get("include_usage"):
+        if self.server.counts and self.request.body.get("stream_options", {}).get("include_usage"):
             yield json.dumps(self._object("", None) | {"choices": [], "usage": self._usage()})
         yield "[DONE]"
 

@@ -185,14 +185,15 @@ def test_draws_follow_the_temperature_and_the_share() -> None:
 
     scores = torch.tensor([[0.5, 0.3, 0.15, 0.05]]).log().repeat(4000, 1)
     dice = [_generator(number, "cpu") for number in range(4000)]
-    for temperature, top_p, expected in [
+    cases: list[tuple[float, float, list[float]]] = [
         (1.0, 1.0, [0.5, 0.3, 0.15, 0.05]),
         (1.0, 0.7, [0.625, 0.375, 0, 0]),
         (1.0, 0.4, [1, 0, 0, 0]),
         (0.5, 1.0, [0.25 / 0.365, 0.09 / 0.365, 0.0225 / 0.365, 0.0025 / 0.365]),
         (0.0, 1.0, [1, 0, 0, 0]),
-    ]:
-        drawn = _Draw(temperature, top_p, dice)(None, scores.clone())
+    ]
+    for temperature, top_p, expected in cases:
+        drawn: Any = _Draw(temperature, top_p, dice)(None, scores.clone())
         assert bool(((drawn == 0).sum(dim=-1) == 1).all())
         assert bool((drawn.isinf().sum(dim=-1) == 3).all())
         shares = (drawn == 0).float().mean(dim=0).tolist()

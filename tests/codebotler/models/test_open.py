@@ -1,0 +1,90 @@
+import asyncio
+import subprocess
+import sys
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.models.base import Settings
+from codebotler.models.open import open_model
+
+KNOWN = "name one that pydantic-ai knows, such as openai-chat, anthropic or google"
+COMMAND = 'pip install "pydantic-ai-slim[groq]"'
+URL = "http://127.0.0.1:9/v1"
+
+
+@pytest.fixture(autouse=True)
+def _without_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (
+        "OPENAI_API_KEY",
+        "OPENAI_BASE_URL",
+        "ANTHROPIC_API_KEY",
+        "GOOGLE_API_KEY",
+        "GEMINI_API_KEY",
+    ):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.mark.parametrize(
+    ("name", "url", "sentence"),
+    [
+        ("openai-chat:m", None, "openai-chat:m needs OPENAI_API_KEY in the environment"),
+        ("openai:m", None, "openai:m needs OPENAI_API_KEY in the environment"),
+        ("anthropic:m", None, "anthropic:m needs ANTHROPIC_API_KEY in the environment"),
+        ("google:m", None, "google:m needs GOOGLE_API_KEY in the environment"),
+        ("openay-chat:m", None, 'there is no provider "openay-chat"; is "openai-chat" meant?'),
+        (
+            "nobody:m",
+            None,
+            f'there is no provider "nobody"; {KNOWN}',
+        ),
+        (
+            "groq:m",
+            None,
+            f"groq:m needs a library that is not installed; install it with: {COMMAND}",
+        ),
+        (
+            "deepseek:m",
+            URL,
+            'the provider "deepseek" takes no base URL; for a server of your own name openai-chat:MODEL',
+        ),
+        (
+            "completions:m",
+            None,
+            "completions:m needs --base-url, or OPENAI_API_KEY in the environment for OpenAI's own",
+        ),
+    ],
+)
+def test_what_is_missing_is_told_in_a_sentence(name: str, url: str | None, sentence: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        open_model(name, Settings(base_url=url))
+    assert str(caught.value) == sentence
+
+
+def test_missing_extra_is_told_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "torch", None)
+    monkeypatch.delitem(sys.modules, "codebotler.models.local", raising=False)
+    with pytest.raises(BadInput) as caught:
+        open_model("hf:some/model", Settings())
+    needs, command = "hf:some/model needs torch and transformers", 'pip install "codebotler[transformers]"'
+    assert str(caught.value) == f"{needs}; install them with: {command}"
+
+
+@pytest.mark.parametrize("name", ["openai-chat:m", "vllm:m", "ollama:m", "completions:m", "anthropic:m"])
+def test_models_are_named_as_they_were_asked_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-ant-0123456789")
+    model = open_model(name, Settings(base_url=URL))
+    assert model.name == name
+    asyncio.run(model.close())
+
+
+def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
+    source = (
+        "import sys\n"
+        "from codebotler.models.open import open_model\n"
+        "from codebotler.models.base import Settings\n"
+        "open_model('recorded', Settings())\n"
+        "print(*sys.modules)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
+    assert not {"openai", "pydantic_ai", "torch", "transformers", "tenacity"} & {*done.stdout.split()}

@@ -1,0 +1,276 @@
+"""Limits and further tries, against a real server."""
+
+import asyncio
+import random
+from collections import Counter
+from collections.abc import Awaitable, Callable, Iterator
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.models.base import BudgetSpentError, ModelError, Reply, Settings, Usage
+from codebotler.models.open import open_model
+from codebotler.models.paced import Paced
+from codebotler.prompts import prompt_for
+from server import Fault, Request, Server
+
+T = TypeVar("T")
+PROMPT = prompt_for("Go to the lobby.")
+CHAT, BASE = "openai-chat:m", "completions:m"
+both = pytest.mark.parametrize("name", [CHAT, BASE])
+
+
+@pytest.fixture
+def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    with Server() as served:
+        yield served
+
+
+def use(
+    server: Server,
+    work: Callable[[Paced], Awaitable[T]],
+    *,
+    name: str = BASE,
+    timeout: float = 30,
+    **limits: Any,  # noqa: ANN401
+) -> tuple[Paced, T]:
+    async def used() -> tuple[Paced, T]:
+        model = open_model(name, Settings(base_url=server.url, seed=0, timeout=timeout))
+        paced = Paced(model, first_wait=0.01, **limits)
+        assert paced.name == name
+        try:
+            return paced, await work(paced)
+        finally:
+            await paced.close()
+
+    return asyncio.run(used())
+
+
+async def one(paced: Paced) -> Reply:
+    return await paced.reply(PROMPT, number=0)
+
+
+def many(count: int) -> Callable[[Paced], Awaitable[list[Reply]]]:
+    async def ask(paced: Paced) -> list[Reply]:
+        return await asyncio.gather(*(paced.reply(PROMPT, number=number) for number in range(count)))
+
+    return ask
+
+
+PASSING = [
+    Fault.TOO_MANY,
+    Fault.SERVER_ERROR,
+    Fault.SLOW,
+    Fault.STALLED,
+    Fault.HUNG_UP,
+    Fault.CUT,
+    Fault.CUT_IN_ORDER,
+    Fault.ERROR_IN_STREAM,
+    Fault.INVALID_JSON,
+    Fault.NOTHING,
+    Fault.WRONG_TYPE,
+]
+
+
+@both
+@pytest.mark.parametrize("fault", PASSING, ids=lambda fault: fault.name)
+def test_what_may_pass_is_tried_again(name: str, server: Server, fault: Fault) -> None:
+    server.faults.extend([fault, fault])
+    paced, reply = use(server, one, name=name, timeout=1 if fault in {Fault.SLOW, Fault.STALLED} else 30)
+    assert "reply 0" in reply.program
+    assert (paced.requests, paced.retried) == (3, 2)
+    assert len(server.requests) == 3
+
+
+@both
+@pytest.mark.parametrize(
+    "fault",
+    [Fault.UNAUTHORIZED, Fault.NOT_FOUND, Fault.NO_MONEY, Fault.TOO_LONG],
+    ids=lambda fault: fault.name,
+)
+def test_what_does_not_pass_is_not(name: str, server: Server, fault: Fault) -> None:
+    server.faults.append(fault)
+    with pytest.raises(ModelError) as caught:
+        use(server, one, name=name)
+    assert "tried" not in caught.value.sentence
+    assert len(server.requests) == 1
+
+
+@both
+@pytest.mark.parametrize("fault", [Fault.EMPTY, Fault.WITHOUT_CODE], ids=lambda fault: fault.name)
+def test_reply_without_a_program_is_the_models_fault_and_not_asked_for_again(
+    name: str, server: Server, fault: Fault
+) -> None:
+    server.faults.append(fault)
+    paced, _ = use(server, one, name=name)
+    assert (paced.requests, paced.retried, len(server.requests)) == (1, 0, 1)
+
+
+def test_tries_come_to_an_end(server: Server) -> None:
+    server.fault = lambda _request: Fault.SERVER_ERROR
+    with pytest.raises(ModelError) as caught:
+        use(server, one, retries=2)
+    assert caught.value.sentence.endswith("(tried 3 times)")
+    assert caught.value.may_pass
+    assert len(server.requests) == 3
+
+
+def test_waits_grow(server: Server) -> None:
+    server.faults.extend([Fault.SERVER_ERROR] * 5)
+    use(server, one)
+    starts = [request.at for request in server.requests]
+    waits = [later - earlier for earlier, later in pairwise(starts)]
+    assert len(waits) == 5
+    for exponent, wait in enumerate(waits):
+        assert wait >= 0.01 * 2**exponent
+
+
+@both
+def test_who_asks_for_peace_gets_it_from_all_requests(name: str, server: Server) -> None:
+    server.faults.append(Fault.TOO_MANY_FOR_A_WHILE)
+    server.retry_after = 1
+
+    async def ask(paced: Paced) -> None:
+        first = asyncio.create_task(paced.reply(PROMPT, number=0))
+        while not paced.retried:  # noqa: ASYNC110 - a counter, which tells nobody
+            await asyncio.sleep(0.005)
+        await asyncio.gather(first, *(paced.reply(PROMPT, number=number) for number in range(3)))
+
+    use(server, ask, name=name)
+    refused, *later = server.requests
+    assert len(later) == 4
+    assert all(0.98 < request.at - refused.at < 10 for request in later)
+
+
+def test_who_asks_for_peace_for_too_long_is_not_waited_for(server: Server) -> None:
+    server.faults.append(Fault.TOO_MANY_FOR_A_WHILE)
+    server.retry_after = 3600
+    with pytest.raises(ModelError) as caught:
+        use(server, one)
+    assert caught.value.retry_after == 3600
+
+
+def test_no_more_requests_are_under_way_than_allowed(server: Server) -> None:
+    server.pause = 0.1
+    _, replies = use(server, many(12), concurrency=3)
+    assert len(replies) == 12
+    assert server.most_open == 3
+
+
+def test_requests_are_spread_over_the_minute_tries_included(server: Server) -> None:
+    server.faults.extend([None, Fault.SERVER_ERROR])
+    paced, _ = use(server, many(5), requests_per_minute=1200)
+    assert paced.requests == 6
+    starts = [request.at for request in server.requests]
+    assert starts[-1] - starts[0] > 4 * 0.05
+
+
+def test_counters_add_up(server: Server) -> None:
+    paced, replies = use(server, many(5))
+    assert (paced.requests, paced.retried) == (5, 0)
+    assert paced.usage == Usage(
+        sum(reply.usage.input_tokens or 0 for reply in replies),
+        sum(reply.usage.output_tokens or 0 for reply in replies),
+    )
+    assert paced.spent == paced.usage.total
+
+
+def spend(paced: Paced) -> Awaitable[tuple[int, BudgetSpentError]]:
+    async def spending() -> tuple[int, BudgetSpentError]:
+        for number in range(100):
+            try:
+                await paced.reply(PROMPT, number=number)
+            except BudgetSpentError as error:
+                return number, error
+        raise AssertionError("the budget is without end")
+
+    return spending()
+
+
+@both
+def test_spent_budget_stops_before_a_request(name: str, server: Server) -> None:
+    paced, (replies, error) = use(server, spend, name=name, token_budget=5_000)
+    each = paced.spent // replies
+    assert replies == -(-5_000 // each)
+    assert (error.budget, error.used) == (5_000, paced.spent)
+    assert error.sentence == f"the token budget of 5,000 is spent: {paced.spent:,} tokens are used"
+    assert len(server.requests) == paced.requests == replies
+
+
+@both
+def test_budget_holds_where_nobody_counts_tokens(name: str, server: Server) -> None:
+    server.counts = False
+    paced, (replies, _) = use(server, spend, name=name, token_budget=5_000)
+    assert 2 <= replies <= 6
+    assert paced.usage == Usage(None, None)
+    assert paced.spent >= 5_000
+
+
+def test_reply_that_breaks_off_counts_against_the_budget(server: Server) -> None:
+    server.fault = lambda _request: Fault.CUT
+    with pytest.raises(BudgetSpentError):
+        use(server, one, token_budget=100)
+    assert len(server.requests) == 1
+
+
+def test_requests_that_wait_find_the_budget_spent(server: Server) -> None:
+    async def ask(paced: Paced) -> list[Any]:
+        asked = (paced.reply(PROMPT, number=number) for number in range(6))
+        return await asyncio.gather(*asked, return_exceptions=True)
+
+    _, ends = use(server, ask, token_budget=10, concurrency=2)
+    assert [type(end) for end in ends] == [Reply] * 2 + [BudgetSpentError] * 4
+    assert len(server.requests) == 2
+
+
+def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
+    async def ask(paced: Paced) -> Reply:
+        server.faults.extend([Fault.SLOW, Fault.SERVER_ERROR, Fault.SLOW])
+        tasks = [asyncio.create_task(paced.reply(PROMPT, number=number)) for number in range(6)]
+        while len(server.requests) < 4:  # noqa: ASYNC110 - it counts in another thread
+            await asyncio.sleep(0.005)
+        for task in tasks:
+            task.cancel()
+        ends = await asyncio.wait_for(asyncio.gather(*tasks, return_exceptions=True), 5)
+        assert sum(isinstance(end, asyncio.CancelledError) for end in ends) >= 2
+        assert asyncio.all_tasks() == {asyncio.current_task()}
+        return await paced.reply(PROMPT, number=0)
+
+    server.pause = 0.2
+    _, reply = use(server, ask, concurrency=3, requests_per_minute=6000)
+    assert "reply 0" in reply.program
+
+
+@both
+def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -> None:
+    dice = random.Random(1)
+    bad = [fault for fault in PASSING if fault not in {Fault.SLOW, Fault.STALLED}]
+
+    def fault(_request: Request) -> Fault | None:
+        return dice.choice(bad) if dice.random() < 0.2 else None
+
+    server.fault = fault
+    paced, replies = use(server, many(100), name=name)
+    assert [f'say("reply {number}")' in reply.program for number, reply in enumerate(replies)] == [True] * 100
+    assert len(server.requests) == paced.requests == 100 + paced.retried
+    assert paced.retried > 5
+    asked = Counter(request.body["seed"] for request in server.requests)
+    assert set(asked) == set(range(100))
+
+
+@pytest.mark.parametrize(
+    ("limits", "sentence"),
+    [
+        ({"concurrency": 0}, "the concurrency is 0, but it must be at least 1"),
+        ({"requests_per_minute": 0.0}, "the requests a minute are 0, but must be above 0"),
+        ({"retries": -1}, "the retries are -1, but must be at least 0"),
+        ({"token_budget": 0}, "the token budget is 0, but it must be at least 1"),
+    ],
+)
+def test_limits_out_of_range_are_told(limits: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        Paced(open_model("recorded", Settings()), **limits)
+    assert str(caught.value) == sentence

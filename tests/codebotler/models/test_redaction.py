@@ -1,0 +1,167 @@
+"""Keys come from the environment, and go to the server and nowhere else."""
+
+import io
+import json
+import logging
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+
+from codebotler.models.redaction import HIDDEN, SHORTEST, guard_logs, redacted
+from server import Fault, Server
+
+KEY = "sk-Fake0123456789abcdefGHIJ"
+ODD = 'Fake/odd+key="0123456789"&x'  # nothing of it has the shape of a key
+RUN = """
+import asyncio, dataclasses, json, logging, sys, traceback
+from pathlib import Path
+
+logging.basicConfig(level=logging.DEBUG, stream=sys.stderr)
+logging.getLogger().addHandler(logging.FileHandler("log.txt"))
+
+from codebotler.models.base import ModelError, Settings
+from codebotler.models.open import open_model
+from codebotler.models.paced import Paced
+from codebotler.prompts import prompt_for
+
+async def main(url):
+    with Path("completions.jsonl").open("w") as rows:
+        for name in ("openai:m", "completions:m", "vllm:m"):
+            settings = Settings(base_url=url)
+            model = Paced(open_model(name, settings), first_wait=0.01)
+            print(model, repr(model.model), settings)
+            for number in range(4):
+                try:
+                    reply = await model.reply(prompt_for("Go to the lobby."), number=number)
+                except ModelError as error:
+                    print(repr(error), error, vars(error), file=sys.stderr)
+                    traceback.print_exc()
+                    logging.exception("no reply")
+                    rows.write(json.dumps({"error": error.sentence}) + "\\n")
+                else:
+                    rows.write(json.dumps(dataclasses.asdict(reply)) + "\\n")
+            await model.close()
+
+asyncio.run(main(sys.argv[1]), debug=True)
+"""
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    with Server() as served:
+        yield served
+
+
+@pytest.mark.parametrize("key", [KEY, ODD])
+def test_key_of_a_run_is_in_nothing_that_is_printed_logged_or_written(
+    tmp_path: Path, server: Server, key: str
+) -> None:
+    server.faults.extend([Fault.UNAUTHORIZED, None, Fault.SERVER_ERROR, None, Fault.CUT, None] * 3)
+    server.answer = lambda request: f"    say('{request.headers['authorization']}')\n"
+    environment = {**os.environ, "OPENAI_API_KEY": key, "VLLM_API_KEY": key, "OPENAI_LOG": "debug"}
+    done = subprocess.run(
+        [sys.executable, "-c", RUN, server.url],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    sent = {request.headers["authorization"] for request in server.requests}
+    assert sent == {f"Bearer {key}"}  # the server had it, and sent it back with every answer
+    everything = {path.name: path.read_text() for path in tmp_path.rglob("*") if path.is_file()}
+    rows = [json.loads(line) for line in everything["completions.jsonl"].splitlines()]
+    everything |= {"output": done.stdout, "errors": done.stderr}
+    assert len(rows) == 12
+    for where, text in everything.items():
+        assert key not in text, where
+        assert json.dumps(key)[1:-1] not in text, where
+        assert repr(key)[1:-1] not in text, where
+        assert (HIDDEN in text) == (where != "output"), where
+    assert "status 401" in done.stderr
+    assert "x-echo" in everything["log.txt"].lower()
+
+
+def test_values_of_all_variables_that_hold_keys_are_removed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (
+        "ANTHROPIC_API_KEY",
+        "HF_TOKEN",
+        "my_secret",
+        "DB_PASSWORD",
+        "GOOGLE_APPLICATION_CREDENTIALS",
+    ):
+        monkeypatch.setenv(name, f"value-of-{name}")
+        assert redacted(f"a value-of-{name} b") == f"a {HIDDEN} b"
+    monkeypatch.setenv("HARMLESS", "value-of-it")
+    assert redacted("a value-of-it b") == "a value-of-it b"
+
+
+def test_key_within_another_one_leaves_no_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("A_KEY", "abcdefgh")
+    monkeypatch.setenv("B_KEY", "abcdefgh-ijklmnop")
+    assert redacted("it is abcdefgh-ijklmnop.") == f"it is {HIDDEN}."
+
+
+@pytest.mark.parametrize("spelling", [ODD, json.dumps(ODD)[1:-1], repr(f"'{ODD}")[3:-1], quote(ODD, safe="")])
+def test_key_is_removed_however_it_is_spelt(monkeypatch: pytest.MonkeyPatch, spelling: str) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", ODD)
+    assert redacted(f"a {spelling} b") == f"a {HIDDEN} b"
+
+
+def test_short_values_are_no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KEYBOARD", "de"[:SHORTEST])
+    monkeypatch.setenv("EMPTY_KEY", "")
+    assert redacted("decide") == "decide"
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "sk-abcdefghijkl",
+        "sk-proj-ab_cd-efgh1234",
+        "sk-ab*******wxyz",
+        "hf_abcdefghijklm",
+        "AIzaSyA" + "b" * 30,
+    ],
+)
+def test_what_has_the_shape_of_a_key_is_removed_wherever_it_comes_from(key: str) -> None:
+    assert redacted(f"Incorrect API key provided: {key}, sorry") == (
+        f"Incorrect API key provided: {HIDDEN}, sorry"
+    )
+
+
+@pytest.mark.parametrize(
+    "text", ["say('sk-8')", "risk-averse people", "pick('hf_x')", "task-program", "a desk-lamp-with-shade"]
+)
+def test_words_of_programs_have_no_shape_of_a_key(text: str) -> None:
+    assert redacted(text) == text
+
+
+def test_logs_of_clients_keep_all_but_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    stream = io.StringIO()
+    handler = logging.StreamHandler(stream)
+    logger = logging.getLogger("httpcore2.test")
+    logger.addHandler(handler)
+    logger.setLevel(logging.DEBUG)
+    try:
+        guard_logs()
+        logger.debug("headers %r of %s", [("Authorization", KEY)], "it")
+        try:
+            float(KEY)
+        except ValueError:
+            logger.exception("failed")
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(logging.NOTSET)
+    text = stream.getvalue()
+    assert f"headers [('Authorization', '{HIDDEN}')] of it\n" in text
+    assert f"ValueError: could not convert string to float: '{HIDDEN}'" in text
+    assert KEY not in text

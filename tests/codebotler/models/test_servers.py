@@ -1,0 +1,244 @@
+"""Chat and text completions, each against a real server that does what servers do."""
+
+import asyncio
+import socket
+from collections.abc import Coroutine, Iterator
+from typing import Any, TypeVar
+
+import openai
+import pytest
+
+from codebotler.models.base import Model, ModelError, Reply, Settings, Usage
+from codebotler.models.open import open_model
+from codebotler.prompts import Message, Prompt, prompt_for
+from server import CHUNK, HUGE, TASK, Fault, Server
+
+T = TypeVar("T")
+PROMPT = prompt_for("Go to the lobby.")
+PROGRAM = '    go_to("lobby")\n    say("reply 7")\n'
+CHAT, BASE = "openai-chat:some/model", "completions:some/model"
+both = pytest.mark.parametrize("name", [CHAT, BASE])
+
+
+@pytest.fixture
+def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    with Server() as served:
+        yield served
+
+
+def ask(name: str, server: Server, prompt: Prompt = PROMPT, **settings: Any) -> tuple[Reply, list[str]]:  # noqa: ANN401
+    """One reply from an own server, and what was heard of it."""
+    heard: list[str] = []
+
+    async def asked(model: Model) -> Reply:
+        try:
+            return await model.reply(prompt, number=4, heard=heard.append)
+        finally:
+            await model.close()
+
+    return asyncio.run(asked(open_model(name, Settings(base_url=server.url, seed=3, **settings)))), heard
+
+
+@both
+def test_reply_is_streamed_and_holds_the_program(name: str, server: Server) -> None:
+    reply, heard = ask(name, server)
+    assert len(heard) > 1
+    assert "".join(heard) == reply.text
+    assert reply.program == TASK + PROGRAM
+    (request,) = server.requests
+    if name == CHAT:
+        assert reply.text == f"Here it is.\n\n```python\n{TASK}{PROGRAM}```\n"
+        assert request.path == "/chat/completions"
+    else:
+        assert reply.text == PROGRAM
+        assert request.path == "/completions"
+    assert reply.finish_reason == "stop"
+    assert reply.usage.output_tokens == len(reply.text) // 4
+    assert (reply.usage.input_tokens or 0) > 500
+    assert reply.usage.total == (reply.usage.input_tokens or 0) + len(reply.text) // 4
+    assert 0 < reply.latency_s < 30
+
+
+@both
+def test_server_is_told_the_settings(name: str, server: Server) -> None:
+    ask(name, server, temperature=0.7, top_p=0.9, max_tokens=99)
+    body = server.requests[0].body
+    limit = body.get("max_tokens") or body.get("max_completion_tokens")
+    assert (body["model"], body["stream"], limit) == ("some/model", True, 99)
+    assert (body["temperature"], body["top_p"], body["seed"]) == (0.7, 0.9, 7)
+
+
+@both
+def test_settings_that_are_none_are_left_to_the_server(name: str, server: Server) -> None:
+    async def asked() -> Reply:
+        settings = Settings(base_url=server.url, temperature=None, top_p=None)
+        model = open_model(name, settings)
+        reply = await model.reply(PROMPT, number=4)
+        await model.close()
+        return reply
+
+    asyncio.run(asked())
+    assert not {"temperature", "top_p", "seed"} & set(server.requests[0].body)
+
+
+def test_chat_is_sent_as_messages(server: Server) -> None:
+    prompt = PROMPT.after("def task_program():\n    pass\n", ["it does nothing"])
+    ask(CHAT, server, prompt)
+    sent = [Message(m["role"], m["content"]) for m in server.requests[0].body["messages"]]
+    assert tuple(sent) == prompt.messages
+
+
+def test_text_is_sent_with_what_stops_it(server: Server) -> None:
+    ask(BASE, server)
+    body = server.requests[0].body
+    assert body["prompt"] == PROMPT.text
+    assert tuple(body["stop"]) == PROMPT.stop
+
+
+def test_server_that_does_not_stop_is_cut_at_the_functions_end(server: Server) -> None:
+    server.answer = lambda _request: PROGRAM + "\n\n# Instruction: Go home.\n" + TASK + "    pass\n"
+    reply, _ = ask(BASE, server)
+    assert reply.program == TASK + PROGRAM
+
+
+def test_openai_is_chat_completions_where_a_base_url_is_given(server: Server) -> None:
+    model = open_model("openai:m", Settings(base_url=server.url))
+    assert model.name == "openai-chat:m"
+    reply, _ = ask("openai:m", server)
+    assert reply.program == TASK + PROGRAM
+    assert server.requests[0].path == "/chat/completions"
+    asyncio.run(model.close())
+
+
+PASSING = {
+    Fault.TOO_MANY: "the server answered with status 429 (Too many requests)",
+    Fault.SERVER_ERROR: "the server answered with status 500 (Something went wrong)",
+    Fault.HUNG_UP: "Connection error (Server disconnected without sending a response)",
+    Fault.CUT: "Connection error (peer closed connection without sending complete message body",
+    Fault.CUT_IN_ORDER: "the reply broke off before its end",
+    Fault.ERROR_IN_STREAM: "The engine died",
+    Fault.INVALID_JSON: "Unterminated string starting at",
+    Fault.NOTHING: "the server sent nothing that is a reply; is the base URL right?",
+    Fault.WRONG_TYPE: "the server sent nothing that is a reply; is the base URL right?",
+}
+LASTING = {
+    Fault.UNAUTHORIZED: "the server answered with status 401 (Incorrect API key provided",
+    Fault.NOT_FOUND: "the server answered with status 404 (The model does not exist); are the model's name",
+    Fault.TOO_LONG: "the server answered with status 400 (The maximum context length is 2048 tokens)",
+    Fault.NO_MONEY: "the server answered with status 429 (You exceeded your current quota)",
+}
+
+
+@both
+@pytest.mark.parametrize("fault", [*PASSING, *LASTING], ids=lambda fault: fault.name)
+def test_failure_is_told_in_a_sentence_with_whether_it_may_pass(
+    name: str, server: Server, fault: Fault
+) -> None:
+    server.faults.append(fault)
+    with pytest.raises(ModelError) as caught:
+        ask(name, server)
+    error = caught.value
+    assert error.sentence.startswith(f"{name}: ")
+    assert (PASSING | LASTING)[fault] in error.sentence
+    assert "\n" not in error.sentence
+    assert error.may_pass == (fault in PASSING)
+    assert error.retry_after is None
+    assert len(server.requests) == 1  # the client itself tries nothing again
+
+
+@both
+@pytest.mark.parametrize(
+    ("said", "seconds"),
+    [("2.5", 2.5), ("7", 7), ("-1", 0), ("soon", None), ("Wed, 21 Oct 2015 07:28:00 GMT", 0), ("nan", None)],
+)
+def test_server_may_ask_for_peace(name: str, server: Server, said: str, seconds: float | None) -> None:
+    server.faults.append(Fault.TOO_MANY_FOR_A_WHILE)
+    server.retry_after = said
+    with pytest.raises(ModelError) as caught:
+        ask(name, server)
+    assert caught.value.may_pass
+    assert caught.value.retry_after == seconds
+
+
+@both
+@pytest.mark.parametrize("fault", [Fault.SLOW, Fault.STALLED], ids=lambda fault: fault.name)
+def test_reply_that_takes_too_long_is_given_up(name: str, server: Server, fault: Fault) -> None:
+    server.faults.append(fault)
+    with pytest.raises(ModelError) as caught:
+        ask(name, server, timeout=0.3)
+    assert caught.value.sentence == f"{name}: no whole reply came within 0.3 s"
+    assert caught.value.may_pass
+
+
+@both
+def test_server_that_is_not_there_is_told(name: str, server: Server) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        server.url = f"http://127.0.0.1:{taken.getsockname()[1]}/v1"
+        with pytest.raises(ModelError, match=r"Connection error \(.*attempts failed|refused") as caught:
+            ask(name, server)
+    assert caught.value.may_pass
+
+
+@both
+def test_reply_without_text_or_code_is_a_reply(name: str, server: Server) -> None:
+    server.faults.extend([Fault.EMPTY, Fault.WITHOUT_CODE])
+    reply, heard = ask(name, server)
+    assert (reply.text, heard, reply.finish_reason) == ("", [], "stop")
+    assert reply.usage == Usage(reply.usage.input_tokens, 0)
+    reply, _ = ask(name, server)
+    assert reply.text == "I am afraid that I cannot help with that."
+
+
+@both
+def test_huge_reply_is_a_reply(name: str, server: Server) -> None:
+    server.faults.append(Fault.HUGE)
+    reply, heard = ask(name, server)
+    assert len(reply.text) == HUGE
+    assert "".join(heard) == reply.text
+    assert len(heard) > HUGE // (CHUNK * 1000)
+
+
+@both
+def test_server_that_does_not_count_tokens_leaves_them_unknown(name: str, server: Server) -> None:
+    server.counts = False
+    reply, _ = ask(name, server)
+    assert reply.usage == Usage(None, None)
+
+
+@both
+def test_given_up_request_ends_at_once_and_the_next_one_is_answered(name: str, server: Server) -> None:
+    async def asked() -> Reply:
+        model = open_model(name, Settings(base_url=server.url, seed=7))
+        begun = asyncio.Event()
+        server.faults.append(Fault.STALLED)
+        task = asyncio.create_task(model.reply(PROMPT, number=0, heard=lambda _piece: begun.set()))
+        await begun.wait()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await asyncio.wait_for(task, 5)
+        reply = await model.reply(PROMPT, number=0)
+        await model.close()
+        return reply
+
+    assert asyncio.run(asked()).program == TASK + PROGRAM
+
+
+def run(work: Coroutine[Any, Any, T]) -> T:
+    return asyncio.run(work)
+
+
+def test_server_speaks_both_protocols_without_streaming_too(server: Server) -> None:
+    async def asked() -> tuple[str | None, str]:
+        async with openai.AsyncOpenAI(api_key="a", base_url=server.url, max_retries=0) as client:
+            chat = await client.chat.completions.create(model="m", messages=[], seed=7)
+            text = await client.completions.create(model="m", prompt="", seed=7)
+            server.faults.append(Fault.INVALID_JSON)
+            with pytest.raises(ValueError, match=r"Unterminated|Expecting"):
+                await client.completions.create(model="m", prompt="")
+        return chat.choices[0].message.content, text.choices[0].text
+
+    said, text = run(asked())
+    assert PROGRAM in (said or "")
+    assert text == PROGRAM

@@ -1,0 +1,381 @@
+"""What holds in a world that is drawn while the program asks about it."""
+
+import itertools
+import subprocess
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from codebotler.simulator.imagined import Fact, ImaginedRobot, Lot, Plan, meant
+from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.trace import Option
+from codebotler.world import Person, Room, World
+
+PLAN = Plan(("start_loc", "kitchen", "lab"), "start_loc")
+YES_NO = (Option("Yes"), Option("No"))
+
+
+def robot_in(room: str = "kitchen", sample: int = 0, *, seed: int = 0, strict: bool = False) -> ImaginedRobot:
+    robot = ImaginedRobot(PLAN, Lot(seed, sample, strict))
+    robot.perform("go_to", [room])
+    return robot
+
+
+def look(robot: ImaginedRobot, what: str) -> Result:
+    return robot.perform("is_in_room", [what])
+
+
+def where(what: str, *, there: bool) -> ImaginedRobot:
+    """A robot in a kitchen in which it has looked for something and found it, or not."""
+    robots = (robot_in(sample=number) for number in range(100))
+    return next(robot for robot in robots if look(robot, what) is there)
+
+
+def failure(robot: ImaginedRobot, skill: str, *arguments: Any) -> str:  # noqa: ANN401 - of any skill
+    with pytest.raises(RobotError) as caught:
+        robot.perform(skill, arguments)
+    return caught.value.kind
+
+
+# --- rooms are certain
+
+
+def test_rooms_are_those_of_the_plan_and_found_as_in_the_simulator() -> None:
+    robot = ImaginedRobot(PLAN, Lot())
+    assert robot.perform("get_all_rooms", ()) == ["start_loc", "kitchen", "lab"]
+    assert robot.perform("get_current_location", ()) == "start_loc"
+    robot.perform("go_to", ["the Kitchen, please"])
+    assert robot.perform("get_current_location", ()) == "kitchen"
+    assert failure(robot, "go_to", "kitch") == "GoToInvalidLocation"
+    assert robot.room == "kitchen"
+    assert [(event.kind, event.text) for event in robot.trace] == [
+        ("goto", "the Kitchen, please"),
+        ("goto", "kitch"),
+    ]
+
+
+def test_rooms_of_a_world_keep_their_regexes_and_their_start() -> None:
+    world = World((Room("lab [12]", people=(Person("amy"),)), Room("hall")), "hall")
+    robot = ImaginedRobot(Plan.of(world), Lot())
+    assert robot.perform("get_current_location", ()) == "hall"
+    robot.perform("go_to", ["lab 2"])
+    assert robot.room == "lab [12]"
+    assert robot.surely == (("go_to", "hall"),)
+
+
+def test_guessed_rooms_are_plain_texts_and_any_other_is_found_too() -> None:
+    robot = ImaginedRobot(Plan(("c++ lab", "hall"), "hall", guessed=True), Lot())
+    robot.perform("go_to", ["C++ lab"])
+    assert robot.room == "c++ lab"
+    robot.perform("go_to", [" attic "])
+    assert robot.room == "attic"
+    robot.perform("is_in_room", ["box"])
+    assert robot.perform("get_all_rooms", ()) == ["c++ lab", "hall"]
+    assert failure(robot, "go_to", " ") == "GoToInvalidLocation"
+
+
+def test_a_room_is_preferred_to_one_that_its_name_contains() -> None:
+    plan = Plan(("lab", "lab 2", "hall"), "hall", guessed=True)
+    assert (plan.room("Lab 2"), plan.room("the lab"), plan.room("")) == ("lab 2", "lab", None)
+
+
+# --- what is looked for is drawn, once
+
+
+def test_a_fact_asked_twice_is_the_same() -> None:
+    for sample in range(30):
+        robot = robot_in(sample=sample)
+        first = look(robot, "mug")
+        robot.perform("go_to", ["lab"])
+        look(robot, "mug")
+        robot.perform("go_to", ["kitchen"])
+        assert look(robot, "mug") is first
+        assert look(robot, "the Mug") is first
+        assert len([fact for fact in robot.facts if '"kitchen"' in fact.sentence]) == 1
+
+
+def test_what_is_looked_for_is_there_in_about_every_second_world_and_differs_by_room() -> None:
+    seen = [look(robot_in(sample=number), "mug") for number in range(200)]
+    assert 70 < sum(map(bool, seen)) < 130
+    in_lab = [look(robot_in("lab", number), "mug") for number in range(200)]
+    assert seen != in_lab
+
+
+def test_a_lucky_world_has_most_of_what_is_looked_for() -> None:
+    seen = [Lot(sample=number, lucky=True).is_there("kitchen", "mug") for number in range(200)]
+    assert 155 < sum(seen) < 195
+
+
+def test_a_longer_request_finds_what_a_part_of_it_finds() -> None:
+    assert look(where("stapler", there=True), "red stapler") is True
+    assert look(where("red stapler", there=False), "stapler") is False
+
+
+def test_all_words_for_people_mean_the_same() -> None:
+    for number in range(10):
+        robot = robot_in(sample=number)
+        assert len({look(robot, word) for word in ("person", "Somebody", "any person", "a human", "")}) == 1
+    assert meant("The  Mug") == "mug"
+    assert meant("another person") == meant("anyone")
+    assert meant("anne") == "anne"
+
+
+def test_a_thing_is_nobody() -> None:
+    robots = (robot_in(sample=number) for number in range(40))
+    assert {look(robot, "person") for robot in robots if look(robot, "body")} == {True, False}
+
+
+def test_looking_changes_nothing_so_that_a_program_need_not_wait_for_it() -> None:
+    robot = robot_in()
+    assert robot.only_looks == {"is_in_room", "get_all_rooms", "get_current_location"}
+    assert robot.never_fails == {"say"}
+    assert robot.surely == tuple(("go_to", room) for room in PLAN.rooms)
+
+
+def test_an_object_picked_up_is_gone_and_put_down_is_there() -> None:
+    robot = where("mug", there=True)
+    robot.perform("pick", ["mug"])
+    assert look(robot, "mug") is False
+    robot.perform("go_to", ["lab"])
+    assert failure(robot, "place", "the mug") == "PlaceNoObject"
+    robot.perform("place", ["mug"])
+    assert look(robot, "the mug") is True
+    robot.perform("pick", ["mug"])
+    robot.perform("go_to", ["kitchen"])
+    assert look(robot, "mug") is False
+    robot.perform("place", ["mug"])
+    assert look(robot, "mug") is True
+
+
+def test_put_down_it_is_there_although_it_was_missed_before() -> None:
+    robot = where("mug", there=False)
+    robot.perform("go_to", ["lab"])
+    robot.perform("pick", ["mug"])
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("place", ["mug"])
+    assert look(robot, "mug") is True
+
+
+# --- what the program never looked for
+
+
+def test_what_it_never_looked_for_is_as_the_program_takes_it() -> None:
+    for number in range(30):
+        robot = robot_in(sample=number)
+        robot.perform("pick", ["stapler"])
+        assert robot.perform("ask", ["alice", "Tea?", YES_NO]) in {0, 1}
+        assert look(robot, "person") is True
+        assert Fact('"alice" is in "kitchen"', by_lot=False) in robot.facts
+
+
+def test_it_may_take_another_one_where_it_never_looked() -> None:
+    robot = robot_in()
+    for _ in range(2):
+        robot.perform("pick", ["stapler"])
+        robot.perform("go_to", ["lab"])
+        robot.perform("place", ["stapler"])
+        robot.perform("go_to", ["kitchen"])
+    assert look(robot, "stapler") is False
+    assert failure(robot, "pick", "stapler") == "PickInvalidObject"
+
+
+def test_an_absence_that_it_saw_counts() -> None:
+    assert failure(where("mug", there=False), "pick", "mug") == "PickInvalidObject"
+    assert failure(where("alice", there=False), "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
+    nobody = where("person", there=False)
+    assert failure(nobody, "ask", "", "Tea?", YES_NO) == "AskNoPerson"
+    assert failure(nobody, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
+
+
+def test_that_an_object_is_absent_says_nothing_of_people_nor_of_other_rooms() -> None:
+    robot = where("mug", there=False)
+    robot.perform("ask", ["", "Where is the mug?", YES_NO])
+    robot.perform("go_to", ["lab"])
+    robot.perform("pick", ["mug"])
+
+
+def test_strict_draws_what_the_program_takes_for_granted() -> None:
+    picked: set[str] = set()
+    answered: set[str] = set()
+    granted: list[tuple[str, Sequence[Argument], set[str]]] = [
+        ("pick", ["stapler"], picked),
+        ("ask", ["alice", "Tea?", YES_NO], answered),
+    ]
+    for number in range(40):
+        robot = robot_in(sample=number, strict=True)
+        for skill, arguments, ended in granted:
+            try:
+                robot.perform(skill, arguments)
+                ended.add("done")
+            except RobotError as error:
+                ended.add(error.kind)
+        assert all(fact.by_lot for fact in robot.facts)
+    assert picked == {"done", "PickInvalidObject"}
+    assert answered == {"done", "AskNoPerson"}
+
+
+def test_strict_has_no_second_one_to_take() -> None:
+    robots = (robot_in(sample=number, strict=True) for number in range(100))
+    robot = next(robot for robot in robots if robot.lot.is_there("kitchen", "mug"))
+    robot.perform("pick", ["mug"])
+    robot.perform("go_to", ["lab"])
+    robot.perform("place", ["mug"])
+    robot.perform("go_to", ["kitchen"])
+    assert failure(robot, "pick", "mug") == "PickInvalidObject"
+
+
+def test_it_holds_one_thing_and_questions_need_options() -> None:
+    robot = robot_in()
+    assert failure(robot, "ask", "alice", "Tea?", ()) == "AskEmptyOptions"
+    assert failure(robot, "place", "mug") == "PlaceNoObject"
+    robot.perform("pick", ["mug"])
+    assert failure(robot, "pick", "cup") == "PickWhileHolding"
+
+
+# --- answers
+
+
+def test_answers_are_drawn_from_the_options_and_stay() -> None:
+    options = tuple(Option(text) for text in ("tea", "water", "1", "10"))
+    chosen = set()
+    for number in range(60):
+        robot = robot_in(sample=number)
+        first = robot.perform("ask", ["alice", "What to drink?", options])
+        assert robot.perform("ask", ["alice", "What to drink?", options]) == first
+        turned = options[::-1]
+        again = robot.perform("ask", ["alice", "What to drink?", turned])
+        assert isinstance(first, int)
+        assert isinstance(again, int)
+        assert turned[again] == options[first]
+        assert robot.trace[-1].answer == options[first].text
+        chosen.add(first)
+    assert chosen == {0, 1, 2, 3}
+
+
+def test_an_answer_that_is_no_longer_offered_is_drawn_again() -> None:
+    robot = robot_in()
+    robot.perform("ask", ["", "Which?", (Option("a"),)])
+    assert robot.perform("ask", ["", "Which?", (Option("b"),)]) == 0
+    assert [fact.sentence for fact in robot.facts][1:] == [
+        'the answer to "Which?" is "a"',
+        'the answer to "Which?" is "b"',
+    ]
+
+
+# --- what is owed to the lots
+
+
+def searched(what: str, in_kitchen: bool, in_lab: bool, seed: int = 0) -> ImaginedRobot:  # noqa: FBT001 - a table
+    for number in itertools.count():
+        robot = robot_in(sample=number, seed=seed)
+        if look(robot, what) is not in_kitchen:
+            continue
+        robot.perform("go_to", ["lab"])
+        if look(robot, what) is in_lab:
+            return robot
+    raise AssertionError
+
+
+def test_a_search_in_vain_excuses_what_comes_of_it() -> None:
+    robot = searched("mug", in_kitchen=False, in_lab=False)
+    assert failure(robot, "place", "mug") == "PlaceNoObject"
+    assert len(robot.excuses) == 1
+    assert failure(robot, "place", "cup") == "PlaceNoObject"
+    assert len(robot.excuses) == 1
+    assert failure(searched("alice", in_kitchen=False, in_lab=False), "ask", "alice", "Tea?", YES_NO)
+
+
+def test_one_look_in_vain_excuses_nothing() -> None:
+    robot = where("mug", there=False)
+    for skill in ("place", "pick"):
+        assert failure(robot, skill, "mug") in {"PlaceNoObject", "PickInvalidObject"}
+    assert look(robot, "mug") is False
+    assert failure(robot, "pick", "mug")
+    assert robot.excuses == set()
+
+
+def test_a_search_that_found_it_once_excuses_nothing() -> None:
+    robot = searched("alice", in_kitchen=True, in_lab=False)
+    assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
+    assert robot.excuses == set()
+
+
+def test_found_once_in_a_long_search_excuses_nothing() -> None:
+    robot = searched("alice", in_kitchen=False, in_lab=True)
+    while not robot.scene.lacks("alice"):
+        robot = searched("alice", in_kitchen=False, in_lab=True, seed=robot.lot.seed + 1)
+        robot.perform("go_to", ["start_loc"])
+        look(robot, "alice")
+    assert len(robot.hopes["alice"].vain) == 2
+    assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
+    assert robot.excuses == set()
+
+
+@pytest.mark.parametrize(("sought", "placed"), [("my blue mug", "mug"), ("mug", "the blue mug")])
+def test_a_search_by_a_longer_or_a_shorter_name_is_one_too(sought: str, placed: str) -> None:
+    robot = searched(sought, in_kitchen=False, in_lab=False)
+    assert failure(robot, "place", placed) == "PlaceNoObject"
+    assert len(robot.excuses) == 1
+
+
+def test_waiting_in_vain_excuses_asking() -> None:
+    robot = where("guest", there=False)
+    robot.now = 60.0
+    look(robot, "guest")
+    assert failure(robot, "ask", "guest", "Tea?", YES_NO) == "AskNoPerson"
+    assert len(robot.excuses) == 1
+
+
+def test_finding_two_of_what_it_searches_excuses_picking_both() -> None:
+    robot = searched("mug", in_kitchen=True, in_lab=True)
+    robot.perform("pick", ["mug"])
+    assert failure(robot, "pick", "mug") == "PickWhileHolding"
+    assert len(robot.excuses) == 1
+    assert failure(robot, "pick", "cup") == "PickWhileHolding"
+    assert len(robot.excuses) == 1
+
+
+def test_strict_excuses_nothing() -> None:
+    robot = searched("mug", in_kitchen=False, in_lab=False)
+    robot.lot = Lot(robot.lot.seed, robot.lot.sample, strict=True)
+    assert failure(robot, "place", "mug") == "PlaceNoObject"
+    assert robot.excuses == set()
+
+
+# --- the same seed draws the same
+
+
+def test_lots_depend_on_seed_sample_and_fact_alone() -> None:
+    def drawn(lot: Lot) -> list[int]:
+        return [lot.draw(1_000, "a fact", str(number)) for number in range(20)]
+
+    assert drawn(Lot(7, 3)) == drawn(Lot(7, 3))
+    assert len({tuple(drawn(lot)) for lot in (Lot(7, 3), Lot(7, 4), Lot(8, 3), Lot(73, 0))}) == 4
+    assert Lot(1).draw(1_000, "ab", "c") != Lot(1).draw(1_000, "a", "bc")
+
+
+def test_lots_are_the_same_whatever_hashing_does() -> None:
+    told = (
+        "from codebotler.simulator.imagined import Lot\n"
+        "print([Lot(5).draw(99, 'x', str(n)) for n in range(9)])\n"
+    )
+    printed = {
+        subprocess.run(
+            [sys.executable, "-c", told], env={"PYTHONHASHSEED": seed}, capture_output=True, check=True
+        ).stdout
+        for seed in ("1", "2")
+    }
+    assert printed == {f"{[Lot(5).draw(99, 'x', str(n)) for n in range(9)]}\n".encode()}
+
+
+def test_a_draw_knows_in_which_worlds_it_would_be_the_same() -> None:
+    robot = robot_in(sample=1)
+    look(robot, "mug")
+    robot.perform("ask", ["", "Tea?", YES_NO])
+    for number in range(30):
+        other = robot_in(sample=number)
+        same = look(other, "mug") == look(robot, "mug")
+        same &= other.perform("ask", ["", "Tea?", YES_NO]) == robot.perform("ask", ["", "Tea?", YES_NO])
+        assert all(draw.is_drawn_by(other.lot) for draw in robot.draws) is same

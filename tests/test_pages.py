@@ -1,0 +1,68 @@
+"""The pages for users: every command on them runs, in their order, as it stands there."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from server import Server
+
+DOCS = Path(__file__).parent.parent / "docs"
+
+
+def run(commands: str, folder: Path, url: str) -> str:
+    """Run what a reader would paste, with a model that answers quickly, and fewer completions."""
+    for name in ("roboeval", "codebotler"):
+        here = f"{shlex.quote(sys.executable)} -m {name}.cli"
+        commands = commands.replace(f".venv/bin/{name}", here)
+    commands = commands.replace("http://localhost:8000/v1", url)
+    commands = commands.replace("--num-completions 50", "--num-completions 1 --tasks LunchTime")
+    ended = subprocess.run(
+        ["bash", "-e", "-o", "pipefail", "-c", commands],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "COLUMNS": "100"},
+    )
+    assert ended.returncode == 0, (commands, ended.stderr)
+    return ended.stdout
+
+
+def blocks(page: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", (DOCS / page).read_text(), re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", ["evaluate-your-model.md", "check-before-you-run.md"])
+def test_every_command_of_a_page_runs(tmp_path: Path, page: str) -> None:
+    with Server(answer=lambda _: 'def task_program():\n    go_to("kitchen")\n    say("hello")\n') as server:
+        printed = [run(commands, tmp_path, server.url) for commands in blocks(page, "sh")]
+        assert server.requests
+    assert all(printed[:1])
+    for code in blocks(page, "python"):
+        subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
+
+
+def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
+    table = next(block for block in blocks("evaluate-your-model.md", "text") if "retries" in block)
+    first, *_, last = [
+        block for block in blocks("evaluate-your-model.md", "sh") if "recorded" in block and "run" in block
+    ]
+    run(first, tmp_path, "")
+    assert table in run(last, tmp_path, "")
+
+
+@pytest.mark.parametrize("page", ["evaluate-your-model.md", "check-before-you-run.md"])
+def test_pages_are_linked(page: str) -> None:
+    assert f"]({page})" in (DOCS / "index.md").read_text()
+    assert f"](docs/{page})" in (DOCS.parent / "README.md").read_text()
+
+
+def test_links_lead_somewhere() -> None:
+    for page in DOCS.glob("*.md"):
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text()):
+            assert (page.parent / target).exists(), (page.name, target)
