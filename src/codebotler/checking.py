@@ -55,7 +55,7 @@ def check_view(found: Check, program: str, name: str) -> RenderableType:
         name: what the user calls it.
     """
     parts: list[RenderableType] = [_verdict(found, name)]
-    lines = program.split("\n")
+    lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
     parts += [Text(), _rooms(found), *_in_vain(found)]
