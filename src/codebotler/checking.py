@@ -81,7 +81,7 @@ def _verdict(found: Check, name: str) -> Text:
 
 
 def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
-    yield Text(visible(problem.sentence), "red")
+    yield Text(shortened(problem.sentence), "red")
     if problem.line is None:
         return
     first, last = max(1, problem.line - AROUND), min(len(lines), problem.line + AROUND)

@@ -204,6 +204,7 @@ def test_what_waits_for_ever_without_a_look_is_run_once() -> None:
     finally:
         lane.close()
     assert len(known[plan]) == 1
+    assert len(found.samples) == 5
     assert "imagined worlds" not in found.problems[0].message
 
 
