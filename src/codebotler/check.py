@@ -205,7 +205,8 @@ def check(
         skills: what the program may call.
         behaviours: what each skill does; those of the eight skills by default.
         workers: how many runs go on at the same time; one by default, which is enough for one program.
-        lanes: what runs programs, for who checks many; without it, it is started and ended.
+        lanes: what runs programs, for who checks many; without it, it is started and ended. What runs on a
+            lane itself calls `check_on`.
 
     Raises:
         BadInput: the name of a room is no regular expression.
@@ -331,7 +332,7 @@ def _samples(plan: Plan, settings: Settings, runner: Runner) -> list[Sample]:
     first = Lot(settings.seed, 0, settings.strict)
     ran = runner.runs(plan, [replace(first, sample=number) for number in range(settings.samples)])
     for more in range(MORE):
-        if not all(sample.in_vain for sample in ran):
+        if not all(sample.in_vain and sample.draws for sample in ran):
             break
         # Who waits in many places needs luck to see the end of it; a search, that not all is full of things.
         ran += runner.runs(plan, [replace(first, sample=len(ran), lucky=more % 2 == 1)])

@@ -55,7 +55,7 @@ def check_view(found: Check, program: str, name: str) -> RenderableType:
         name: what the user calls it.
     """
     parts: list[RenderableType] = [_verdict(found, name)]
-    lines = program.split("\n")
+    lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
         parts += [Text(), *_problem(problem, lines)]
     parts += [Text(), _rooms(found), *_in_vain(found)]
@@ -81,7 +81,7 @@ def _verdict(found: Check, name: str) -> Text:
 
 
 def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
-    yield Text(visible(problem.sentence), "red")
+    yield Text(shortened(problem.sentence), "red")
     if problem.line is None:
         return
     first, last = max(1, problem.line - AROUND), min(len(lines), problem.line + AROUND)

@@ -108,7 +108,7 @@ def test_an_error_after_some_answers_only_is_told_with_them(checks: Checks) -> N
         samples=12,
     )
     (problem,) = found.problems
-    assert problem.where == 'the answer to "Tea?" is "No"'
+    assert problem.where == 'the answer in "start_loc" to "Tea?" is "No"'
 
 
 def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
@@ -124,7 +124,7 @@ def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
         samples=8,
     )
     assert f'"{always}" is in "start_loc"' in found.samples[0].world
-    assert [problem.where for problem in found.problems] == ['the answer to "Tea?" is "No"']
+    assert [problem.where for problem in found.problems] == ['the answer in "start_loc" to "Tea?" is "No"']
 
 
 def test_a_line_is_blamed_once(checks: Checks) -> None:
@@ -204,6 +204,7 @@ def test_what_waits_for_ever_without_a_look_is_run_once() -> None:
     finally:
         lane.close()
     assert len(known[plan]) == 1
+    assert len(found.samples) == 5
     assert "imagined worlds" not in found.problems[0].message
 
 

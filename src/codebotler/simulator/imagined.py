@@ -337,7 +337,8 @@ def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option,
     if robot.told.get(asked) not in texts:
         drawn = texts[robot.answered(len(texts), "answer", *asked)]
         robot.told[asked] = drawn
-        robot.facts.append(Fact(f'the answer to "{brief(question)}" is "{brief(drawn)}"', by_lot=True))
+        where = f'in "{brief(robot.room)}" to "{brief(question)}"'
+        robot.facts.append(Fact(f'the answer {where} is "{brief(drawn)}"', by_lot=True))
     chosen = texts.index(robot.told[asked])
     robot.amend(texts[chosen])
     return chosen

@@ -259,8 +259,8 @@ def test_an_answer_that_is_no_longer_offered_is_drawn_again() -> None:
     robot.perform("ask", ["", "Which?", (Option("a"),)])
     assert robot.perform("ask", ["", "Which?", (Option("b"),)]) == 0
     assert [fact.sentence for fact in robot.facts][1:] == [
-        'the answer to "Which?" is "a"',
-        'the answer to "Which?" is "b"',
+        'the answer in "kitchen" to "Which?" is "a"',
+        'the answer in "kitchen" to "Which?" is "b"',
     ]
 
 
