@@ -143,8 +143,10 @@ class Server:
         server = await asyncio.start_server(self._connected, "127.0.0.1", 0)
         self.url = f"http://127.0.0.1:{server.sockets[0].getsockname()[1]}/v1"
         started.set()
-        async with server:
+        try:
             await asyncio.Event().wait()
+        finally:
+            server.close()  # without waiting, for clients may keep their connections
 
     @staticmethod
     async def _closed() -> None:

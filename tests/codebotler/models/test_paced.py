@@ -2,6 +2,10 @@
 
 import asyncio
 import random
+import signal
+import subprocess
+import sys
+import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator
 from itertools import pairwise
@@ -226,6 +230,27 @@ def test_requests_that_wait_find_the_budget_spent(server: Server) -> None:
     assert len(server.requests) == 2
 
 
+def test_spent_budget_is_told_without_waiting_for_a_turn(server: Server) -> None:
+    async def ask(paced: Paced) -> float:
+        await one(paced)
+        start = time.monotonic()
+        with pytest.raises(BudgetSpentError):
+            await one(paced)
+        return time.monotonic() - start
+
+    _, seconds = use(server, ask, token_budget=10, requests_per_minute=12)
+    assert seconds < 2
+
+
+def test_budget_that_is_spent_while_a_request_waits_for_its_turn_stops_it(server: Server) -> None:
+    async def ask(paced: Paced) -> list[Any]:
+        return [*await asyncio.gather(one(paced), one(paced), return_exceptions=True)]
+
+    _, ends = use(server, ask, token_budget=10, requests_per_minute=40)
+    assert [type(end) for end in ends] == [Reply, BudgetSpentError]
+    assert len(server.requests) == 1
+
+
 def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
     async def ask(paced: Paced) -> Reply:
         server.faults.extend([Fault.SLOW, Fault.SERVER_ERROR, Fault.SLOW])
@@ -242,6 +267,48 @@ def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
     server.pause = 0.2
     _, reply = use(server, ask, concurrency=3, requests_per_minute=6000)
     assert "reply 0" in reply.program
+
+
+INTERRUPTED = """
+import asyncio, sys
+from codebotler.models.base import Settings
+from codebotler.models.open import open_model
+from codebotler.models.paced import Paced
+from codebotler.prompts import prompt_for
+
+async def main(name, url):
+    model = Paced(open_model(name, Settings(base_url=url)), concurrency=4)
+    prompt = prompt_for("Go to the lobby.")
+    try:
+        await asyncio.gather(*(model.reply(prompt, number=number) for number in range(20)))
+    finally:
+        await model.close()
+        print("closed")
+
+try:
+    asyncio.run(main(*sys.argv[1:]))
+except KeyboardInterrupt:
+    print("stopped")
+"""
+
+
+@both
+def test_control_c_stops_all_requests_at_once_and_without_a_word(name: str, server: Server) -> None:
+    server.faults.extend([Fault.SLOW, Fault.STALLED] * 10)
+    with subprocess.Popen(
+        [sys.executable, "-X", "dev", "-c", INTERRUPTED, name, server.url],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        while len(server.requests) < 4 and process.poll() is None:
+            time.sleep(0.01)
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=20)
+    assert output == "closed\nstopped\n", errors
+    assert not [line for line in errors.splitlines() if not line.startswith("Executing <")]
+    assert len(server.requests) == 4
 
 
 @both
