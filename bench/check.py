@@ -18,8 +18,9 @@ from pathlib import Path
 
 from codebotler.check import SAMPLES, Sample, Settings, check_on
 from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.imagined import ImaginedRobot, Lot, Plan
+from codebotler.simulator.imagined import ImaginedRobot, Plan
 from codebotler.simulator.lane import Lane
+from codebotler.simulator.lots import Lot
 from roboeval.evaluate import evaluate
 from roboeval.records import Completion, recorded_completions
 from roboeval.suite import Suite, load_suite

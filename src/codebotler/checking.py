@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.text import Text
 
 from codebotler.badinput import MAX_BYTES, BadInput, read_text, text_of
-from codebotler.check import Check, Problem, Sample
+from codebotler.problems import Check, Problem, Sample
 from codebotler.program import TASK, bound_names
 from codebotler.reply import program_of
 from codebotler.storyboard import steps_of, storyboard

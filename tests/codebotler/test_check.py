@@ -8,8 +8,9 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.check import MORE, Check, Sample, Settings, check, check_on
 from codebotler.simulator.engine import Lanes
-from codebotler.simulator.imagined import Lot, Plan
+from codebotler.simulator.imagined import Plan
 from codebotler.simulator.lane import Lane
+from codebotler.simulator.lots import Lot
 from codebotler.trace import Status
 
 ROOMS = ("start_loc", "kitchen", "alice's office", "bob's office")

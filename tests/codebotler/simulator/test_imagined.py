@@ -1,6 +1,7 @@
 """What holds in a world that is drawn while the program asks about it."""
 
 import itertools
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -8,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from codebotler.simulator.imagined import Fact, ImaginedRobot, Lot, Plan, meant
+from codebotler.simulator.imagined import Fact, ImaginedRobot, Plan, meant
+from codebotler.simulator.lots import Lot
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.trace import Option
 from codebotler.world import Person, Room, World
@@ -358,12 +360,14 @@ def test_lots_depend_on_seed_sample_and_fact_alone() -> None:
 
 def test_lots_are_the_same_whatever_hashing_does() -> None:
     told = (
-        "from codebotler.simulator.imagined import Lot\n"
-        "print([Lot(5).draw(99, 'x', str(n)) for n in range(9)])\n"
+        "from codebotler.simulator.lots import Lot\nprint([Lot(5).draw(99, 'x', str(n)) for n in range(9)])\n"
     )
     printed = {
         subprocess.run(
-            [sys.executable, "-c", told], env={"PYTHONHASHSEED": seed}, capture_output=True, check=True
+            [sys.executable, "-c", told],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            check=True,
         ).stdout
         for seed in ("1", "2")
     }
