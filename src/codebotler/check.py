@@ -265,11 +265,14 @@ def _widened(plan: Plan, ran: Iterable[Sample]) -> Plan:
 
 # --- what is wrong
 
+HARMLESS = "AskInvalidOptions"
+"""Options that are no texts: a robot offers them as texts all the same, and only RTL has nothing to judge."""
+
 
 @lru_cache(maxsize=16)  # who checks with many seeds does so program by program
 def _flaws(program: str, plan: Plan, skills: SkillTable) -> tuple[Problem, ...]:
     """What the text shows, one problem a line."""
-    flaws = list(Program(program).problems(skills))
+    flaws = [flaw for flaw in Program(program).problems(skills) if flaw.kind != HARMLESS]
     if not plan.guessed:
         flaws += [
             Flaw(line, "GoToInvalidLocation", no_room(request, plan))

@@ -80,6 +80,10 @@ def test_a_program_without_problems_is_accepted(checks: Checks) -> None:
     assert [sample.number for sample in found.samples] == [0, 1, 2, 3, 4]
 
 
+def test_options_that_are_no_texts_do_not_count(checks: Checks) -> None:
+    assert checks.kinds("say(str(ask('alice', 'How many?', [1, 2]) + 1))") == []
+
+
 def test_an_absence_that_it_saw_counts_and_is_told_in_words(checks: Checks) -> None:
     found = checks("go_to('kitchen')", "is_in_room('person')", "ask('person', 'Tea?', ['Yes', 'No'])")
     (problem,) = found.problems
