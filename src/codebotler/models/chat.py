@@ -108,8 +108,8 @@ class Chat:
                     case PartDeltaEvent(delta=TextPartDelta(content_delta=piece)) if piece:
                         heard(piece)
             response = stream.get()
-        # A stream that ends early, but in good order, is told from a whole one only by what it lacks; for chat
-        # completions pydantic-ai makes up a reason for the end.
+        # A stream that ends early, but in good order, is told from a whole one only by what it lacks; for
+        # chat completions pydantic-ai makes up a reason for the end.
         made_up = isinstance(self.spoken, OpenAIChatModel) and "finish_reason" not in (
             response.provider_details or {}
         )
