@@ -108,11 +108,12 @@ class Chat:
                     case PartDeltaEvent(delta=TextPartDelta(content_delta=piece)) if piece:
                         heard(piece)
             response = stream.get()
-        # A stream that ends early, but in good order, is told from a whole one only by what it lacks.
-        unfinished = isinstance(self.spoken, OpenAIChatModel) and "finish_reason" not in (
+        # A stream that ends early, but in good order, is told from a whole one only by what it lacks; for
+        # chat completions pydantic-ai makes up a reason for the end.
+        made_up = isinstance(self.spoken, OpenAIChatModel) and "finish_reason" not in (
             response.provider_details or {}
         )
-        if unfinished or response.state != "complete":
+        if made_up or response.finish_reason is None or response.state != "complete":
             raise broken_off(self.name, begun=bool(response.parts))
         return response
 
