@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+WIDEST = 10_000
+
 
 def print_rich(what: RenderableType) -> None:
-    """Draw on the terminal, or plainly into a pipe."""
+    """Draw on the terminal; or plainly into a pipe, where no line is broken unless COLUMNS is set."""
     from rich.console import Console
+    from rich.measure import Measurement
 
     console = Console()
     if console.is_terminal:
         console.print(what)
         return
+    if "COLUMNS" not in os.environ:
+        natural = Measurement.get(console, console.options.update(max_width=WIDEST), what).maximum
+        console.width = max(console.width, natural)
     with console.capture() as drawn:
         console.print(what)
     print("\n".join(line.rstrip() for line in drawn.get().splitlines()))

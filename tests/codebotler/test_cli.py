@@ -34,7 +34,7 @@ def codebotler(*arguments: str | Path, given: str | None = None) -> tuple[int, s
         text=True,
         check=False,
         input=given,
-        env={**os.environ, "COLUMNS": "100", "NO_COLOR": "1"},
+        env={**{name: value for name, value in os.environ.items() if name != "COLUMNS"}, "NO_COLOR": "1"},
     )
     return ended.returncode, ended.stdout, ended.stderr
 
