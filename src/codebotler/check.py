@@ -223,7 +223,9 @@ def _samples(plan: Plan, settings: Settings, runner: Runner) -> list[Sample]:
     first = Lot(settings.seed, 0, settings.strict)
     ran = runner.runs(plan, [replace(first, sample=number) for number in range(settings.samples)])
     for more in range(MORE):
-        if not all(sample.in_vain and sample.draws for sample in ran):
+        if not all(sample.in_vain and sample.draws for sample in ran) or all(
+            one.only_computed for one in ran
+        ):
             break
         # Who waits in many places needs luck to see the end of it; a search, that not all is full of things.
         ran += runner.runs(plan, [replace(first, sample=len(ran), lucky=more % 2 == 1)])

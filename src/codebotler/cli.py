@@ -77,6 +77,7 @@ def generate(
     from codebotler.models.base import Settings
     from codebotler.models.open import open_model
     from codebotler.prompts import prompt_for
+    from codebotler.terminal import busy
     from codebotler.world import World
 
     if not instruction.strip():
@@ -94,14 +95,15 @@ def generate(
         timeout=timeout,
         base_url=base_url,
     )
-    made = generated(
-        open_model(model, settings),
-        prompt,
-        world=known,
-        retries=int(repair) if retries is None else retries,
-        repair=repair,
-        record=record,
-    )
+    with busy(f"asking {model}"):
+        made = generated(
+            open_model(model, settings),
+            prompt,
+            world=known,
+            retries=int(repair) if retries is None else retries,
+            repair=repair,
+            record=record,
+        )
     print(made.program, end="" if made.program.endswith("\n") else "\n")
     raise typer.Exit(1 if made.problems else 0)
 
@@ -123,20 +125,21 @@ def check(
     """Look for problems in a program, in its text and in imagined worlds; status 1 if there are any."""
     from codebotler.check import check as look_for_problems
     from codebotler.checking import check_view, read_program
-    from codebotler.terminal import print_json, print_rich
+    from codebotler.terminal import busy, print_json, print_rich
     from codebotler.world import World
 
     known = None if world is None else World.read(world)
     source = read_program(program)
-    found = look_for_problems(
-        source,
-        rooms=None if known is None else [room.name for room in known.rooms],
-        start=None if known is None else known.robot,
-        samples=samples,
-        seed=seed,
-        strict=strict,
-        workers=workers,
-    )
+    with busy("checking"):
+        found = look_for_problems(
+            source,
+            rooms=None if known is None else [room.name for room in known.rooms],
+            start=None if known is None else known.robot,
+            samples=samples,
+            seed=seed,
+            strict=strict,
+            workers=workers,
+        )
     if json:
         print_json(found.data())
     else:

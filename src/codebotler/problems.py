@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from codebotler.program import listed
+from codebotler.simulator.child import PROCESSOR_TIME
 from codebotler.simulator.imagined import Fact, Plan, brief
 from codebotler.simulator.lots import Draw, Lot
 from codebotler.skills import SKILLS, SkillTable
@@ -64,6 +65,12 @@ class Sample:
     def is_as_in(self, lot: Lot) -> bool:
         """Whether the same run in another world would meet the same facts, and so be the same."""
         return all(draw.is_drawn_by(lot) for draw in self.draws)
+
+    @property
+    def only_computed(self) -> bool:
+        """Whether it used up its processor time; that costs seconds, and is no waiting."""
+        error = self.outcome.error
+        return self.in_vain and error is not None and error.message.endswith(PROCESSOR_TIME)
 
     @property
     def lots(self) -> tuple[str, ...]:

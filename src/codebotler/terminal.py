@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from threading import Timer
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
 WIDEST = 10_000
+QUIET_S = 2.0  # for so long does a command say nothing at first
 
 
 def print_rich(what: RenderableType) -> None:
@@ -27,6 +31,29 @@ def print_rich(what: RenderableType) -> None:
     with console.capture() as drawn:
         console.print(what)
     print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
+
+
+@contextmanager
+def busy(doing: str) -> Iterator[None]:
+    """Show that something goes on: on a terminal how long it has taken, elsewhere one line after a while.
+
+    Args:
+        doing: what goes on, such as `checking`.
+    """
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (SpinnerColumn(), TextColumn(doing, markup=False), TimeElapsedColumn())
+    line = Timer(QUIET_S, note, [f"{doing} ..."])
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
+        progress.add_task(doing)
+        if not console.is_terminal:
+            line.start()
+        try:
+            yield
+        finally:
+            line.cancel()
 
 
 def print_json(data: object) -> None:

@@ -8,13 +8,11 @@ from datetime import timedelta
 from time import monotonic
 from typing import NoReturn, TypeVar
 
-from codebotler.terminal import note, print_json, print_rich
+from codebotler.terminal import QUIET_S, note, print_json, print_rich
 
 __all__ = ["fail", "metered", "note", "print_json", "print_rich", "watched"]
 
 Item = TypeVar("Item")
-
-QUIET_S = 2.0  # for so long does a command say nothing at first; lines of a long one come more seldom
 
 
 def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:

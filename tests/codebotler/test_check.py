@@ -189,6 +189,12 @@ def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None
     assert "in each of 25 imagined worlds" in problem.message
 
 
+def test_who_computes_for_ever_does_not_wait(checks: Checks) -> None:
+    found = checks("for room in get_all_rooms():", "    is_in_room(room)", "sum(range(10**12))", samples=2)
+    assert [problem.kind for problem in found.problems] == ["TimeoutError"]
+    assert len(found.samples) == 2
+
+
 def test_waiting_at_several_lines_is_one_problem(checks: Checks) -> None:
     found = checks(
         "while not is_in_room('mug'):",

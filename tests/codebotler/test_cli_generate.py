@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 import subprocess
 import sys
@@ -38,7 +39,10 @@ def codebotler(*arguments: str, cwd: Path | None = None, after: str = "") -> End
         cwd=cwd,
         env={**os.environ, "OPENAI_API_KEY": KEY, "COLUMNS": "100"},
     )
-    return Ended(ended.returncode, ended.stdout, ended.stderr)
+    told = re.sub(
+        r"^(asking|checking).* \.\.\.\n", "", ended.stderr, flags=re.MULTILINE
+    )  # where it took long
+    return Ended(ended.returncode, ended.stdout, told)
 
 
 def instruction(suite: Suite) -> str:

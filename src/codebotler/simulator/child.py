@@ -25,6 +25,8 @@ from codebotler.simulator.sandbox import (
 )
 from codebotler.trace import RunError, Status
 
+PROCESSOR_TIME = "seconds of processor time"
+"""How the sentence ends that tells of a program which computed for too long."""
 LONGEST = 60.0  # seconds of waiting for a child in all; nothing that computes takes so long
 FILTERED, KILLED_BY_FILTER = 2, 3  # what Linux says of a process and its list of system calls
 SILENCE = 1  # seconds after which a silent child is looked at
@@ -200,7 +202,7 @@ def cause_of_death(status: int, seconds: int = CPU_SECONDS) -> tuple[Status, Run
     """
     match -status:
         case signal.SIGXCPU:
-            return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} seconds of processor time")
+            return Status.TIMEOUT, RunError("TimeoutError", f"{seconds:,} {PROCESSOR_TIME}")
         case signal.SIGSYS:
             return Status.KILLED, RunError(
                 "ForbiddenCall", "the program asked the kernel for what is forbidden"
