@@ -63,6 +63,8 @@ def main() -> None:
                 f"{time.perf_counter() - start:.1f} s; {1000 * used / len(keys):.1f} ms of processor time "
                 f"each; {twice} possibly paid twice"
             )
+            if len(keys) != 80 * each or len(set(keys)) != 80 * each or not failed:
+                sys.exit("not every completion is there exactly once, or no request failed")
 
 
 if __name__ == "__main__":
