@@ -432,12 +432,12 @@ def test_an_interruption_counts_what_waits_for_the_disk(
     def interrupted(file: Appender) -> None:
         if file.path == run.completions and file.path.read_bytes().count(b"\n") > 10:
             monkeypatch.undo()
-            signal.raise_signal(signal.SIGINT)
+            os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.2)
         sync(file)
 
     monkeypatch.setattr(Appender, "sync", interrupted)
-    order = Order(paper, SMALL, 3)
+    order = Order(paper, SMALL, 100)  # so many that it cannot be over by then
     with pytest.raises(KeyboardInterrupt):
         generate_run(run, order, Scripted(seconds=0.01), Settings(), Pace(), begun=seen.append)
     (progress,) = seen
