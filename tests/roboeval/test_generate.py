@@ -1,6 +1,7 @@
 """Whatever happens meanwhile, a run gets exactly the completions it shall have, each once."""
 
 import json
+import os
 import random
 import re
 import signal
