@@ -13,6 +13,7 @@ from codebotler.drives import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.problems import Check, Problem, Sample, failures, no_room
 from codebotler.program import Problem as Flaw
 from codebotler.program import Program, parsed
+from codebotler.reach import reach
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.imagined import AS_WRITTEN, ImaginedRobot, Plan
 from codebotler.simulator.lane import Lane
@@ -267,6 +268,12 @@ def _widened(plan: Plan, ran: Iterable[Sample]) -> Plan:
 
 # --- what is wrong
 
+
+def unforgiven(flaws: Iterable[Flaw], program: str) -> Iterator[Flaw]:
+    """Those that do harm: their line is run, and nothing catches them."""
+    return (flaw for flaw in flaws if not reach(program).forgives(flaw.line, flaw.kind))
+
+
 HARMLESS = "AskInvalidOptions"
 """Options that are no texts: a robot offers them as texts all the same, and only RTL has nothing to judge."""
 
@@ -282,7 +289,7 @@ def _flaws(program: str, plan: Plan, skills: SkillTable) -> tuple[Problem, ...]:
             if plan.room(request) is None
         ]
     by_line: dict[int | None, list[Flaw]] = {}
-    for flaw in flaws:
+    for flaw in flaws if isinstance(parsed(program), Flaw) else unforgiven(flaws, program):
         by_line.setdefault(flaw.line, []).append(flaw)
     return tuple(
         Problem(same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)

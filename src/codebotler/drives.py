@@ -20,7 +20,9 @@ COMPARING = frozenset({"startswith", "endswith"})
 
 
 def fixed_drives(source: str, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
-    """The line and the request of each drive that is written out and that nothing can save if it fails.
+    """The line and the request of each drive that is written out, and that depends on no other mention of it.
+
+    A program that compares something with a name of a room may drive there only if there is one.
 
     Args:
         source: of the program; of one that does not parse, there are none.
@@ -31,16 +33,25 @@ def fixed_drives(source: str, skills: SkillTable = SKILLS) -> list[tuple[int, st
         return []
     try:
         bound = names_bound(tree)
-        if "*" in bound or any(isinstance(node, ast.Try | ast.TryStar | ast.With) for node in ast.walk(tree)):
+        if "*" in bound:
             return []
+        compared = {text for node in ast.walk(tree) if isinstance(node, ast.Compare) for text in _texts(node)}
         drives = {name: skill for name, skill in _drives(skills).items() if name not in bound}
         return [
             (call.lineno, request.value)
             for call, request in _requests(tree, drives)
             if isinstance(request, ast.Constant) and isinstance(request.value, str)
+            if request.value.strip().casefold() not in compared
         ]
     except RecursionError:
         return []
+
+
+def _texts(expression: ast.expr) -> Iterator[str]:
+    """The texts that stand in an expression, in small letters."""
+    for node in ast.walk(expression):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value.strip().casefold()
 
 
 def named_rooms(source: str, skills: SkillTable = SKILLS) -> tuple[str, ...]:

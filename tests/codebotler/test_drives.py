@@ -88,8 +88,8 @@ def test_drives_that_are_written_out() -> None:
 @pytest.mark.parametrize(
     "source",
     [
-        START + 'try:\n        go_to("lab")\n    except Exception:\n        pass\n',
-        "from contextlib import suppress\n" + START + 'with suppress(Exception):\n        go_to("lab")\n',
+        START + 'if "Lab" in get_all_rooms():\n        go_to("lab")\n',
+        START + 'for room in get_all_rooms():\n        if room == "lab":\n            go_to("lab")\n',
         "def go_to(x):\n    pass\n" + START + 'go_to("lab")\n',
         "from mine import *\n" + START + 'go_to("lab")\n',
         START + 'go_to("lab"\n',

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -35,6 +35,8 @@ PEOPLE = frozenset(
     }
 )
 """Words that mean whoever is there."""
+
+AGREES = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
 
 _ARTICLE = re.compile(r"(?:the|an?|any|some)\s+")
 
@@ -103,19 +105,19 @@ class Scene:
 
 @dataclass
 class Hope:
-    """How often a program looked for somebody or something.
+    """Where a program looked for somebody or something.
 
     Args:
-        vain: the rooms and the times at which it found nothing.
+        vain: the rooms in which it found nothing.
         found: the rooms in which it found what it looked for.
     """
 
-    vain: set[tuple[str, float]] = field(default_factory=set)
+    vain: set[str] = field(default_factory=set)
     found: set[str] = field(default_factory=set)
 
     @property
     def is_lost(self) -> bool:
-        """Whether it waited for it, or searched more than one room for it, and never found it."""
+        """Whether it searched more than one room, and never found it."""
         return len(self.vain) > 1 and not self.found
 
 
@@ -125,8 +127,8 @@ class ImaginedRobot(SimulatedRobot):
     What the program looks for is there or not by chance. What it never looked for is as it takes it to be:
     somebody answers, and what it picks up lies there. Answers are drawn from what a question offers.
 
-    A search takes for granted that there is one of what it searches, somewhere or at some time. Where the
-    lots fell otherwise, `excuses` tells which errors are owed to that, so that nobody blames the program.
+    A search of several rooms takes for granted that there is one of what it searches. Where the lots fell
+    otherwise, `excuses` tells which errors are owed to that, so that nobody blames the program.
 
     Args:
         plan: the rooms, which are certain.
@@ -161,7 +163,7 @@ class ImaginedRobot(SimulatedRobot):
         self.excuses: set[str] = set()
 
     def hope(self, name: str) -> Hope:
-        """How often the program looked for somebody or something, also by a longer or a shorter name."""
+        """Where the program looked for somebody or something, also by a longer or a shorter name."""
         found = Hope()
         for looked, hope in self.hopes.items():
             if looked == name or (SOMEBODY not in {looked, name} and (looked in name or name in looked)):
@@ -197,11 +199,12 @@ class ImaginedRobot(SimulatedRobot):
         self.draws.append(Presence(self.room, name, here))
         return here
 
-    def answered(self, count: int, *question: str) -> int:
-        """Draw the answer to a question, by its position among so many."""
-        drawn = self.lot.draw(count, *question)
-        self.draws.append(Answer(count, question, drawn))
-        return drawn
+    def answered(self, options: Sequence[str], *question: str) -> str:
+        """Draw the answer to a question."""
+        agreeing = next((i for i, text in enumerate(options) if AGREES.match(text)), 0)
+        drawn = self.lot.answer(len(options), agreeing, *question)
+        self.draws.append(Answer(len(options), agreeing, question, drawn))
+        return options[drawn]
 
     def settle(self, name: str, *, here: bool, by_lot: bool) -> None:
         """Let somebody or something be in this room or not, from now on."""
@@ -221,6 +224,11 @@ def meant(request: str) -> str:
     return SOMEBODY if name in PEOPLE else name
 
 
+def is_name(request: str) -> bool:
+    """Whether a request names a person, as far as its spelling tells; whoever is found by it is somebody."""
+    return request.strip()[:1].isupper()
+
+
 def drive(robot: ImaginedRobot, location: str) -> None:
     """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
     robot.record("goto", location)
@@ -234,20 +242,17 @@ def look(robot: ImaginedRobot, entity: str) -> bool:
     """Look for an object or for somebody; whether they are there is drawn at the first look."""
     name = meant(entity)
     here = robot.is_here(name)
-    if here is None and name in robot.scene.gone:
+    if here is None and (name in robot.scene.gone or (is_name(entity) and robot.scene.lacks(SOMEBODY))):
         here = False
         robot.scene.missed.add(name)
     if here is None:
         here = robot.drawn(name)
         robot.settle(name, here=here, by_lot=True)
-        if here and name == SOMEBODY:
-            robot.scene.people.add(name)
-        elif here:
+        if here and (name == SOMEBODY or is_name(entity)):
+            robot.scene.people |= {name, SOMEBODY}
+        if here and name != SOMEBODY:
             robot.things[robot.room].append(Thing(name, is_pattern=False))
-    if here:
-        robot.hopes[name].found.add(robot.room)
-    else:
-        robot.hopes[name].vain.add((robot.room, robot.now))
+    (robot.hopes[name].found if here else robot.hopes[name].vain).add(robot.room)
     robot.record("check", entity, found=here)
     return here
 
@@ -263,7 +268,7 @@ def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option,
     asked = (robot.room, who, question.strip())
     texts = [option.text for option in options]
     if robot.told.get(asked) not in texts:
-        drawn = texts[robot.answered(len(texts), "answer", *asked)]
+        drawn = robot.answered(texts, *asked)
         robot.told[asked] = drawn
         where = f'in "{brief(robot.room)}" to "{brief(question)}"'
         robot.facts.append(Fact(f'the answer {where} is "{brief(drawn)}"', by_lot=True))
@@ -294,6 +299,7 @@ def pick(robot: ImaginedRobot, obj: str) -> None:
     with robot.excused(when=again or hope.is_lost):
         real.pick(robot, obj)
     robot.scene.gone.add(name)
+    robot.scene.people.discard(name)
 
 
 def _lies_there(robot: ImaginedRobot, name: str) -> bool:

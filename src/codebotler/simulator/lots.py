@@ -17,7 +17,7 @@ class Lot:
         seed: any whole number.
         sample: the number of this world among those of the same seed.
         strict: whether what the program never looked for is drawn, too; else it is as the program takes it.
-        lucky: whether who or what is looked for is there in seven of eight cases, instead of every second.
+        lucky: whether who or what is looked for is there, and who is asked agrees, in seven of eight cases.
     """
 
     seed: int = 0
@@ -30,6 +30,18 @@ class Lot:
         texts = [str(self.seed), str(self.sample), *fact]
         named = "".join(f"{len(text)}:{text}" for text in texts).encode(errors="surrogatepass")
         return int.from_bytes(blake2b(named, digest_size=8).digest(), "big") % count
+
+    def answer(self, count: int, agreeing: int, *question: str) -> int:
+        """The position of the option that somebody chooses, by chance.
+
+        Args:
+            count: how many options there are.
+            agreeing: the position of the one that agrees most.
+            question: which question it is.
+        """
+        if self.lucky and self.draw(EIGHTS, "agrees", *question) < EIGHTS - 1:
+            return agreeing
+        return self.draw(count, "answer", *question)
 
     def is_there(self, room: str, name: str) -> bool:
         """Whether somebody or something is in a room, by chance."""
@@ -61,17 +73,19 @@ class Answer:
 
     Args:
         count: how many options there were.
-        fact: the question.
+        agreeing: the position of the one that agrees most.
+        question: which question it was.
         drawn: the position of the option that was chosen.
     """
 
     count: int
-    fact: tuple[str, ...]
+    agreeing: int
+    question: tuple[str, ...]
     drawn: int
 
     def is_drawn_by(self, lot: Lot) -> bool:
         """Whether the same would be drawn in another world."""
-        return lot.draw(self.count, *self.fact) == self.drawn
+        return lot.answer(self.count, self.agreeing, *self.question) == self.drawn
 
 
 Draw: TypeAlias = Presence | Answer

@@ -322,12 +322,39 @@ def test_a_search_by_a_longer_or_a_shorter_name_is_one_too(sought: str, placed: 
     assert len(robot.excuses) == 1
 
 
-def test_waiting_in_vain_excuses_asking() -> None:
+def test_waiting_in_vain_does_not_excuse_asking() -> None:
     robot = where("guest", there=False)
     robot.now = 60.0
     look(robot, "guest")
     assert failure(robot, "ask", "guest", "Tea?", YES_NO) == "AskNoPerson"
-    assert len(robot.excuses) == 1
+    assert robot.excuses == set()
+
+
+def test_who_has_a_name_is_somebody() -> None:
+    for sample in range(20):
+        robot = ImaginedRobot(PLAN, Lot(sample=sample))
+        if look(robot, "Bob"):
+            assert look(robot, "person")
+        robot = ImaginedRobot(PLAN, Lot(sample=sample))
+        if not look(robot, "person"):
+            assert not look(robot, "Bob")
+
+
+def test_what_was_taken_is_gone_also_if_it_has_a_name() -> None:
+    robot = where("Coke", there=True)
+    robot.perform("pick", ["Coke"])
+    assert not look(robot, "Coke")
+
+
+@pytest.mark.parametrize("options", [("No", "Yes"), ("Yes", "No")])
+def test_who_is_lucky_meets_people_who_mostly_agree(options: tuple[str, ...]) -> None:
+    def says_yes(sample: int, *, lucky: bool) -> bool:
+        robot = ImaginedRobot(PLAN, Lot(sample=sample, lucky=lucky))
+        chosen = robot.perform("ask", ["Bob", "Tea?", tuple(map(Option, options))])
+        return isinstance(chosen, int) and options[chosen] == "Yes"
+
+    assert 20 < sum(says_yes(sample, lucky=False) for sample in range(64)) < 44
+    assert sum(says_yes(sample, lucky=True) for sample in range(64)) > 52
 
 
 def test_finding_two_of_what_it_searches_excuses_picking_both() -> None:
