@@ -75,6 +75,10 @@ def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
         (("--tasks", "Nonsense"), 'the suite "paper" has no task "Nonsense"; its tasks are '),
         (("--temperature", "-1"), "the temperature is -1, but it must be between 0 and 100"),
         (("--num-completions", "0"), "invalid value for '--num-completions': "),
+        (
+            ("--num-completions", "10001"),
+            "invalid value for '--num-completions': 10001 is not in the range 1<=x<=10000",
+        ),
         (("--concurrency", "0"), "invalid value for '--concurrency': "),
         (("--out", ""), "nothing is named; name a run"),
         (("--base-url", "http://me:secret@localhost/v1"), "the base URL has a user name, a password or"),
@@ -104,6 +108,22 @@ def test_a_wrong_key_is_one_sentence_and_stands_nowhere(tmp_path: Path) -> None:
             assert "401" in ended.err
             assert KEY not in ended.err
     assert any(KEY in request.headers["authorization"] for request in server.requests)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("model", ["completions:tiny", "openai:tiny", "vllm:tiny"])
+@pytest.mark.parametrize("key", ["sk-one\nsk-two", "sk-schl\u00fcssel"])
+def test_a_key_that_cannot_be_sent_is_one_sentence(tmp_path: Path, model: str, key: str) -> None:
+    variable = "VLLM_API_KEY" if model.startswith("vllm") else "OPENAI_API_KEY"
+    with Server() as server:
+        ended = roboeval(
+            *served(server.url, model=model), cwd=tmp_path, environment={**ENVIRONMENT, variable: key}
+        )
+    assert (ended.status, ended.out) == (2, "")
+    assert ended.err.startswith(f"roboeval: the key in {variable} cannot be sent: ")
+    assert ended.err.count("\n") == 1
+    assert "sk-" not in ended.err
+    assert server.requests == []
     assert list(tmp_path.iterdir()) == []
 
 
