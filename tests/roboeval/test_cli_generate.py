@@ -75,17 +75,23 @@ def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
         (("--tasks", "Nonsense"), 'the suite "paper" has no task "Nonsense"; its tasks are '),
         (("--temperature", "-1"), "the temperature is -1, but it must be between 0 and 100"),
         (("--num-completions", "0"), "invalid value for '--num-completions': "),
-        (
-            ("--num-completions", "10001"),
-            "invalid value for '--num-completions': 10001 is not in the range 1<=x<=10000",
-        ),
         (("--concurrency", "0"), "invalid value for '--concurrency': "),
         (("--out", ""), "nothing is named; name a run"),
-        (("--base-url", "http://me:secret@localhost/v1"), "the base URL has a user name, a password or"),
+        (("--base-url", "http://me:secret@localhost/v1"), "the base URL has a user name, a password, a"),
     ],
 )
 def test_what_is_asked_wrongly_leaves_nothing(tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
     assert refused("generate", *words, cwd=tmp_path).startswith(sentence)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["generate", "run"])
+def test_no_more_than_10000_completions_of_a_prompt(tmp_path: Path, command: str) -> None:
+    words = (command, "--model", "recorded:nobody", "--num-completions")  # it is asked for nothing
+    sentence = refused(*words, "10001", cwd=tmp_path)
+    assert sentence.startswith("invalid value for '--num-completions': ")
+    assert "10000" in sentence
+    assert refused(*words, "10000", cwd=tmp_path).startswith("there is no recorded model")
     assert list(tmp_path.iterdir()) == []
 
 
