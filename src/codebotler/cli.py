@@ -72,12 +72,14 @@ def generate(
     ] = None,
 ) -> None:
     """Have a model write a program, and print it; status 1 if a check finds problems in it."""
+    from contextlib import ExitStack
+
     from codebotler.badinput import BadInput
-    from codebotler.generating import generated, in_words
+    from codebotler.generating import generated, in_words, recorder, told_form
     from codebotler.models.base import Settings
-    from codebotler.models.open import open_model
+    from codebotler.models.open import kind_of, open_model
     from codebotler.prompts import prompt_for
-    from codebotler.terminal import busy
+    from codebotler.terminal import busy, note
     from codebotler.world import World
 
     if not instruction.strip():
@@ -85,7 +87,10 @@ def generate(
     known = None if world is None else World.read(world)
     prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
     if show_prompt:
+        form = told_form(kind_of(model), model)
         print(in_words(prompt, model))
+        if form is not None:
+            note(form)
         return
     settings = Settings(
         temperature=temperature,
@@ -95,16 +100,18 @@ def generate(
         timeout=timeout,
         base_url=base_url,
     )
-    with busy(f"asking {model}"):
-        made = generated(
-            open_model(model, settings),
-            prompt,
-            world=known,
-            retries=int(repair) if retries is None else retries,
-            repair=repair,
-            record=record,
-        )
-    print(made.program, end="" if made.program.endswith("\n") else "\n")
+    with ExitStack() as recording:
+        with busy(f"asking {model}"):
+            asked = open_model(model, settings)
+            made = generated(
+                asked,
+                prompt,
+                world=known,
+                retries=int(repair) if retries is None else retries,
+                repair=repair,
+                note_down=recording.enter_context(recorder(record, asked.name)),
+            )
+        print(made.program, end="" if made.program.endswith("\n") else "\n")
     raise typer.Exit(1 if made.problems else 0)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from codebotler.check import check
-from codebotler.generation import Attempt, Generation, generate
+from codebotler.generation import Attempt, Generation, generate, untold
 from codebotler.models.base import Model
 from codebotler.models.paced import Paced
 from codebotler.prompts import Prompt
@@ -25,7 +26,7 @@ def generated(
     world: World | None = None,
     retries: int = 0,
     repair: bool = False,
-    record: Path | None = None,
+    note_down: Callable[[Attempt], None] = untold,
 ) -> Generation:
     """Have a model write a program, and say beside the results what is wrong with each attempt.
 
@@ -35,16 +36,15 @@ def generated(
         world: where the program is to run; without it, the rooms are those that the program goes to.
         retries: how many times a rejected program is asked for again, at least 0.
         repair: whether to ask again with the program and its problems.
-        record: a file that gets a line of JSON for every attempt.
+        note_down: told each attempt as it ends.
 
     Raises:
         ModelError: no whole reply came.
         EngineError: no isolated process could be started.
-        OSError: the record cannot be written.
     """
     rooms = None if world is None else [room.name for room in world.rooms]
     start = None if world is None else world.robot
-    with recorder(record, model.name) as note_down, Lanes(1) as lanes:
+    with Lanes(1) as lanes:
 
         def problems(program: str) -> list[str]:
             found = check(program, rooms=rooms, start=start, lanes=lanes)
@@ -71,17 +71,34 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
     Args:
         path: the file.
         model: the name of who is asked.
+
+    Raises:
+        OSError: at the end, if an attempt could not be added; after it, none is.
     """
     if path is None:
-        yield lambda _: None
+        yield untold
         return
-    with path.open("a", encoding="utf-8", errors="backslashreplace") as file:
+    failed: OSError | None = None
+    with path.open("ab", buffering=0) as file:
 
         def add(attempt: Attempt) -> None:
-            file.write(json.dumps(attempt.data(model), ensure_ascii=False) + "\n")
-            file.flush()
+            nonlocal failed
+            if failed is not None:
+                return
+            start = os.fstat(file.fileno()).st_size
+            text = json.dumps(attempt.data(model), ensure_ascii=False) + "\n"
+            line = memoryview(text.encode(errors="backslashreplace"))
+            try:
+                while line:
+                    line = line[file.write(line) :]
+            except OSError as error:
+                failed = OSError(error.errno, error.strerror, str(path))
+                with suppress(OSError):  # a device or a pipe has nothing to take back
+                    file.truncate(start)
 
         yield add
+    if failed is not None:
+        raise failed
 
 
 def _tell(attempt: Attempt, most: int) -> None:
@@ -104,3 +121,18 @@ def in_words(prompt: Prompt, model: str) -> str:
     if model.partition(":")[0] == "completions":
         return prompt.text.removesuffix("\n")
     return "\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages)
+
+
+def told_form(kind: str, model: str) -> str | None:
+    """What is to be said of the form in which a prompt is shown, where the model's name does not tell it.
+
+    Args:
+        kind: what stands before the colon of the model's name.
+        model: the name of the model.
+    """
+    if kind != "hf":
+        return None
+    return (
+        f"these are the messages that {model} gets if its tokenizer has a chat template; "
+        "without one it gets the text that --model completions:NAME shows"
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import json
@@ -23,6 +24,7 @@ from roboeval.suite import Suite
 MAX_ROW = 5_000_000
 MAX_EVALUATION = 1_000_000_000  # of our own rows: a trace may be a million characters in each of many worlds
 COMPLETIONS = "completions.jsonl"
+CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no folder to the disk
 
 Key: TypeAlias = tuple[str, int, int]
 
@@ -281,7 +283,10 @@ class Appender:
     path: Path
 
     def __post_init__(self) -> None:
+        is_new = not self.path.exists()
         self._file: BinaryIO = self.path.open("ab", buffering=0)
+        if is_new:
+            sync_folder(self.path.parent)
         whole = whole_length(self.path)
         if self.path.stat().st_size > whole:
             self._file.truncate(whole)
@@ -321,6 +326,27 @@ class Appender:
         """Bring everything to the disk, and let go of the file."""
         with self._file:
             self.sync()
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring to the disk which files a folder has, as far as its file system can.
+
+    Else a file whose content is on the disk may be gone after a power failure.
+
+    Raises:
+        OSError: the disk is broken.
+    """
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except PermissionError:  # a folder that may be written but not read
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in CANNOT_SYNC:
+            raise OSError(error.errno, error.strerror, str(folder)) from None
+    finally:
+        os.close(descriptor)
 
 
 def whole_length(path: Path) -> int:

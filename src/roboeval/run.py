@@ -22,6 +22,7 @@ from roboeval.records import (
     Completion,
     read_completions,
     recorded_completions,
+    sync_folder,
     to_line,
 )
 from roboeval.suite import ABLATED, Suite
@@ -159,6 +160,8 @@ class Run:
             os.close(descriptor)
             raise BadInput("another process is writing this run; wait until it has ended", file=self.path)
         try:
+            for folder in made:
+                sync_folder(folder.parent)
             yield
         except BaseException:
             if made and list(self.path.iterdir()) == [lock]:
@@ -296,6 +299,7 @@ def written_whole(path: Path) -> Iterator[BinaryIO]:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
+        sync_folder(path.parent)
     except OSError as error:
         temporary.unlink(missing_ok=True)
         if error.errno is None:

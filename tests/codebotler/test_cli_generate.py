@@ -17,6 +17,7 @@ from server import Fault, Request, Server
 KEY = "sk-verysecret0123456789abcdefghijkl"
 LOST = "```python\ndef task_program():\n    go_to('the moon')\n```\n"
 FINE = "```python\ndef task_program():\n    go_to('kitchen')\n```\n"
+LIMIT = 1 << 30  # bytes of a file, of which most take no room
 WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
 
 
@@ -28,11 +29,11 @@ class Ended(NamedTuple):
     err: str
 
 
-def codebotler(*arguments: str, cwd: Path | None = None, after: str = "") -> Ended:
-    """Run a command, with something of bash after it."""
+def codebotler(*arguments: str, cwd: Path | None = None, before: str = "", after: str = "") -> Ended:
+    """Run a command, with something of bash before and after it."""
     program = shlex.join([sys.executable, "-m", "codebotler.cli"])
     ended = subprocess.run(
-        ["bash", "-c", f"{program} {shlex.join(arguments)} {after.replace('codebotler', program)}"],
+        ["bash", "-c", f"{before} {program} {shlex.join(arguments)} {after.replace('codebotler', program)}"],
         capture_output=True,
         text=True,
         check=False,
@@ -154,6 +155,31 @@ def test_the_prompt_is_shown_without_a_key_or_a_server() -> None:
     assert base.out.endswith("# Instruction: Go to the kitchen.\ndef task_program():\n")
 
 
+def test_the_prompt_for_a_local_model_says_which_form_it_is() -> None:
+    ended = codebotler("generate", "Go to the kitchen.", "--model", "hf:no/such", "--show-prompt")
+    assert ended.status == 0
+    assert ended.out.startswith("--- system\n")
+    assert ended.err == (
+        "these are the messages that hf:no/such gets if its tokenizer has a chat template; "
+        "without one it gets the text that --model completions:NAME shows\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("model", "sentence"),
+    [
+        ("nonsense", '"nonsense" names no model; write recorded, '),
+        ("hf:", '"hf:" names no model; write recorded, '),
+        ("recorded:lazy", 'there is no recorded model "recorded:lazy"; there are recorded:careful, '),
+    ],
+)
+def test_no_prompt_is_shown_for_a_model_that_is_none(model: str, sentence: str) -> None:
+    ended = codebotler("generate", "Go to the kitchen.", "--model", model, "--show-prompt")
+    assert (ended.status, ended.out) == (2, "")
+    assert ended.err.startswith(f"codebotler: {sentence}")
+    assert ended.err.count("\n") == 1
+
+
 def test_a_world_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text("rooms: 3\n")
     ended = codebotler("generate", "Go.", "--world", "world.yaml", cwd=tmp_path)
@@ -164,3 +190,26 @@ def test_a_world_that_is_none(tmp_path: Path) -> None:
 def test_a_record_that_cannot_be_written(tmp_path: Path, paper: Suite) -> None:
     ended = codebotler("generate", instruction(paper), "--record", "no/such/folder", cwd=tmp_path)
     assert ended == (2, "", "codebotler: no/such/folder: No such file or directory\n")
+
+
+def test_a_full_disk_under_the_record_is_told_and_costs_no_program(tmp_path: Path) -> None:
+    with Server(answer=lost_at_first) as server:
+        ended = written(server, "--retries", "3", "--record", "/dev/full", cwd=tmp_path)
+    assert ended.status == 1
+    assert ended.out == "def task_program():\n    go_to('kitchen')\n"
+    assert ended.err.splitlines()[-2:] == [
+        "attempt 2 of 4 is accepted",
+        "codebotler: /dev/full: No space left on device; make room and give the same command again",
+    ]
+
+
+def test_a_record_that_does_not_fit_keeps_only_whole_lines(tmp_path: Path, paper: Suite) -> None:
+    record = tmp_path / "attempts.jsonl"
+    record.touch()
+    os.truncate(record, LIMIT - 100)
+    words = ("generate", instruction(paper), "--record", record.name)
+    ended = codebotler(*words, cwd=tmp_path, before=f"trap '' XFSZ; ulimit -f {LIMIT // 1024};")
+    assert ended.status == 1
+    assert ended.out.startswith("def task_program():\n")
+    assert ended.err.startswith("codebotler: attempts.jsonl: File too large")
+    assert record.stat().st_size == LIMIT - 100

@@ -77,11 +77,21 @@ def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
         (("--num-completions", "0"), "invalid value for '--num-completions': "),
         (("--concurrency", "0"), "invalid value for '--concurrency': "),
         (("--out", ""), "nothing is named; name a run"),
-        (("--base-url", "http://me:secret@localhost/v1"), "the base URL has a user name, a password or"),
+        (("--base-url", "http://me:secret@localhost/v1"), "the base URL has a user name, a password, a"),
     ],
 )
 def test_what_is_asked_wrongly_leaves_nothing(tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
     assert refused("generate", *words, cwd=tmp_path).startswith(sentence)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["generate", "run"])
+def test_no_more_than_10000_completions_of_a_prompt(tmp_path: Path, command: str) -> None:
+    words = (command, "--model", "recorded:nobody", "--num-completions")  # it is asked for nothing
+    sentence = refused(*words, "10001", cwd=tmp_path)
+    assert sentence.startswith("invalid value for '--num-completions': ")
+    assert "10000" in sentence
+    assert refused(*words, "10000", cwd=tmp_path).startswith("there is no recorded model")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -104,6 +114,22 @@ def test_a_wrong_key_is_one_sentence_and_stands_nowhere(tmp_path: Path) -> None:
             assert "401" in ended.err
             assert KEY not in ended.err
     assert any(KEY in request.headers["authorization"] for request in server.requests)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("model", ["completions:tiny", "openai:tiny", "vllm:tiny"])
+@pytest.mark.parametrize("key", ["sk-one\nsk-two", "sk-schl\u00fcssel"])
+def test_a_key_that_cannot_be_sent_is_one_sentence(tmp_path: Path, model: str, key: str) -> None:
+    variable = "VLLM_API_KEY" if model.startswith("vllm") else "OPENAI_API_KEY"
+    with Server() as server:
+        ended = roboeval(
+            *served(server.url, model=model), cwd=tmp_path, environment={**ENVIRONMENT, variable: key}
+        )
+    assert (ended.status, ended.out) == (2, "")
+    assert ended.err.startswith(f"roboeval: the key in {variable} cannot be sent: ")
+    assert ended.err.count("\n") == 1
+    assert "sk-" not in ended.err
+    assert server.requests == []
     assert list(tmp_path.iterdir()) == []
 
 

@@ -1,6 +1,8 @@
 """Rows of completions: what is accepted can be copied and read again, and nothing else is accepted."""
 
+import errno
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.badinput import BadInput
-from roboeval.records import MAX_ROW, read_completions, to_line
-from roboeval.run import Run, open_source
+from roboeval.records import MAX_ROW, Appender, read_completions, sync_folder, to_line
+from roboeval.run import Run, open_source, write_whole
 from roboeval.suite import Suite
 
 ROW = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": "x = 1"}
@@ -77,3 +79,78 @@ def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
     with pytest.raises(BadInput, match="as a row this is longer"):
         Run(tmp_path / "run").keep(open_source(str(path), paper))
     assert not (tmp_path / "run").exists()
+
+
+# --- what is brought to the disk
+
+
+@pytest.fixture
+def synced(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Path, frozenset[str]]]:
+    """What is brought to the disk, each with the files that it has if it is a folder."""
+    found: list[tuple[Path, frozenset[str]]] = []
+    fsync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        path = Path(f"/proc/self/fd/{descriptor}").readlink()
+        found.append(
+            (path, frozenset(file.name for file in path.iterdir()) if path.is_dir() else frozenset())
+        )
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    return found
+
+
+def test_a_line_is_brought_to_the_disk_when_that_is_asked_for(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    file = Appender(tmp_path / "a.jsonl")
+    synced.clear()
+    file.append(b"{}\n")
+    assert synced == []
+    file.sync()
+    assert synced == [(tmp_path / "a.jsonl", frozenset())]
+    file.close()
+    assert synced == [(tmp_path / "a.jsonl", frozenset())] * 2
+
+
+def test_a_new_file_is_in_its_folder_on_the_disk(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    Appender(tmp_path / "a.jsonl").close()
+    assert (tmp_path, frozenset({"a.jsonl"})) in synced
+    synced.clear()
+    Appender(tmp_path / "a.jsonl").close()
+    assert tmp_path not in dict(synced)  # it is there already
+
+
+def test_a_file_that_is_written_whole_is_in_its_folder_on_the_disk(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    write_whole(tmp_path / "run.json", b"{}")
+    assert synced == [(tmp_path / "run.json.new", frozenset()), (tmp_path, frozenset({"run.json"}))]
+
+
+def test_a_new_folder_of_a_run_is_on_the_disk(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    with Run(tmp_path / "runs" / "one").writing():
+        pass
+    assert synced == [
+        (tmp_path / "runs", frozenset({"one"})),
+        (tmp_path, frozenset({"runs"})),
+    ]
+
+
+def test_a_folder_that_cannot_be_synced_is_told_only_where_the_disk_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers = iter([errno.EINVAL, errno.EIO])
+
+    def refused(_descriptor: int) -> None:
+        raise OSError(next(numbers), "refused")
+
+    monkeypatch.setattr(os, "fsync", refused)
+    sync_folder(tmp_path)  # many a file system brings no folder to the disk
+    with pytest.raises(OSError, match=str(tmp_path)):
+        sync_folder(tmp_path)

@@ -16,6 +16,7 @@ from codebotler.reply import program_of
 Heard: TypeAlias = Callable[[str], None]
 
 HUGE = 20_000  # characters
+A_URL = "write one like http://localhost:8000/v1"
 NOT_IN_URL = "keys belong into the environment, not into a URL, which is recorded with a run"
 
 
@@ -62,15 +63,16 @@ class Settings:
 
 
 def _check_url(url: str) -> None:
+    # Nothing of it is quoted: where it is mistyped, nobody knows which part of it is a password.
+    if any(mark in url for mark in "@?#"):
+        raise BadInput(f"the base URL has a user name, a password, a query or a fragment; {NOT_IN_URL}")
     try:
         parts = urlsplit(url)
         _ = parts.port
-    except ValueError as error:
-        raise BadInput(f"the base URL is none ({error})") from None
-    if parts.username or parts.password or parts.query:
-        raise BadInput(f"the base URL has a user name, a password or a query; {NOT_IN_URL}")
+    except ValueError:
+        raise BadInput(f"the base URL has no valid host and port; {A_URL}") from None
     if parts.scheme not in {"http", "https"} or not parts.hostname:
-        raise BadInput(f'"{url}" is no base URL; write one like http://localhost:8000/v1')
+        raise BadInput(f"the base URL does not begin with http:// or https:// and a host; {A_URL}")
 
 
 @dataclass(frozen=True)

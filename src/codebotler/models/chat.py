@@ -24,17 +24,19 @@ from pydantic_ai.messages import (
 from pydantic_ai.models import Model as Spoken
 from pydantic_ai.models import infer_model, known_model_names
 from pydantic_ai.models.openai import OpenAIChatModel
-from pydantic_ai.providers import Provider, infer_provider, infer_provider_class
+from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings
 
 from codebotler.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
 from codebotler.models.faults import brief, broken_off, fault, late, refused, retry_after
-from codebotler.models.redaction import guard_logs, redacted
+from codebotler.models.keys import blank_is_unset, key_in
+from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.prompts import Message, Prompt
 
 OWN_SERVER = "openai-chat"  # what servers of one's own speak
 VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")
+KEY_VARIABLE = re.compile(r"\b[A-Z][A-Z0-9]*_[A-Z0-9_]*(?:KEY|TOKEN)[A-Z0-9_]*")
 INSTALL = re.compile(r'pip install "?[\w\[\],.-]+"?')
 TRANSPORTS = ("httpx", "httpx2", "httpcore", "httpcore2", "anyio", "ssl")
 
@@ -48,7 +50,8 @@ class Chat:
         settings: how it is to be asked.
 
     Raises:
-        BadInput: there is no such provider, its key is not in the environment, or its library is missing.
+        BadInput: there is no such provider, its key is not in the environment or cannot be sent, or its
+            library is missing.
     """
 
     def __init__(self, name: str, settings: Settings) -> None:
@@ -90,7 +93,7 @@ class Chat:
             raise
         except Exception as error:  # noqa: BLE001 - libraries of many providers, each with errors of its own
             raise self._told(error) from None
-        text = redacted(response.text or "")
+        text = without_keys(response.text or "")
         program = await program_in(text)
         return Reply(text, program, _usage(response), time.monotonic() - start, response.finish_reason)
 
@@ -167,19 +170,29 @@ def _usage(response: ModelResponse) -> Usage:
 def _spoken(name: str, base_url: str | None) -> Spoken:
     provider = name.partition(":")[0]
     try:
-        infer_provider_class(provider)
+        made = infer_provider_class(provider)
     except ValueError:
         raise BadInput(_unknown(provider)) from None
     except ImportError as error:
         raise BadInput(_not_installed(name, error)) from None
+    variables = _key_variables(provider, made)
+    for variable in variables:
+        key_in(variable)
     try:
-        return infer_model(name, lambda wanted: _provider(wanted, base_url))
+        with blank_is_unset(variables):
+            return infer_model(name, lambda wanted: _provider(wanted, base_url))
     except BadInput:
         raise
     except ImportError as error:
         raise BadInput(_not_installed(name, error)) from None
     except Exception as error:  # noqa: BLE001 - libraries of many providers, each with errors of its own
         raise BadInput(_not_set(name, error)) from None
+
+
+def _key_variables(provider: str, made: type[Provider[object]]) -> list[str]:
+    """The variables that a provider takes its key from; nothing but its source tells them all."""
+    source = inspect.getsource(gateway if provider.startswith("gateway/") else made)
+    return sorted(set(KEY_VARIABLE.findall(source)))
 
 
 def _provider(name: str, base_url: str | None) -> Provider[object]:

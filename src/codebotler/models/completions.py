@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import time
 
 import openai
@@ -13,7 +12,8 @@ from openai.types import Completion
 from codebotler.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
 from codebotler.models.faults import broken_off, fault, late, refused, retry_after
-from codebotler.models.redaction import guard_logs, redacted
+from codebotler.models.keys import key_in
+from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.prompts import Prompt
 
 KEY = "OPENAI_API_KEY"
@@ -29,11 +29,11 @@ class Completions:
         settings: how it is to be asked.
 
     Raises:
-        BadInput: neither a URL nor a key is given.
+        BadInput: neither a URL nor a key is given, or the key cannot be sent.
     """
 
     def __init__(self, model: str, settings: Settings) -> None:
-        key = os.environ.get(KEY)
+        key = key_in(KEY)
         if settings.base_url is None and not key:
             raise BadInput(
                 f"completions:{model} needs --base-url, or {KEY} in the environment for OpenAI's own"
@@ -67,7 +67,7 @@ class Completions:
             raise fault(self.name, f"the server sent no valid JSON ({error})", may_pass=True) from None
         if finish_reason is None:
             raise broken_off(self.name, begun=bool(text))
-        text = redacted(text)
+        text = without_keys(text)
         program = await program_in(prompt.program_from(text))
         return Reply(text, program, usage, time.monotonic() - start, finish_reason)
 

@@ -24,13 +24,11 @@ def open_model(name: str, settings: Settings) -> Model:
     Raises:
         BadInput: there is no such model, a key is not in the environment, or something is not installed.
     """
-    kind, _, rest = name.partition(":")
-    if kind == "recorded":
-        return Recital(recorded_model(name))
-    if not kind or not rest.strip():
-        raise BadInput(f'"{name}" names no model; write {KINDS}')
+    kind, rest = kind_of(name), name.partition(":")[2]
     # Each of these imports a large library, which only who uses it should wait for.
     match kind:
+        case "recorded":
+            return Recital(recorded_model(name))
         case "completions":
             from codebotler.models.completions import Completions  # noqa: PLC0415 - see above
 
@@ -45,3 +43,17 @@ def open_model(name: str, settings: Settings) -> Model:
             from codebotler.models.chat import Chat  # noqa: PLC0415 - see above
 
             return Chat(name, settings)
+
+
+def kind_of(name: str) -> str:
+    """What stands before the colon of a model's name, as far as it can be told without a large library.
+
+    Raises:
+        BadInput: there is no such recorded model, or this is the name of none.
+    """
+    kind, _, rest = name.partition(":")
+    if kind == "recorded":
+        recorded_model(name)
+    elif not kind or not rest.strip():
+        raise BadInput(f'"{name}" names no model; write {KINDS}')
+    return kind

@@ -9,8 +9,9 @@ import re
 from urllib.parse import quote
 
 SECRET = re.compile(r"key|token|secret|passw|credential", re.IGNORECASE)  # in the name of a variable
-SHORTEST = 8  # what is shorter is no key, and would be found everywhere
-SHAPED = re.compile(r"\b(?:sk|pk|gsk|xai|hf)[-_][\w*.-]{8,}|\bAIza[\w*-]{20,}|(?<=Bearer )\S{8,}")
+SHORTEST = 8  # what is shorter is found everywhere, and would spoil programs
+SHORTEST_TOLD = 3  # in errors and logs, where nothing is spoilt
+SHAPED = r"\b(?:sk|pk|gsk|xai|hf)[-_][\w*.-]{8,}|\bAIza[\w*-]{20,}|(?<=Bearer )\S{8,}"
 HIDDEN = "[key removed]"
 LOGGERS = (
     "openai",
@@ -31,19 +32,41 @@ LOGGERS = (
 
 
 def redacted(text: str) -> str:
-    """A text without the values of variables that hold keys, and without what has the shape of a key."""
-    for secret in _secrets():
-        for spelling in (secret, json.dumps(secret)[1:-1], repr(secret)[1:-1], quote(secret, safe="")):
-            text = text.replace(spelling, HIDDEN)
-    return SHAPED.sub(HIDDEN, text)
+    """An error or a line of a log without keys.
+
+    Removed are the values of variables that hold keys, even short ones, and what has the shape of a key.
+    """
+    return _rest(SHORTEST_TOLD).sub(HIDDEN, without_keys(text))
 
 
-def _secrets() -> list[str]:
-    """The values of all variables that hold keys, the longest first, since one may contain another."""
-    found = {
-        value.strip() for name, value in os.environ.items() if SECRET.search(name) and len(value) >= SHORTEST
+def without_keys(text: str) -> str:
+    """A reply without the values of variables that hold keys.
+
+    What only has the shape of a key stays, and so does what is short: both may be names in a program.
+    """
+    secrets = _secrets(SHORTEST)
+    return re.sub("|".join(secrets), HIDDEN, text) if secrets else text
+
+
+def _rest(shortest: int) -> re.Pattern[str]:
+    """What is still to be removed once long keys are; what stands for those is left as it is."""
+    return re.compile("|".join([re.escape(HIDDEN), SHAPED, *_secrets(shortest)]))
+
+
+def _secrets(shortest: int) -> list[str]:
+    """Patterns of the values of variables that hold keys, the longest first, for one may contain another."""
+    values = {value.strip() for name, value in os.environ.items() if SECRET.search(name)}
+    spellings = {
+        spelling
+        for value in values
+        if len(value) >= shortest
+        for spelling in (value, json.dumps(value)[1:-1], repr(value)[1:-1], _quoted(value))
     }
-    return sorted((value for value in found if len(value) >= SHORTEST), key=len, reverse=True)
+    return [re.escape(spelling) for spelling in sorted(spellings, key=len, reverse=True)]
+
+
+def _quoted(value: str) -> str:
+    return quote(value, safe="", errors="surrogateescape")
 
 
 class _Redaction(logging.Filter):

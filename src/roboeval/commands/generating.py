@@ -28,7 +28,7 @@ ModelOption = Annotated[
 OutOption = Annotated[
     Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
 ]
-NumOption = Annotated[int, typer.Option(min=1, help="Completions for each prompt.")]
+NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
 TemperatureOption = Annotated[float, typer.Option(help="How far the model strays from the likeliest.")]
 TopPOption = Annotated[float, typer.Option(help="The share of likely tokens that are drawn from.")]
 MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]

@@ -18,6 +18,7 @@ from typing import Any, Self
 
 TASK = "def task_program():\n"
 CHUNK = 24  # characters of a streamed piece
+DRIP = 0.2  # seconds between two pieces that come for ever
 HUGE = 1_000_000
 PAGE = "<html><body>This is a proxy. Please log in.</body></html>"
 
@@ -44,6 +45,7 @@ class Fault(Enum):
     EMPTY = auto()
     WITHOUT_CODE = auto()
     HUGE = auto()
+    DRIP = auto()
 
 
 REFUSALS: dict[Fault | None, tuple[int, str, str | None]] = {
@@ -250,6 +252,10 @@ class _Answer:
                         return
                     case Fault.STALLED:
                         await asyncio.sleep(self.server.delay)
+                    case Fault.DRIP:
+                        while True:
+                            yield json.dumps(self._object(piece, None))
+                            await asyncio.sleep(DRIP)
             yield json.dumps(self._object(piece, None))
         yield json.dumps(self._object("", "stop"))
         if self.server.counts and self.request.body.get("stream_options", {}).get("include_usage"):

@@ -88,3 +88,83 @@ def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
     )
     done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
     assert not {"openai", "pydantic_ai", "torch", "transformers", "tenacity"} & {*done.stdout.split()}
+
+
+@pytest.mark.parametrize(
+    ("name", "variable"),
+    [
+        ("completions:m", "OPENAI_API_KEY"),
+        ("openai-chat:m", "OPENAI_API_KEY"),
+        ("openai:m", "OPENAI_API_KEY"),
+        ("anthropic:m", "ANTHROPIC_API_KEY"),
+        ("google:m", "GOOGLE_API_KEY"),
+        ("vllm:m", "VLLM_API_KEY"),
+        ("gateway/openai:m", "PYDANTIC_AI_GATEWAY_API_KEY"),
+    ],
+)
+@pytest.mark.parametrize(
+    "key", ["sk-one\nsk-two", "sk-schl\u00fcssel", "sk-\x1bred", "sk-one\r", " sk-one", "sk-\udcff"]
+)
+@pytest.mark.parametrize("url", [None, URL])
+def test_key_that_cannot_be_sent_is_refused(
+    monkeypatch: pytest.MonkeyPatch, name: str, variable: str, key: str, url: str | None
+) -> None:
+    monkeypatch.setenv(variable, key)
+    with pytest.raises(BadInput) as caught:
+        open_model(name, Settings(base_url=url))
+    assert str(caught.value) == (
+        f"the key in {variable} cannot be sent: it has a line break, a space at an end, or what is no "
+        "printable ASCII; set it again"
+    )
+
+
+def test_key_of_another_provider_is_no_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-one\nsk-two")
+    asyncio.run(open_model("openai-chat:m", Settings(base_url=URL)).close())
+
+
+@pytest.mark.parametrize(
+    ("name", "variable"),
+    [
+        ("openai-chat:m", "OPENAI_API_KEY"),
+        ("openai:m", "OPENAI_API_KEY"),
+        ("anthropic:m", "ANTHROPIC_API_KEY"),
+        ("google:m", "GOOGLE_API_KEY"),
+    ],
+)
+@pytest.mark.parametrize("key", ["", "  "])
+def test_blank_key_is_a_missing_one(
+    monkeypatch: pytest.MonkeyPatch, name: str, variable: str, key: str
+) -> None:
+    monkeypatch.setenv(variable, key)
+    with pytest.raises(BadInput) as caught:
+        open_model(name, Settings())
+    assert str(caught.value) == f"{name} needs {variable} in the environment"
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "user:topsecretpw@localhost:8000/v1",
+        "http//user:topsecretpw@localhost/v1",
+        "http:/user:topsecretpw@localhost/v1",
+        "http://user:topsec/retpw@localhost/v1",
+        "http://user:topsecretpw/v1",
+        "http://user/topsecretpw@localhost/v1",
+        "http://localhost:topsecretpw",
+        "http://[topsecretpw/v1",
+        "http://localhost\u2100topsecretpw/v1",
+        "topsecretpw",
+        "ftp://topsecretpw",
+        "http://localhost/v1?key=topsecretpw",
+        "http://localhost/v1#topsecretpw",
+        "http://localhost/v1#",
+    ],
+)
+def test_base_url_that_is_refused_is_not_quoted(url: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        Settings(base_url=url)
+    sentence = str(caught.value)
+    assert sentence.startswith("the base URL ")
+    assert not any(part in sentence for part in ("topsec", "retpw", "user:", "key="))
+    assert caught.value.__cause__ is None

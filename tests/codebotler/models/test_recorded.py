@@ -142,10 +142,10 @@ def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
         ({"top_p": 1.5}, "top-p is 1.5, but it must be above 0 and at most 1"),
         ({"max_tokens": 0}, "the limit is 0 tokens, but it must be at least 1"),
         ({"timeout": 0.0}, "the timeout is 0 seconds, but it must be above 0"),
-        ({"base_url": "localhost:8000"}, '"localhost:8000" is no base URL; write one like http'),
-        ({"base_url": "http://a:99999/v1"}, "the base URL is none"),
-        ({"base_url": "http://me:sk-secret@a/v1"}, "the base URL has a user name, a password or a query"),
-        ({"base_url": "http://a/v1?key=sk-secret"}, "the base URL has a user name, a password or a query"),
+        ({"base_url": "localhost:8000"}, "the base URL does not begin with http:// or https:// and a host; "),
+        ({"base_url": "http://a:99999/v1"}, "the base URL has no valid host and port; write one like http"),
+        ({"base_url": "http://me:sk-secret@a/v1"}, "the base URL has a user name, a password, a query "),
+        ({"base_url": "http://a/v1?key=sk-secret"}, "the base URL has a user name, a password, a query "),
     ],
 )
 def test_settings_out_of_range_are_told(wrong: dict[str, Any], sentence: str) -> None:

@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 import pytest
 
-from codebotler.models.redaction import HIDDEN, SHORTEST, guard_logs, redacted
+from codebotler.models.redaction import HIDDEN, SHORTEST_TOLD, guard_logs, redacted, without_keys
 from server import Fault, Server
 
 KEY = "sk-Fake0123456789abcdefGHIJ"
@@ -115,10 +115,43 @@ def test_key_is_removed_however_it_is_spelt(monkeypatch: pytest.MonkeyPatch, spe
     assert redacted(f"a {spelling} b") == f"a {HIDDEN} b"
 
 
-def test_short_values_are_no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("KEYBOARD", "de"[:SHORTEST])
+def test_what_is_shorter_than_any_key_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("KEYBOARD", "decide"[: SHORTEST_TOLD - 1])
     monkeypatch.setenv("EMPTY_KEY", "")
     assert redacted("decide") == "decide"
+
+
+@pytest.mark.parametrize("key", ["secret", "abc", "key", "removed"])
+def test_short_key_is_kept_out_of_errors_and_logs_but_not_of_programs(
+    monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", key)
+    monkeypatch.setenv("OTHER_API_KEY", "a-long-one")
+    sentence = "Incorrect: {}, a-long-one, sk-0123456789."
+    assert redacted(sentence.format(key)) == f"Incorrect: {HIDDEN}, {HIDDEN}, {HIDDEN}"
+    program = f"say('{key}')"
+    assert without_keys(program) == program
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "pk_location_name = get_current_location()",
+        "for hf_rooms_to_visit in get_all_rooms(): pass",
+        "say('sk-abcdefghijkl')",
+        "say('Bearer of good news')",
+    ],
+)
+def test_program_keeps_names_that_look_like_keys(monkeypatch: pytest.MonkeyPatch, program: str) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", KEY)
+    assert without_keys(program) == program
+
+
+@pytest.mark.parametrize("spelling", [ODD, json.dumps(ODD)[1:-1], repr(f"'{ODD}")[3:-1], quote(ODD, safe="")])
+def test_program_loses_the_key_itself(monkeypatch: pytest.MonkeyPatch, spelling: str) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", ODD)
+    monkeypatch.setenv("OTHER_API_KEY", ODD[:-3])
+    assert without_keys(f"say('{spelling}')") == f"say('{HIDDEN}')"
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Chat and text completions, each against a real server that does what servers do."""
 
 import asyncio
+import os
 import socket
 from collections.abc import Coroutine, Iterator
 from typing import Any, TypeVar
@@ -169,6 +170,56 @@ def test_reply_that_takes_too_long_is_given_up(name: str, server: Server, fault:
         ask(name, server, timeout=0.3)
     assert caught.value.sentence == f"{name}: no whole reply came within 0.3 s"
     assert caught.value.may_pass
+
+
+@both
+def test_reply_that_never_ends_is_given_up_though_its_pieces_come_in_time(name: str, server: Server) -> None:
+    async def asked() -> None:
+        model = open_model(name, Settings(base_url=server.url, timeout=1.0))
+        try:
+            await asyncio.wait_for(model.reply(PROMPT, number=0, heard=heard.append), 10)
+        finally:
+            await model.close()
+
+    heard: list[str] = []
+    server.faults.append(Fault.DRIP)
+    with pytest.raises(ModelError) as caught:
+        asyncio.run(asked())
+    assert caught.value.sentence == f"{name}: no whole reply came within 1 s"
+    assert caught.value.may_pass
+    assert len(heard) > 2
+
+
+@both
+@pytest.mark.parametrize("word", ["pk_location_name", "hf_rooms_to_visit"])
+def test_program_with_a_name_that_looks_like_a_key_stays_as_it_is(
+    name: str, server: Server, word: str
+) -> None:
+    server.answer = lambda request: f"{TASK * request.is_chat}    {word} = 1\n"
+    reply, _ = ask(name, server)
+    assert reply.program == f"{TASK}    {word} = 1\n"
+
+
+@both
+def test_short_key_that_a_server_sends_back_is_not_told(
+    name: str, server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "sesame")
+    server.faults.append(Fault.UNAUTHORIZED)
+    with pytest.raises(ModelError) as caught:
+        ask(name, server)
+    assert server.requests[0].headers["authorization"] == "Bearer sesame"
+    assert "sesame" not in caught.value.sentence
+
+
+@both
+@pytest.mark.parametrize("key", ["", " "])
+def test_blank_key_is_no_key(name: str, server: Server, monkeypatch: pytest.MonkeyPatch, key: str) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", key)
+    reply, _ = ask(name, server)
+    assert reply.program == TASK + PROGRAM
+    assert server.requests[0].headers["authorization"] in {"Bearer none", "Bearer api-key-not-set"}
+    assert os.environ["OPENAI_API_KEY"] == key
 
 
 @both
