@@ -8,7 +8,9 @@ import os
 import re
 from urllib.parse import quote
 
-SECRET = re.compile(r"key|token|secret|passw|credential", re.IGNORECASE)  # in the name of a variable
+SECRET = re.compile(r"(?:key|token|secret|password|passwd|credential)s?(?:_|$)", re.IGNORECASE)
+"""What the names of variables that hold keys contain; TOKENIZERS_PARALLELISM is none."""
+
 SHORTEST = 8  # what is shorter is found everywhere, and would spoil programs
 SHORTEST_TOLD = 3  # in errors and logs, where nothing is spoilt
 SHAPED = r"\b(?:sk|pk|gsk|xai|hf)[-_][\w*.-]{8,}|\bAIza[\w*-]{20,}|(?<=Bearer )\S{8,}"

@@ -198,3 +198,22 @@ def test_logs_of_clients_keep_all_but_the_key(monkeypatch: pytest.MonkeyPatch) -
     assert f"headers [('Authorization', '{HIDDEN}')] of it\n" in text
     assert f"ValueError: could not convert string to float: '{HIDDEN}'" in text
     assert KEY not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "holds_a_key"),
+    [
+        ("OPENAI_API_KEY", True),
+        ("MYAPIKEY", True),
+        ("HF_TOKEN", True),
+        ("AWS_SECRET_ACCESS_KEY", True),
+        ("DB_PASSWORD_2", True),
+        ("TOKENIZERS_PARALLELISM", False),
+        ("KEYBOARD_LAYOUT", False),
+    ],
+)
+def test_names_of_variables_that_hold_keys(
+    monkeypatch: pytest.MonkeyPatch, name: str, *, holds_a_key: bool
+) -> None:
+    monkeypatch.setenv(name, "kitchen table")
+    assert (redacted("at the kitchen table") == "at the [key removed]") is holds_a_key
