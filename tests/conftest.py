@@ -1,6 +1,7 @@
 """What all tests share: the corpus of real programs, where it is at hand, and the paper's suite."""
 
 import os
+import signal
 from collections.abc import Generator
 from pathlib import Path
 from typing import TypeVar
@@ -12,6 +13,12 @@ from roboeval.suite import Suite, load_suite
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="A test that is skipped has failed.")
+
+
+def pytest_configure() -> None:
+    """Let Ctrl-C be what it is on a terminal, also for what tests start; a shell's background job ignores it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.hookimpl(wrapper=True)
