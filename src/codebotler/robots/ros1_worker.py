@@ -186,14 +186,18 @@ class Graph:
 
         return self.is_online() and self.address_of(self.node) == rospy.get_node_uri()
 
+    def nodes_of(self, server: str) -> List[str]:
+        """The nodes that say they take the goals of an action server; they may have died."""
+        _, subscribers, _ = self._master.getSystemState()
+        return [node for topic, names in subscribers if topic == server + "/goal" for node in names]
+
     def why_missing(self, server: str, type_name: str) -> str:
         """Why there is no connection with an action server."""
         if not self.is_online():
             return "%s is gone, and so is the ROS master at %s; start it again" % (server, self.uri)
         if not self.knows_us():
             return "the ROS master at %s was started anew; connect again" % self.uri
-        _, subscribers, _ = self._master.getSystemState()
-        nodes = [node for topic, names in subscribers if topic == server + "/goal" for node in names]
+        nodes = self.nodes_of(server)
         if not nodes:
             return "there is no action server at %s; start it" % server
         address = self.address_of(nodes[0])
@@ -350,13 +354,16 @@ class Worker:
         rospy.signal_shutdown("the end")
 
     def _missing(self) -> Dict[str, str]:
-        """Wait a while for all servers; those that are not there, with the reason, by skill."""
+        """Wait a while for the servers on the graph; those that are not there, with the reason, by skill."""
         until = time.monotonic() + self.patience
-        left = dict(self.servers)
-        while left and time.monotonic() < until:
-            left = {skill: server for skill, server in left.items() if not server.is_connected(self.silence)}
+        awaited = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
+        while not all(s.is_connected(self.silence) for s in awaited) and time.monotonic() < until:
             time.sleep(0.005)
-        return {skill: self.graph.why_missing(server.name, server.type) for skill, server in left.items()}
+        return {
+            skill: self.graph.why_missing(server.name, server.type)
+            for skill, server in self.servers.items()
+            if not server.is_connected(self.silence)
+        }
 
     def _cancel_all(self) -> None:
         for server in self.servers.values():
