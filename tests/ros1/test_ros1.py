@@ -63,16 +63,6 @@ def test_skill_that_fails_in_several_ways_names_itself(graph: Graph) -> None:
     assert error.value.kind == "PickFailed"
 
 
-def test_result_of_another_type_is_no_answer(graph: Graph) -> None:
-    graph.serve(replace(SKILLS["is_in_room"], ros=SKILLS["get_all_rooms"].ros))
-    robot = graph.robot(
-        skills=SkillTable((replace(SKILLS["is_in_room"], parameters=(), ros=SKILLS["get_all_rooms"].ros),))
-    )
-    robot.connect()
-    with pytest.raises(RobotLostError, match="must return bool, but the robot returned"):
-        robot.perform("is_in_room", [])
-
-
 def test_no_master_is_said_at_once() -> None:
     uri = f"http://localhost:{free_port()}"
     with pytest.raises(NotReadyError, match=f"no ROS master answers at {uri}; start one"):

@@ -170,8 +170,10 @@ class RosRobot:
             match message:
                 case {"is": "feedback", "text": str(phrase)}:
                     told(phrase)
+                case {"is": "result", "value": bool() | str() | list() | None as value}:
+                    return value
                 case {"is": "result", "value": value}:
-                    return _checked(skill, value)
+                    raise RobotLostError(f"{skill.name} cannot return {value!r:.100}, as the robot's did")
                 case {"is": "error", "text": str(text), "state": str(state)}:
                     raise error_of(skill, text, state)
                 case {"is": "cancelled"}:
@@ -238,17 +240,3 @@ def error_of(skill: Skill, text: str, state: str) -> RobotError:
         return RobotError(named[1], named[2])
     kind = skill.ros.failure or f"{skill.ros.type}Failed"
     return RobotError(kind, text or f"{skill.ros.server} {state} the goal without a reason")
-
-
-def _checked(skill: Skill, value: object) -> Result:
-    """What a server returned, where it is what the skill returns."""
-    match skill.returns, value:
-        case "None", _:
-            return None
-        case "str", str() as text:
-            return text
-        case "bool", bool() as truth:
-            return truth
-        case "list[str]", list() as texts if all(isinstance(text, str) for text in texts):
-            return texts
-    raise RobotLostError(f"{skill.name} must return {skill.returns}, but the robot returned {value!r}")
