@@ -77,7 +77,7 @@ def _interrupted(folder: Path) -> Summary | None:
         if State(summary.state) not in STEPS:
             return None
         events = events_of(folder)
-        told = last_told(events)
+        told = _last_told(events)
         if told is not None and State(told["state"]) not in STEPS:
             summary.state, summary.reason, summary.ended = told["state"], told.get("reason", ""), told["time"]
             summary.write(folder)
@@ -91,7 +91,7 @@ def _interrupted(folder: Path) -> Summary | None:
         log.close()
 
 
-def last_told(events: list[Line]) -> Line | None:
+def _last_told(events: list[Line]) -> Line | None:
     """The last event that tells of a state."""
     return next((line for line in reversed(events) if line["event"] == "state"), None)
 

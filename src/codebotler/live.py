@@ -43,8 +43,8 @@ class LiveRobot:
         robot: connected.
         note: takes down each skill, how it goes on and how it ends.
         place: the room it is in, as far as that is known.
-        clock_starts: what the program's clock shows when the robot's is 0; by default what a clock on the
-            wall shows now, since programs speak of the time to people.
+        clock_starts: what the program's clock shows at its start; by default what a clock on the wall shows
+            now, since programs speak of the time to people.
     """
 
     is_live = True
@@ -61,13 +61,14 @@ class LiveRobot:
         self._place = place
         self._events: list[Event] = []
         self._number = 0
+        self._began: float | None = None
         self._stopped = threading.Event()
         self._fault: OSError | None = None
 
     @property
     def now(self) -> float:
-        """What the robot's clock shows, in seconds since the start."""
-        return self.robot.clock.now
+        """Seconds by the robot's clock since the program began with its first skill."""
+        return 0.0 if self._began is None else self.robot.clock.now - self._began
 
     @property
     def trace(self) -> Trace:
@@ -162,6 +163,9 @@ class LiveRobot:
         return result
 
     def _go_on(self) -> None:
+        """Let the program go on, unless it is to end."""
+        if self._began is None:
+            self._began = self.robot.clock.now
         if self._fault is not None:
             raise self._fault
         if self._stopped.is_set():

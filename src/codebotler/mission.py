@@ -90,7 +90,7 @@ class Mission:
     def __init__(self, home: Path, robot: str, instruction: str = "", told: Told = untold) -> None:
         self.folder = _new_folder(home / "missions")
         self._log = Log(self.folder)
-        self._told = told
+        self.told = told
         self._book = threading.RLock()  # held while something is written and told; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
         self._stopped_by: str | None = None
@@ -326,7 +326,7 @@ class Mission:
             line = self._log.add(event, clock=clock, **data)
             if event == "state":
                 self.summary.write(self.folder)
-            self._told(line)
+            self.told(line)
 
 
 def _reason(error: BaseException) -> str:
