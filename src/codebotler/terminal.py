@@ -34,6 +34,12 @@ def note(sentence: str) -> None:
     print(sentence, file=sys.stderr)
 
 
+def says_yes(question: str) -> bool:
+    """Ask the person who reads this; whoever says nothing, or is not there, does not say yes."""
+    print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in {"y", "yes"}
+
+
 def visible(text: str) -> str:
     """A text with whatever a terminal would obey or hide, such as ESC, written out as an escape."""
     if text.isprintable():
