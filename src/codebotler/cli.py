@@ -235,14 +235,16 @@ def virtual_robot(
     world: Annotated[Path, typer.Option(help="The world file that tells where the robot is.")],
     port: Annotated[
         int | None,
-        typer.Option(min=1, max=65535, help="Of the ROS master; that of ROS_MASTER_URI, or 11311, by default."),
+        typer.Option(
+            min=1, max=65535, help="Of the ROS master; that of ROS_MASTER_URI, or 11311, by default."
+        ),
     ] = None,
     speed: Annotated[float, typer.Option(help="How many of the robot's seconds pass in a real one.")] = 1.0,
     ros_python: Annotated[
         Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
     ] = Path("/usr/bin/python3"),
 ) -> None:
-    """Offer a simulated robot's skills on a ROS 1 graph, until Ctrl-C; starts a ROS master if none answers."""
+    """Offer a simulated robot's skills on ROS 1, until Ctrl-C; starts a ROS master if none answers."""
     from contextlib import suppress
 
     from codebotler.robots.virtual import VirtualRobot

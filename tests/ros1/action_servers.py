@@ -6,24 +6,31 @@ import signal
 import sys
 import threading
 import time
+from typing import Any
 
-WORKER = os.path.join(os.path.dirname(__file__), "..", "..", "src", "codebotler", "robots")
-sys.path.insert(0, os.environ.get("WORKER", WORKER))
+sys.path.insert(0, sys.argv[1])
 
-import actionlib  # noqa: E402 - the path comes first
-import rospy  # noqa: E402
-from actionlib_msgs.msg import GoalStatus  # noqa: E402
-from ros1_worker import message_types  # noqa: E402
+import actionlib
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from ros1_worker import message_types
+
+ABORTS = {
+    "abort": "the door is shut",
+    "abort, named": "DoorIsShut: you have no key",
+    "abort without a word": "",
+}
+NEVER = ("never", "never, whatever you say", "late")
 
 
-def tell(*what):
+def tell(*what: str) -> None:
     print(json.dumps(what), flush=True)
 
 
-class Deaf(actionlib.ActionServer):
+class Deaf(actionlib.ActionServer):  # type: ignore[misc]  # it has no types
     """Takes no notice of goals while the environment says so."""
 
-    def internal_goal_callback(self, goal):
+    def internal_goal_callback(self, goal: Any) -> None:
         if os.environ.get("DEAF"):
             tell("ignored")
         else:
@@ -31,27 +38,22 @@ class Deaf(actionlib.ActionServer):
 
 
 class Server:
-    def __init__(self, name, spec):
+    def __init__(self, name: str, spec: Any) -> None:
         self.server = Deaf(name, spec, self.start, self.cancel, auto_start=False)
         self.server.start()
-        self.goals = {}
+        self.goals: dict[str, Any] = {}
 
-    def start(self, handle):
-        goal = handle.get_goal()
+    def start(self, handle: Any) -> None:
+        goal, result = handle.get_goal(), handle.get_default_result()
         text = getattr(goal, goal.__slots__[0]) if goal.__slots__ else ""
         self.goals[handle.get_goal_id().id] = handle, text
         tell("goal", text)
-        result = handle.get_default_result()
         if text == "reject":
             handle.set_rejected(result, "not in this gown")
             return
         handle.set_accepted()
-        if text == "abort":
-            handle.set_aborted(result, "the door is shut")
-        elif text == "abort, named":
-            handle.set_aborted(result, "DoorIsShut: you have no key")
-        elif text == "abort without a word":
-            handle.set_aborted(result)
+        if text in ABORTS:
+            handle.set_aborted(result, ABORTS[text])
         elif text == "die":
             os.kill(os.getpid(), signal.SIGKILL)
         elif text == "by somebody else":
@@ -64,12 +66,10 @@ class Server:
             setattr(feedback, feedback.__slots__[0], "the hall")
             handle.publish_feedback(feedback)
             threading.Timer(0.3, handle.set_succeeded, [result]).start()
-        elif text not in {"never", "never, whatever you say", "late"}:
-            if result.__slots__:
-                result.result = ["not a truth"] if isinstance(result.result, list) else result.result
+        elif text not in NEVER:
             handle.set_succeeded(result)
 
-    def cancel(self, handle):
+    def cancel(self, handle: Any) -> None:
         handle, text = self.goals[handle.get_goal_id().id]
         tell("cancel", text)
         if text == "late":
@@ -79,7 +79,7 @@ class Server:
 
 
 rospy.init_node("servers", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
-actions = json.loads(sys.argv[1])
+actions = json.loads(sys.argv[2])
 specs = message_types([{"type": kind, "definition": text} for kind, _, text in actions])
 servers = [Server(name, specs[kind]) for kind, name, _ in actions]
 tell("ready")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.robots.ros import Waits
-from codebotler.robots.ros1 import PYTHON, Ros1
+from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
 from codebotler.skills import SKILLS, Skill
 
 HERE = Path(__file__).parent
@@ -90,7 +90,7 @@ class Graph:
     def serve(self, *skills: Skill, **environment: str) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
         actions = [[s.ros.type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
-        server = Process(SERVER, json.dumps(actions), master=self.uri, **environment)
+        server = Process(SERVER, str(SCRIPT.parent), json.dumps(actions), master=self.uri, **environment)
         self.processes.append(server)
         server.expect("ready")
         return server

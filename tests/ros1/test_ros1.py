@@ -18,7 +18,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros import Waits
 from codebotler.robots.ros1 import SCRIPT, Ros1
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS, Parameter, RosAction, Skill, SkillTable
+from codebotler.skills import SKILLS, Parameter, RosAction, Skill
 from ros_graph import GO_TO, LONG, SAY, Graph, free_port, started
 
 
@@ -30,7 +30,7 @@ def test_goal_is_executed_and_the_result_comes_back(graph: Graph) -> None:
     assert robot.perform("go_to", ["the hall"]) is None
     server.expect("goal", "the hall")
     assert robot.perform("get_current_location", []) == ""
-    assert robot.perform("get_all_rooms", []) == ["not a truth"]
+    assert robot.perform("get_all_rooms", []) == []
     assert robot.perform("is_in_room", ["mug"]) is False
     assert robot.perform("ask", ["ann", "tea?", ("yes", "no")]) == ""
 
@@ -321,7 +321,7 @@ def test_second_tool_is_refused_and_the_first_goes_on(graph: Graph) -> None:
     graph.serve(GO_TO)
     first, second = graph.robot(), graph.robot()
     first.connect()
-    with pytest.raises(NotReadyError, match="another codebotler has this robot: the node /codebotler at http"):
+    with pytest.raises(NotReadyError, match="another codebotler has this robot: the node /codebotler at"):
         second.connect()
     first.perform("go_to", ["the hall"])
     first.disconnect()
@@ -420,9 +420,7 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
     def digest(*lines: str) -> str:
         return md5("\n".join(lines).encode(), usedforsecurity=False).hexdigest()
 
-    actions = [
-        {"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None
-    ]
+    actions = [{"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None]
     said = subprocess.run(
         ["/usr/bin/python3", "-c", MD5, str(SCRIPT.parent), json.dumps(actions)],
         capture_output=True,

@@ -39,7 +39,8 @@ def virtual(graph: Graph) -> Iterator[VirtualRobot]:
     virtual.stop()
 
 
-def test_it_does_on_the_graph_what_the_simulated_robot_does(graph: Graph, virtual: VirtualRobot) -> None:
+@pytest.mark.usefixtures("virtual")
+def test_it_does_on_the_graph_what_the_simulated_robot_does(graph: Graph) -> None:
     robot = graph.robot()
     robot.connect()
     assert robot.missing == {}

@@ -8,7 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codebotler.robots.base import Argument, CancelledError, Feedback, NotReadyError, Result, RobotLostError, untold
+from codebotler.robots.base import (
+    Argument,
+    CancelledError,
+    Feedback,
+    NotReadyError,
+    Result,
+    RobotLostError,
+    untold,
+)
 from codebotler.robots.clock import Clock
 from codebotler.robots.worker import ENDED, Message, Worker
 from codebotler.simulator.robot import RobotError
@@ -85,12 +93,12 @@ class RosRobot:
         """Start a worker, wait for the action servers, and set the clock to 0.
 
         Raises:
-            NotReadyError: there is no ROS, no master, no action server at all, or somebody else has the robot.
+            NotReadyError: there is no ROS, no master, no action server, or somebody else has the robot.
         """
         self.disconnect()
         worker = self._start(cancel_all=self._doubtful)
         self.missing = worker.about["missing"]
-        if self.missing and len(self.missing) == sum(skill.ros is not None for skill in self.skills.rows):
+        if self.missing and self.missing.keys() == actions_of(self.skills).keys():
             worker.leave()
             raise NotReadyError(f"the robot has no action server at all: {next(iter(self.missing.values()))}")
         self._worker, self._stopped, self._doubtful = worker, False, False
@@ -136,14 +144,9 @@ class RosRobot:
             self._doubtful = True
 
     def _start(self, *, cancel_all: bool) -> Worker:
-        actions = {
-            skill.name: {"type": skill.ros.type, "server": skill.ros.server, "definition": skill.ros.definition}
-            for skill in self.skills.rows
-            if skill.ros is not None
-        }
         start = {
             "node": self._ros.node,
-            "actions": actions,
+            "actions": actions_of(self.skills),
             "cancel_all": cancel_all,
             "patience": self._waits.patience,
             "silence": self._waits.silence,
@@ -165,26 +168,26 @@ class RosRobot:
             message = worker.receive(self._waits.patience * 2)
             if message is None or message["is"] in {ENDED, "gone"}:
                 raise self._lost(worker, message)
-            if message.get("id") != number:
-                continue
-            match message:
-                case {"is": "feedback", "text": str(phrase)}:
-                    told(phrase)
-                case {"is": "result", "value": bool() | str() | list() | None as value}:
-                    return value
-                case {"is": "result", "value": value}:
-                    raise RobotLostError(f"{skill.name} cannot return {value!r:.100}, as the robot's did")
-                case {"is": "error", "text": str(text), "state": str(state)}:
-                    raise error_of(skill, text, state)
-                case {"is": "cancelled"}:
-                    raise CancelledError
-                case {"is": "unsent", "anew": True, "text": str(text)}:
-                    raise _AnewError(text)
-                case {"is": "lost", "text": str(text)}:
-                    self._doubtful = True
-                    raise RobotLostError(text)
-                case {"is": "unsent", "text": str(text)}:
-                    raise RobotLostError(text)
+            if message.get("id") == number and message["is"] == "feedback":
+                told(message["text"])
+            elif message.get("id") == number:
+                return self._end(skill, message)
+
+    def _end(self, skill: Skill, message: Message) -> Result:
+        """What a goal came to, as the worker tells it."""
+        match message:
+            case {"is": "result", "value": bool() | str() | list() | None as value}:
+                return value
+            case {"is": "result", "value": value}:
+                raise RobotLostError(f"{skill.name} cannot return {value!r:.100}, as the robot's did")
+            case {"is": "error", "text": str(text), "state": str(state)}:
+                raise error_of(skill, text, state)
+            case {"is": "cancelled"}:
+                raise CancelledError
+            case {"is": "unsent", "anew": True, "text": str(text)}:
+                raise _AnewError(text)
+        self._doubtful = self._doubtful or message["is"] == "lost"
+        raise RobotLostError(message["text"])
 
     def _lost(self, worker: Worker, message: Message | None) -> Exception:
         """What to raise when nobody looks after the goal any more, after all goals were cancelled."""
@@ -224,6 +227,15 @@ class RosRobot:
 
 class _AnewError(Exception):
     """The master was started anew and does not know the worker."""
+
+
+def actions_of(skills: SkillTable) -> Message:
+    """What a worker needs to know of each skill that has an action, by name."""
+    return {
+        skill.name: {"type": ros.type, "server": ros.server, "definition": ros.definition}
+        for skill in skills.rows
+        if (ros := skill.ros) is not None
+    }
 
 
 def error_of(skill: Skill, text: str, state: str) -> RobotError:

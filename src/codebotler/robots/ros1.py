@@ -49,7 +49,9 @@ def readiness(python: Path = PYTHON) -> Readiness:
     """Whether the interpreter has rospy and what belongs to it."""
     missing = lacks(python, NEEDS)
     if missing is None:
-        return Readiness("ros1", works=False, missing=f"{python} cannot be run", mend="name another: --ros-python")
+        return Readiness(
+            "ros1", works=False, missing=f"{python} cannot be run", mend="name another: --ros-python"
+        )
     if missing:
         return Readiness("ros1", works=False, missing=f"{python} lacks {', '.join(missing)}", mend=MEND)
     return Readiness("ros1", works=True, note=f"by {python}; needs a master, see ROS_MASTER_URI")

@@ -1,16 +1,16 @@
 """The worker of the virtual robot: real action servers on a ROS 1 graph, run by a Python that has rospy.
 
-What a skill does is decided on the other side of the channel: each goal and each cancel is told there, and how
-a goal ends is heard from there. Where no master answers, it starts one that ends with this process.
+What a skill does is decided on the other side of the channel: each goal and each cancel is told there, and
+how a goal ends is heard from there. Where no master answers, it starts one that ends with this process.
 """
 
 from __future__ import annotations
 
 import socket
 import threading
-from typing import Any, Dict, List
+from typing import Any
 
-from ros1_worker import Channel, Graph, Message, NotReadyError, main, message_types
+from ros1_worker import Channel, Graph, Message, NotReadyError, main, message_types, no_master
 
 
 class Servers:
@@ -29,10 +29,10 @@ class Servers:
         self.graph = Graph(start["node"])
         self.master = None if self.graph.is_online() else started_master(start["port"], self.graph.uri)
         self.graph.enter()
-        self.handles: Dict[str, Any] = {}
+        self.handles: dict[str, Any] = {}
         self.lock = threading.Lock()
         specs = message_types(list(start["actions"].values()))
-        self.servers: List[Any] = []
+        self.servers: list[Any] = []
         for skill, action in start["actions"].items():
             spec = specs[action["type"]]
             server = actionlib.ActionServer(
@@ -64,8 +64,8 @@ class Servers:
         if self.master is not None:
             self.master.stop()
 
-    def _starter(self, skill: str) -> Any:  # noqa: ANN401 - what actionlib wants
-        def start(handle: Any) -> None:  # noqa: ANN401 - actionlib has no types
+    def _starter(self, skill: str) -> Any:
+        def start(handle: Any) -> None:
             goal, number = handle.get_goal(), handle.get_goal_id().id
             with self.lock:
                 self.handles[number] = handle
@@ -75,18 +75,18 @@ class Servers:
 
         return start
 
-    def _cancel(self, handle: Any) -> None:  # noqa: ANN401 - actionlib has no types
+    def _cancel(self, handle: Any) -> None:
         self.channel.tell("cancel", id=handle.get_goal_id().id)
 
 
-def started_master(port: Any, uri: str) -> Any:  # noqa: ANN401 - a number or nothing; rosmaster has no types
+def started_master(port: Any, uri: str) -> Any:
     """A master in this process.
 
     Raises:
         NotReadyError: it may not be started, or the port is taken.
     """
     if port is None:
-        raise NotReadyError("no ROS master answers at %s; start one (roscore), or set ROS_MASTER_URI" % uri)
+        raise NotReadyError(no_master(uri))
     import rosmaster.master
 
     with socket.socket() as probe:
@@ -95,7 +95,7 @@ def started_master(port: Any, uri: str) -> Any:  # noqa: ANN401 - a number or no
             probe.bind(("127.0.0.1", port))
         except OSError as error:
             raise NotReadyError(
-                "port %d is taken by what is no ROS master (%s); name another one with --port" % (port, error)
+                f"port {port} is taken by what is no ROS master ({error}); name another one with --port"
             ) from None
     master = rosmaster.master.Master(port)
     master.start()

@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from codebotler.robots.base import Argument, CancelledError, RobotLostError, untold
+from codebotler.robots.ros import actions_of
 from codebotler.robots.ros1 import MASTER, PYTHON
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.worker import Message, Worker
@@ -67,11 +68,7 @@ class VirtualRobot:
         Raises:
             NotReadyError: there is no ROS, or no master and none may be started.
         """
-        actions = {
-            skill.name: {"type": skill.ros.type, "server": skill.ros.server, "definition": skill.ros.definition}
-            for skill in self._skills.rows
-            if skill.ros is not None
-        }
+        actions = actions_of(self._skills)
         where = urlsplit(self.address)
         port = (where.port or 11311) if where.hostname in HERE else None
         environment = {"ROS_MASTER_URI": self.address}
@@ -162,5 +159,3 @@ class VirtualRobot:
             return {"do": "abort", "text": f"{error.kind}: {error}"}
         except CancelledError:
             return {"do": "cancelled"}
-
-

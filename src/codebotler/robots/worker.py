@@ -57,7 +57,9 @@ class Worker:
                 start_new_session=True,
             )
         except OSError as error:
-            raise NotReadyError(f"{python}: {error.strerror}; name the robot's Python by --ros-python") from None
+            raise NotReadyError(
+                f"{python}: {error.strerror}; name the robot's Python by --ros-python"
+            ) from None
         self._readers = [
             threading.Thread(target=self._listen, args=(self._process.stdout,), daemon=True),
             threading.Thread(target=self._keep, args=(self._process.stderr,), daemon=True),
