@@ -29,7 +29,7 @@ test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --ignore tests/ros1 $(TESTS)
 
 test-ros1: $(VENV)/tested
-	$(BIN)/python -m pytest --no-skips --numprocesses 2 --dist loadfile tests/ros1
+	$(BIN)/python -m pytest --no-skips --numprocesses 2 tests/ros1
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py

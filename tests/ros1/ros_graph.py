@@ -124,3 +124,21 @@ def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
     yield ended
     thread.join(LONG)
     assert not thread.is_alive()
+
+
+INSTALLED = """
+import sys
+sys.path.insert(0, {worker!r})
+from ros1_worker import build
+build(sys.modules[__name__], {name!r}, {definition!r})
+"""
+
+
+def installed(folder: Path, name: str, definition: str) -> str:
+    """Install the robot's package with one action; what is then on the path."""
+    package = folder / "robot_actions_pkg" / "msg"
+    package.mkdir(parents=True)
+    package.with_name("__init__.py").touch()
+    code = INSTALLED.format(worker=str(SCRIPT.parent), name=name, definition=definition)
+    (package / "__init__.py").write_text(code)
+    return str(folder)

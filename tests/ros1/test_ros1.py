@@ -19,7 +19,7 @@ from codebotler.robots.ros import Waits
 from codebotler.robots.ros1 import SCRIPT, Ros1
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, Parameter, RosAction, Skill
-from ros_graph import GO_TO, LONG, SAY, Graph, free_port, started
+from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
 
 
 def test_goal_is_executed_and_the_result_comes_back(graph: Graph) -> None:
@@ -374,22 +374,11 @@ def test_ninth_skill_is_performed(graph: Graph) -> None:
     server.expect("goal", "ann")
 
 
-INSTALLED = """
-import sys
-sys.path.insert(0, {worker!r})
-from ros1_worker import build
-build(sys.modules[__name__], "GoTo", "string location\\n---\\n---\\nstring near\\n")
-"""
-
-
 def test_installed_messages_are_preferred_and_their_feedback_is_told(
     graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = tmp_path / "robot_actions_pkg"
-    (package / "msg").mkdir(parents=True)
-    (package / "__init__.py").touch()
-    (package / "msg" / "__init__.py").write_text(INSTALLED.format(worker=str(SCRIPT.parent)))
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    definition = "string location\n---\n---\nstring near\n"
+    monkeypatch.setenv("PYTHONPATH", installed(tmp_path, "GoTo", definition))
     graph.serve(GO_TO, SAY)
     robot = graph.robot()
     robot.connect()
