@@ -163,6 +163,18 @@ class Graph:
         )
         return address is not None
 
+    def leave(self) -> None:
+        """Be a node no more."""
+        import rospy
+
+        rospy.signal_shutdown("the end")
+
+    def is_left(self) -> bool:
+        """Whether this is a node no more, since another one has taken its name."""
+        import rospy
+
+        return bool(rospy.is_shutdown())
+
     def is_online(self) -> bool:
         """Whether the master answers."""
         before = socket.getdefaulttimeout()
@@ -297,7 +309,8 @@ class Goal:
     def __init__(self, number: int, server: Server) -> None:
         self.number, self.server = number, server
         self.lock = threading.RLock()
-        self.handle: Any = None
+        self.stop: Callable[[], None] | None = None
+        self.handle: Any = None  # actionlib forgets a goal of which nobody keeps this
         self.sent: float | None = None
         self.is_acknowledged = self.is_over = False
         self.ends: float | None = None  # since when only its result is waited for
@@ -308,8 +321,8 @@ class Goal:
         """Cancel it; if it has not been sent yet, it never will be."""
         with self.lock:
             self.cancelled = self.cancelled or time.monotonic()
-            if self.handle is not None:
-                self.server.cancel(self.handle.comm_state_machine.action_goal.goal_id.id)
+            if self.stop is not None:
+                self.stop()
 
 
 class Worker:
@@ -325,12 +338,8 @@ class Worker:
         self.patience: float = start["patience"]
         self.silence: float = start["silence"]
         self.longest: float = start["longest"]
-        self.graph = Graph(start["node"])
-        left_behind = self.graph.enter()
-        specs = message_types(list(start["actions"].values()))
-        self.servers = {
-            skill: Server(action, specs[action["type"]]) for skill, action in start["actions"].items()
-        }
+        self.graph, left_behind = self._entered(start["node"])
+        self.servers: dict[str, Any] = self._servers(start["actions"])
         self.goal: Goal | None = None
         missing = self._missing()
         if left_behind or start["cancel_all"]:
@@ -349,13 +358,22 @@ class Worker:
 
     def leave(self) -> None:
         """Cancel what goes on, and leave the graph."""
-        import rospy
-
         goal = self.goal
         if goal is not None and not goal.is_over:
             goal.cancel()
             goal.ended.wait(LAST_WORDS)
-        rospy.signal_shutdown("the end")
+        if goal is not None and goal.cancelled is not None:
+            time.sleep(TICK)  # ROS sends in threads of its own
+        self.graph.leave()
+
+    def _entered(self, node: str) -> Any:
+        """The graph, and whether an earlier worker died there without leaving."""
+        graph = Graph(node)
+        return graph, graph.enter()
+
+    def _servers(self, actions: Message) -> dict[str, Any]:
+        specs = message_types(list(actions.values()))
+        return {skill: Server(action, specs[action["type"]]) for skill, action in actions.items()}
 
     def _missing(self) -> dict[str, str]:
         """Wait a while for the servers on the graph; those that are not there, with the reason, by skill."""
@@ -372,7 +390,7 @@ class Worker:
     def _cancel_all(self) -> None:
         for server in self.servers.values():
             server.cancel()
-        time.sleep(TICK)  # rospy sends in threads of its own
+        time.sleep(TICK)  # ROS sends in threads of its own
 
     def _perform(self, line: Message) -> None:
         server = self.servers[line["skill"]]
@@ -414,6 +432,8 @@ class Worker:
                 lambda handle: self._changed(goal, handle),
                 lambda _, feedback: self._feedback(goal, feedback),
             )
+            goal_id = goal.handle.comm_state_machine.action_goal.goal_id.id
+            goal.stop = lambda: goal.server.cancel(goal_id)
 
     def _changed(self, goal: Goal, handle: Any) -> None:
         """Hear of a step of the goal's life, in one of rospy's threads."""
@@ -448,13 +468,13 @@ class Worker:
             if goal.is_over:
                 return
             goal.is_over = True
+        if what == "lost":
+            goal.cancel()
         self.channel.tell(what, id=goal.number, **more)
         goal.ended.set()
 
     def _watch(self) -> None:
         """Look after the goal that goes on, by a clock that neither ROS nor anybody else sets."""
-        import rospy
-
         told = 0.0
         while True:
             time.sleep(TICK)
@@ -462,14 +482,13 @@ class Worker:
             if now - told >= ALIVE:
                 self.channel.tell("alive")
                 told = now
-            if rospy.is_shutdown():
+            if self.graph.is_left():
                 self.channel.tell("gone", text=f"another node called {self.graph.node} has taken over")
                 return
             goal = self.goal
             if goal is not None and not goal.is_over:
                 why = self._fault(goal, now)
                 if why is not None:
-                    goal.cancel()
                     self._end(goal, "lost", text=why)
 
     def _fault(self, goal: Goal, now: float) -> str | None:
