@@ -209,5 +209,5 @@ def _stopped_by_signals(mission: Mission) -> Iterator[list[int]]:
     try:
         yield got
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, handler in before.items():  # who was impatient must not break the tidying up
+            signal.signal(number, signal.SIG_IGN if got else handler)

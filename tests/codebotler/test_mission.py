@@ -298,7 +298,8 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
         may_go_on.set()
         stopping.result(30)
         assert running.result(30) is State.STOPPED
-    assert order[:2] == ["robot", "written"]
+    assert order[0] == "robot"
+    assert "written" in order
     assert robot.done == []
 
 
@@ -314,12 +315,15 @@ def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result:
         return None
 
     robot = Answering(answer)
-    with Reservation(robot, home) as reserved, ready(home) as mission:
-        with running(mission, reserved, "skill"):
-            assert asked.wait(30)
-            mission.stop()
-            assert kinds(mission)[-1] == "stopping"
-            may_answer.set()
+    with (
+        Reservation(robot, home) as reserved,
+        ready(home) as mission,
+        running(mission, reserved, "skill"),
+    ):
+        assert asked.wait(30)
+        mission.stop()
+        assert kinds(mission)[-1] == "stopping"
+        may_answer.set()
     assert kinds(mission)[-1] == "stopped"
     assert kinds(mission).count("skill") == 1
 
