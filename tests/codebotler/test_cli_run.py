@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from codebotler.models.recorded import recorded_model
 from processes import are_gone, children_of
 from roboeval.suite import Suite
 
@@ -140,6 +141,8 @@ def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) ->
     status, out, _ = run(folder, instruction, "--yes")
     assert status == 0
     assert "accepted: no problem in the program" in out
+    program = "".join(line.removeprefix("    ") for line in out.splitlines(keepends=True)[:40])
+    assert recorded_model("recorded:careful").reply(instruction, 0).program in program
     status, out, _ = ended(folder, "missions", "last", "--json")
     mission = json.loads(out)
     assert (mission["instruction"], mission["model"]) == (instruction, "recorded:careful")
