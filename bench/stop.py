@@ -1,8 +1,8 @@
 """How long does it take from a stop to the robot?
 
 A mission has the robot drive, and is stopped in the middle of it: by `Mission.stop`, as a page does it, and
-by Ctrl-C at a tool of its own. Printed are the worst of STOPS=50 and the middle one, in milliseconds: from the
-stop until the robot was told (`cancel` is called), and until what it did had ended.
+by Ctrl-C at a tool of its own. Printed are the worst of STOPS=50 and the middle one, in milliseconds: until
+the robot was told (`cancel` is called), and until what it did had ended.
 """
 
 import os
