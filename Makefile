@@ -13,12 +13,20 @@ BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
 DOTS = while read -r; do printf .; done; echo
 SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
+INSTRUCTION = Look into every printer room for a stapler. To each printer room that has none, bring one stapler \
+from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
 .PHONY: demo test test-ros1 test-transformers fuzz lint bench clean
 
 demo: $(VENV)/installed
+	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
+	@echo "  $(INSTRUCTION)"
+	@echo
+	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler run "$(INSTRUCTION)" --world examples/office.yaml --speed 40 --yes
+	@echo
+	@echo "The benchmark, on programs that ship with it:"
 	@$(BIN)/roboeval evaluate recorded:careful
 	@echo
 	@$(BIN)/roboeval evaluate recorded:hasty
@@ -52,6 +60,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/generate.py
 	$(BIN)/python bench/faulty_server.py
 	$(BIN)/python bench/check.py
+	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
 
 $(VENV)/made:

@@ -114,7 +114,7 @@ class LiveRobot:
         event = event and replace(event, place=self._place, time=self.now)
         if event and event.kind in BEGINS:
             self._events.append(event)
-        result = self._taken_down(row, [_text(argument) for argument in arguments])
+        result = self._taken_down(row, [_text(argument) for argument in arguments], event)
         if event is None:
             return result
         if event.kind in BEGINS:
@@ -124,7 +124,7 @@ class LiveRobot:
             self._place = event.text
         return _position(result, event) if event.options else result
 
-    def _taken_down(self, skill: Skill, given: list[base.Argument]) -> base.Result:
+    def _taken_down(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         """The robot's answer or its error, each taken down."""
         self._number += 1
         which = {"number": self._number, "skill": skill.name}
@@ -133,6 +133,8 @@ class LiveRobot:
         started = self.now
         try:
             result = self._done(skill, given)
+            if event is not None and event.options:
+                _position(result, event)
         except RobotError as error:
             self._note("error", **which, kind=error.kind, message=str(error))
             self._go_on()

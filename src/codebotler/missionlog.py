@@ -153,8 +153,8 @@ def events_of(folder: Path) -> list[Line]:
         OSError: they cannot be read.
     """
     path = folder / EVENTS
-    whole = path.read_bytes().rpartition(b"\n")[0]
-    return [_event(text, path, number) for number, text in enumerate(whole.splitlines(), 1)]
+    whole = path.read_bytes().split(b"\n")[:-1]
+    return [_event(text, path, number) for number, text in enumerate(whole, 1)]
 
 
 def _event(text: bytes, path: Path, number: int) -> Line:

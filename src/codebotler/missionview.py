@@ -47,6 +47,7 @@ class Watcher:
     def __init__(self, summary: Summary) -> None:
         self._console = Console(highlight=False)
         self._is_half = False
+        self._console.print()
         self._console.print(Text.assemble(("running", "bold"), f" on the robot {summary.robot}"))
 
     def __enter__(self) -> Self:
@@ -167,9 +168,15 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
             table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(f"{line['clock']:.1f} s", "dim"), text)
     state = State(summary.state)
     problems = [Text(f"problem: {shortened(problem)}", "red") for problem in summary.problems]
-    program = Text("\n" + "\n".join(f"    {visible(text)}" for text in summary.program.splitlines()) + "\n")
+    program = Group(Text(), source_view(summary.program))
     end = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))
     return Group(head, program, *problems, table, Text(), end)
+
+
+def source_view(program: str) -> Text:
+    """A program as it stands, and an empty line."""
+    lines = [f"    {visible(text.expandtabs(4))}\n" for text in program.splitlines()]
+    return Text("".join(lines), no_wrap=True, overflow="ignore")
 
 
 def robots_view(kinds: Sequence[Readiness]) -> Table:

@@ -17,7 +17,7 @@ from codebotler.checking import check_view, read_program
 from codebotler.drives import named_rooms
 from codebotler.generating import generated
 from codebotler.mission import GRACE, Mission, MissionError, State
-from codebotler.missionview import Watcher, ending
+from codebotler.missionview import Watcher, ending, source_view
 from codebotler.models.base import Model
 from codebotler.problems import no_room
 from codebotler.prompts import prompt_for
@@ -154,7 +154,9 @@ def _is_approved(mission: Mission, program: str, plan: Plan | None, request: Req
     """Show what a check finds, and ask."""
     rooms, start = (plan.rooms, plan.start) if plan else (None, None)
     found = check(program, rooms=rooms, start=start)
-    name = "the program" if not request.is_program or request.what == "-" else request.what
+    name = request.what if request.is_program and request.what != "-" else "the program"
+    if not request.is_program:
+        print_rich(source_view(program))
     print_rich(check_view(found, program, name))
     problems = [problem.sentence for problem in found.problems]
     mission.check(problems)
@@ -209,5 +211,5 @@ def _stopped_by_signals(mission: Mission) -> Iterator[list[int]]:
     try:
         yield got
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, handler in before.items():  # who was impatient must not break the tidying up
+            signal.signal(number, signal.SIG_IGN if got else handler)

@@ -15,10 +15,10 @@ def print_rich(what: RenderableType) -> None:
 
     console = Console()
     if console.is_terminal:
-        console.print(what)
+        console.print(what, crop=False)
         return
     with console.capture() as drawn:
-        console.print(what)
+        console.print(what, crop=False)
     print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
 
 

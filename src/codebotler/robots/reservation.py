@@ -41,7 +41,11 @@ class Reservation:
         self._lock = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             self._take()
-            self.robot.connect()
+            try:
+                self.robot.connect()
+            except BaseException:
+                self.robot.disconnect()
+                raise
         except BaseException:
             os.close(self._lock)
             raise
