@@ -131,6 +131,7 @@ class Graph:
     """
 
     def __init__(self, name: str) -> None:
+        import netifaces  # noqa: F401 - rosgraph needs it only when it connects, and then it is lost in a thread
         import rosgraph
 
         self.node = rosgraph.names.resolve_name(name, rosgraph.names.get_ros_namespace())

@@ -163,16 +163,16 @@ class Rosbridge:
     def _rescue(self, skill: Skill, goal: str) -> str:
         """Cancel a goal over another connection; what became of that, in words."""
         assert skill.ros is not None
-        lost = f"the connection with {self.address} was lost"
+        where = self.address
         try:
             line = Line(self.address, [skill.ros], self._waits.patience)
         except NotReadyError:
-            return f"{lost}, and its goal could not be cancelled: STOP THE ROBOT BY HAND"
+            return f"the connection with {where} was lost, and its goal goes on: STOP THE ROBOT BY HAND"
         for _ in range(5):  # the first may be said before the server listens
             line.send(line.dialect.cancel(skill.ros, goal))
             time.sleep(AGAIN / 2)
         line.close()
-        return f"{lost}; its goal was cancelled over another one"
+        return f"the connection with {where} was lost; its goal was cancelled over another one"
 
 
 class _Watch:
