@@ -16,7 +16,7 @@ import pytest
 
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros import Waits
-from codebotler.robots.ros1 import SCRIPT, Ros1
+from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, Parameter, RosAction, Skill
 from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
@@ -329,6 +329,32 @@ def test_second_tool_is_refused_and_the_first_goes_on(graph: Graph) -> None:
     second.perform("go_to", ["the hall"])
 
 
+def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        code = "import rospy, sys; rospy.init_node('codebotler', disable_signals=True); sys.stdin.read()"
+        with subprocess.Popen(
+            [str(PYTHON), "-c", code], stdin=subprocess.PIPE, env={**os.environ, "ROS_MASTER_URI": graph.uri}
+        ) as other:
+            server.expect("cancel", "never")
+            assert other.stdin is not None
+            other.stdin.close()
+    assert isinstance(ended["error"], CancelledError)
+
+
+def test_text_that_no_message_can_hold_is_said(graph: Graph) -> None:
+    server = graph.serve(SAY)
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"the goal of /say_server cannot be sent: .*surrogates"):
+        robot.perform("say", ["\ud800"])
+    robot.perform("say", ["hello"])
+    server.expect("goal", "hello")
+
+
 def test_master_that_was_started_anew_between_missions(graph: Graph) -> None:
     graph.serve(GO_TO)
     robot = graph.robot()
@@ -411,7 +437,7 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
 
     actions = [{"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None]
     said = subprocess.run(
-        ["/usr/bin/python3", "-c", MD5, str(SCRIPT.parent), json.dumps(actions)],
+        [str(PYTHON), "-c", MD5, str(SCRIPT.parent), json.dumps(actions)],
         capture_output=True,
         text=True,
         check=True,

@@ -7,6 +7,7 @@ its input, and at a signal, it cancels the goal that goes on: whoever started it
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -339,9 +340,9 @@ class Worker:
         self.patience: float = start["patience"]
         self.silence: float = start["silence"]
         self.longest: float = start["longest"]
+        self.goal: Goal | None = None
         self.graph, left_behind = self._entered(start["node"])
         self.servers: dict[str, Any] = self._servers(start["actions"])
-        self.goal: Goal | None = None
         missing = self._missing()
         if left_behind or start["cancel_all"]:
             self._cancel_all()
@@ -359,18 +360,26 @@ class Worker:
 
     def leave(self) -> None:
         """Cancel what goes on, and leave the graph."""
+        self._stop()
+        self.graph.leave()
+
+    def _entered(self, node: str) -> Any:
+        """The graph, and whether an earlier worker died there without leaving."""
+        import rospy
+
+        graph = Graph(node)
+        left_behind = graph.enter()
+        rospy.on_shutdown(self._stop)
+        return graph, left_behind
+
+    def _stop(self) -> None:
+        """Cancel what goes on, while that can still be sent."""
         goal = self.goal
         if goal is not None and not goal.is_over:
             goal.cancel()
             goal.ended.wait(LAST_WORDS)
         if goal is not None and goal.cancelled is not None:
             time.sleep(TICK)  # ROS sends in threads of its own
-        self.graph.leave()
-
-    def _entered(self, node: str) -> Any:
-        """The graph, and whether an earlier worker died there without leaving."""
-        graph = Graph(node)
-        return graph, graph.enter()
 
     def _servers(self, actions: Message) -> dict[str, Any]:
         specs = message_types(list(actions.values()))
@@ -415,6 +424,8 @@ class Worker:
         self._end(goal, "unsent", text=why, anew=self.graph.is_online() and not self.graph.knows_us())
 
     def _send(self, goal: Goal, arguments: list[Any]) -> None:
+        import genpy
+
         fields = goal.server.goal.__slots__
         if len(fields) != len(arguments):
             text = (
@@ -423,13 +434,19 @@ class Worker:
             )
             self._end(goal, "unsent", text=text)
             return
+        message = goal.server.goal(*arguments)
+        try:  # what fails within rospy leaves half a message on the line, and spoils the next one
+            message.serialize(io.BytesIO())
+        except (genpy.SerializationError, ValueError) as error:
+            self._end(goal, "unsent", text=f"the goal of {goal.server.name} cannot be sent: {error}")
+            return
         with goal.lock:
             if goal.cancelled is not None:
                 self._end(goal, "cancelled")
                 return
             goal.sent = time.monotonic()
             goal.handle = goal.server.client.send_goal(
-                goal.server.goal(*arguments),
+                message,
                 lambda handle: self._changed(goal, handle),
                 lambda _, feedback: self._feedback(goal, feedback),
             )

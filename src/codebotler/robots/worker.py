@@ -154,7 +154,7 @@ class Worker:
                 continue
             if message["is"] == "cancel-sent":
                 self._cancel_sent.set()
-            else:
+            elif message["is"] != "alive" or self._messages.empty():  # where nobody asks, one will do
                 self._messages.put(message)
         self._messages.put({"is": ENDED})
 
