@@ -2,7 +2,8 @@
 # installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
 # `make test-transformers` tests models that run on this machine, with a Python for which there is a torch (3.11);
-# it makes an environment of its own, since nothing else needs so much.
+# it makes an environment of its own, since nothing else needs so much. `make test-ros1` tests robots on ROS 1, for
+# which the system's Python must have rospy (`codebotler robots` says what is missing).
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -17,7 +18,7 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo test test-transformers fuzz lint bench clean
+.PHONY: demo test test-ros1 test-transformers fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -33,7 +34,10 @@ demo: $(VENV)/installed
 	@echo "To see why a program fails, keep the verdicts: $(BIN)/roboeval evaluate recorded:hasty --out runs/hasty"
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(TESTS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --ignore tests/ros1 $(TESTS)
+
+test-ros1: $(VENV)/tested
+	$(BIN)/python -m pytest --no-skips --numprocesses 2 tests/ros1
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py
@@ -57,6 +61,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/faulty_server.py
 	$(BIN)/python bench/check.py
 	$(BIN)/python bench/stop.py
+	$(BIN)/python bench/ros1.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"

@@ -230,6 +230,41 @@ def robots(json: Annotated[bool, typer.Option("--json", help="Print JSON for mac
         print_rich(robots_view(found))
 
 
+@app.command("virtual-robot")
+def virtual_robot(
+    world: Annotated[Path, typer.Option(help="The world file that tells where the robot is.")],
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="Of the ROS master; that of ROS_MASTER_URI, or 11311, by default."
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="How many of the robot's seconds pass in a real one.")] = 1.0,
+    ros_python: Annotated[
+        Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
+    ] = Path("/usr/bin/python3"),
+) -> None:
+    """Offer a simulated robot's skills on ROS 1, until Ctrl-C; starts a ROS master if none answers."""
+    from contextlib import suppress
+
+    from codebotler.robots.virtual import VirtualRobot
+    from codebotler.terminal import visible
+    from codebotler.world import World
+
+    def show(line: str) -> None:
+        with suppress(OSError):  # the robot goes on where nobody reads any more
+            print(visible(line), flush=True)
+
+    robot = VirtualRobot(World.read(world), speed=speed, port=port, python=ros_python, told=show)
+    try:
+        started = robot.start()
+        what = "a ROS master was started" if started else "joined the ROS master"
+        print(f"{what} at {robot.address}; the robot is ready, Ctrl-C ends it", file=sys.stderr)
+        robot.wait()
+    finally:
+        robot.stop()
+
+
 def obey(app: typer.Typer, name: str) -> NoReturn:
     """Run a command line and end the process; what a user can cause ends in one sentence.
 
@@ -269,7 +304,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for one that a user cannot cause."""
     from codebotler.badinput import BadInput
     from codebotler.models.base import BudgetSpentError, ModelError
-    from codebotler.robots.base import NotReadyError
+    from codebotler.robots.base import NotReadyError, RobotLostError
     from codebotler.simulator.engine import EngineError
 
     if isinstance(error, USAGE):
@@ -278,7 +313,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 2, message[:1].lower() + message[1:] + where
     if isinstance(error, BadInput):
         return 2, str(error)
-    if isinstance(error, EngineError | BudgetSpentError | NotReadyError):
+    if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
         return 1, str(error)
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence

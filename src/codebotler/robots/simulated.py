@@ -57,6 +57,10 @@ class Simulated:
         """Put the robot where the world has it; everything there is as at the start."""
         self._robot = SimulatedRobot(self._world, AS_WRITTEN, self.skills)
         self._place = self._stands_at[self._world.robot]
+        self.resume()
+
+    def resume(self) -> None:
+        """Be ready again after a cancel, in the world as it has become."""
         self.clock.restart()
 
     def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
