@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from codebotler.badinput import BadInput
@@ -52,41 +53,46 @@ def recover(home: Path) -> list[Summary]:
         home: the folder of missions.
 
     Returns:
-        those that were not known to be before.
+        those that were not known to be before; what cannot be read is left to `missions` to complain about,
+        so that it keeps no robot from working.
 
     Raises:
-        BadInput: one cannot be read.
         OSError: one cannot be written.
     """
-    return [summary for folder in _folders(home) if (summary := _interrupted(folder)) is not None]
+    found = []
+    for folder in _folders(home):
+        with suppress(BadInput):
+            found += _interrupted(folder)
+    return found
 
 
 def _folders(home: Path) -> Iterator[Path]:
     return (path.parent for path in sorted((home / "missions").glob(f"*/{SUMMARY}")))
 
 
-def _interrupted(folder: Path) -> Summary | None:
+def _interrupted(folder: Path) -> list[Summary]:
+    """The mission, if it was, and nobody had noticed."""
     if State(Summary.read(folder).state) not in STEPS:
-        return None
+        return []
     try:
         log = Log(folder)
     except BlockingIOError:
-        return None  # another tool is on it
+        return []  # another tool is on it
     try:
         summary = Summary.read(folder)
         if State(summary.state) not in STEPS:
-            return None
+            return []
         events = events_of(folder)
         told = _last_told(events)
         if told is not None and State(told["state"]) not in STEPS:
             summary.state, summary.reason, summary.ended = told["state"], told.get("reason", ""), told["time"]
             summary.write(folder)
-            return None
+            return []
         summary.reason, clock = _how(summary, events), events[-1]["clock"] if events else 0.0
         summary.state, summary.ended = State.INTERRUPTED, time.time()
         log.add("state", clock=clock, state=summary.state, reason=summary.reason)
         summary.write(folder)
-        return summary
+        return [summary]
     finally:
         log.close()
 

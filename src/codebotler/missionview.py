@@ -173,10 +173,10 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
     return Group(head, program, *problems, table, Text(), end)
 
 
-def source_view(program: str) -> Text:
-    """A program as it stands, and an empty line."""
+def source_view(program: str) -> Group:
+    """A program as it stands, without breaks in its lines, and an empty line."""
     lines = [f"    {visible(text.expandtabs(4))}\n" for text in program.splitlines()]
-    return Text("".join(lines), no_wrap=True, overflow="ignore")
+    return Group(Text("".join(lines), no_wrap=True, overflow="ignore"))
 
 
 def robots_view(kinds: Sequence[Readiness]) -> Table:

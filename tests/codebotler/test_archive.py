@@ -103,6 +103,7 @@ def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None
     (folder / SUMMARY).write_text(text)
     with pytest.raises(BadInput, match=r"mission\.json: this is no summary"):
         missions(tmp_path)
+    assert recover(tmp_path) == [], "a robot can work nevertheless"
 
 
 @pytest.mark.parametrize(

@@ -135,7 +135,7 @@ def test_rooms_that_the_robot_does_not_know_are_told_before_it_moves(folder: Pat
 
 
 def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) -> None:
-    task = paper.tasks["SayGoodDay"]
+    task = paper.tasks["StaplerDelivery"]
     instruction = task.prompts[0]
     (folder / "world.yaml").write_text(task.scenarios[0].world.to_yaml())
     status, out, _ = run(folder, instruction, "--yes")
@@ -315,6 +315,13 @@ def test_missions_are_listed_and_shown(folder: Path) -> None:
     _, out, _ = ended(folder, "missions", name, "--json")
     data = json.loads(out)
     assert (data["id"], data["events"][-1]["state"]) == (name, "done")
+
+
+def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
+    line = f"    say({'long ' * 40!r})"
+    (folder / "long.py").write_text(f"def task_program():\n{line}\n")
+    run(folder, "long.py", "--yes")
+    assert f"    {line}\n" in ended(folder, "missions", "last")[1]
 
 
 def test_mission_is_written_as_mcap(folder: Path) -> None:

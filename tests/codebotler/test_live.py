@@ -208,6 +208,7 @@ def test_nothing_starts_after_a_stop() -> None:
     assert (notes, robot.trace) == ([], ())
     assert isinstance(robot.robot, Answering)
     assert robot.robot.cancels == 1
+    assert not robot.robot.clock.wait(1), "who sleeps wakes up"
 
 
 def test_robot_that_answers_after_a_stop_is_not_believed() -> None:

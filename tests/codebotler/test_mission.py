@@ -345,12 +345,15 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
         summary = Summary.read(mission.folder)
         assert (summary.state, summary.reason) == ("failed", UNCONFIRMED)
     before = events_of(mission.folder)
+    told: list[Line] = []
+    mission.told = told.append
     may_answer.set()
     threads = [thread for thread in threading.enumerate() if thread.name == mission.id]
     for thread in threads:
         thread.join(30)
     assert threads
     assert events_of(mission.folder) == before, "what comes after the end is not written"
+    assert told == [], "nor told"
     assert robot.done == ["hello"]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 from collections.abc import Mapping, Sequence
 
 from codebotler.badinput import BadInput
@@ -51,7 +50,6 @@ class Simulated:
         self.skills, self.clock = skills, Clock(speed)
         self._world, self._pace = world, metres_per_second
         self._stands_at = {room.name: room.stand_at or (0.0, 0.0) for room in laid_out(world).rooms}
-        self._cancelled = threading.Event()
         self._robot: SimulatedRobot | None = None
         self._place = self._stands_at[world.robot]
 
@@ -63,7 +61,6 @@ class Simulated:
 
     def resume(self) -> None:
         """Be ready again after a cancel, in the world as it has become."""
-        self._cancelled.clear()
         self.clock.restart()
 
     def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
@@ -75,6 +72,7 @@ class Simulated:
         """
         assert self._robot is not None, "the robot is not connected"
         asked = tuple(a if isinstance(a, str) else tuple(map(Option, a)) for a in arguments)
+        self._wait(0.0)
         if skill == "go_to":
             self._drive(self._robot, str(asked[0]), told)
         else:
@@ -87,7 +85,6 @@ class Simulated:
 
     def cancel(self) -> None:
         """Stop at once."""
-        self._cancelled.set()
         self.clock.stop()
 
     def disconnect(self) -> None:
@@ -113,7 +110,7 @@ class Simulated:
         self._place = end
 
     def _wait(self, seconds: float) -> None:
-        if not self.clock.wait(seconds) or self._cancelled.is_set():
+        if not self.clock.wait(seconds):
             raise CancelledError
 
 
