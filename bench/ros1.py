@@ -14,6 +14,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from statistics import median, quantiles
 
 from codebotler.robots.base import CancelledError
@@ -34,7 +35,7 @@ WORLD = World((Room("hall"), Room("kitchen")), "hall")
 
 def raw(robot: VirtualRobot, goals: int) -> list[float]:
     """The seconds that each goal takes by actionlib's own client."""
-    script = str(SCRIPT.parents[3] / "bench" / "raw_actionlib.py")
+    script = str(Path(__file__).with_name("raw_actionlib.py"))
     action = json.dumps(actions_of(SKILLS)["say"])
     done = subprocess.run(
         [str(PYTHON), script, str(SCRIPT.parent), action, str(goals)],

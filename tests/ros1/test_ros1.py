@@ -251,7 +251,7 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None
 
 def test_stop_works_where_the_worker_hangs(graph: Graph) -> None:
     server = graph.serve(GO_TO)
-    robot = graph.robot()
+    robot = graph.robot(waits=Waits(patience=LONG))  # too long for its silence to be noticed
     robot.connect()
     with started(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
