@@ -3,7 +3,8 @@
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
 # `make test-transformers` tests models that run on this machine, with a Python for which there is a torch (3.11);
 # it makes an environment of its own, since nothing else needs so much. `make test-faults` asks a server that fails
-# one request in ten for 4,000 completions, over two protocols.
+# one request in ten for 4,000 completions, over two protocols. `make test-ros1` tests robots on ROS 1, for which
+# the system's Python must have rospy (`codebotler robots` says what is missing).
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -13,12 +14,20 @@ BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
 DOTS = while read -r; do printf .; done; echo
 SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
+INSTRUCTION = Look into every printer room for a stapler. To each printer room that has none, bring one stapler \
+from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo test test-transformers test-faults fuzz lint bench clean
+.PHONY: demo test test-ros1 test-transformers test-faults fuzz lint bench clean
 
 demo: $(VENV)/installed
+	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
+	@echo "  $(INSTRUCTION)"
+	@echo
+	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler run "$(INSTRUCTION)" --world examples/office.yaml --speed 40 --yes
+	@echo
+	@echo "The benchmark, on programs that ship with it:"
 	@$(BIN)/roboeval evaluate recorded:careful
 	@echo
 	@$(BIN)/roboeval evaluate recorded:hasty
@@ -26,7 +35,10 @@ demo: $(VENV)/installed
 	@echo "To see why a program fails, keep the verdicts: $(BIN)/roboeval evaluate recorded:hasty --out runs/hasty"
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(TESTS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --ignore tests/ros1 $(TESTS)
+
+test-ros1: $(VENV)/tested
+	$(BIN)/python -m pytest --no-skips --numprocesses 2 tests/ros1
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py
@@ -52,6 +64,8 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/generate.py
 	$(BIN)/python bench/faulty_server.py
 	$(BIN)/python bench/check.py
+	$(BIN)/python bench/stop.py
+	$(BIN)/python bench/ros1.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"

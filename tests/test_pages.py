@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.mission import State
+from codebotler.missionview import WORDS
 from server import Server
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -47,6 +49,35 @@ def test_every_command_of_a_page_runs(tmp_path: Path, page: str) -> None:
         subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
 
 
+def test_every_command_about_robots_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CODEBOTLER_HOME", str(tmp_path / "state"))
+    (tmp_path / "office.yaml").write_text((DOCS.parent / "examples" / "office.yaml").read_text())
+    kinds, tea, _, shown = [run(commands, tmp_path, "") for commands in blocks("robots.md", "sh")]
+    assert re.search(r"^sim +works", kinds, re.MULTILINE)
+    assert 'looks for "ann"\n            → found' in tea
+    assert "has no stapler" in shown
+    assert (tmp_path / "tea.mcap").exists()
+    (code,) = blocks("robots.md", "python")
+    ended = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True
+    )
+    assert ended.stdout.splitlines()[-1] == "done"
+
+
+def test_states_and_events_of_missions_are_documented() -> None:
+    states, _, lines = (DOCS / "robots.md").read_text().partition("### What lies on the disk")
+    assert re.findall(r"^\| `(\w+)` \|", states, re.MULTILINE) == [
+        *(
+            state
+            for state in State
+            if state not in {State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED}
+        ),
+        *(State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED),
+    ]
+    rows = dict(re.findall(r"^\| `(\w+)` \|(.*)", lines, re.MULTILINE))
+    assert set(re.findall(r"`(\w+)`", rows["event"])) == set(WORDS)
+
+
 def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
     table = next(block for block in blocks("evaluate-your-model.md", "text") if "retries" in block)
     first, *_, last = [
@@ -56,7 +87,7 @@ def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
     assert table in run(last, tmp_path, "")
 
 
-@pytest.mark.parametrize("page", ["evaluate-your-model.md", "check-before-you-run.md"])
+@pytest.mark.parametrize("page", ["evaluate-your-model.md", "check-before-you-run.md", "robots.md", "ros.md"])
 def test_pages_are_linked(page: str) -> None:
     assert f"]({page})" in (DOCS / "index.md").read_text()
     assert f"](docs/{page})" in (DOCS.parent / "README.md").read_text()

@@ -154,6 +154,127 @@ def check(
     raise typer.Exit(1 if found.problems else 0)
 
 
+@app.command()
+def run(
+    program: Annotated[
+        str, typer.Argument(metavar="PROGRAM|INSTRUCTION", help="A file, -, or what to do in plain words.")
+    ],
+    robot: Annotated[
+        str, typer.Option(help="Which robot: sim, or another that `codebotler robots` lists.")
+    ] = "sim",
+    world: Annotated[Path | None, typer.Option(help="The world file of a simulated robot.")] = None,
+    model: Annotated[str, typer.Option(help="Who writes the program for an instruction.")] = "recorded",
+    yes: Annotated[bool, typer.Option("--yes", help="Run it without asking.")] = False,
+    despite_problems: Annotated[
+        bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
+    ] = False,
+    speed: Annotated[
+        float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
+    ] = 1.0,
+    address: Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")] = "",
+    ros_python: Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")] = Path(
+        "/usr/bin/python3"
+    ),
+) -> None:
+    """Check a program, ask, and run it on a robot; Ctrl-C stops the robot, with status 130."""
+    from codebotler.home import home
+    from codebotler.models.base import Settings
+    from codebotler.models.open import open_model
+    from codebotler.robots.base import Options
+    from codebotler.robots.open import open_robot
+    from codebotler.running import Request
+    from codebotler.running import run as run_mission
+    from codebotler.world import World
+
+    request = Request(program, lambda: open_model(model, Settings()), yes, despite_problems)
+    options = Options(
+        world=None if world is None else World.read(world),
+        speed=speed or None,
+        address=address,
+        ros_python=ros_python,
+    )
+    raise typer.Exit(run_mission(open_robot(robot, options), request, home()))
+
+
+@app.command()
+def missions(
+    mission: Annotated[
+        str | None, typer.Argument(metavar="ID", help="Show this one; `last` is the last one.")
+    ] = None,
+    mcap: Annotated[
+        Path | None, typer.Option(help="Write it to this file, which Foxglove opens, with the program in it.")
+    ] = None,
+    clock: Annotated[str, typer.Option(help="With --mcap: wall, or robot for simulated time.")] = "wall",
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """List past missions, or show what happened in one."""
+    from codebotler.archiving import show_mission, show_missions, write_mission
+    from codebotler.badinput import BadInput
+    from codebotler.home import home
+
+    if mcap is not None and mission is None:
+        raise BadInput("--mcap writes one mission; name it, or `last`")
+    if clock not in {"wall", "robot"}:
+        raise BadInput(f'"{clock}" is no clock; write wall or robot')
+    if mission is None:
+        show_missions(home(), json=json)
+    elif mcap is None:
+        show_mission(home(), mission, json=json)
+    else:
+        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall")
+
+
+@app.command()
+def robots(json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False) -> None:
+    """List the kinds of robots: which work here, what is missing for the others, and the mend."""
+    from dataclasses import asdict
+
+    from codebotler.missionview import robots_view
+    from codebotler.robots.open import all_readiness
+    from codebotler.terminal import print_json, print_rich
+
+    found = all_readiness()
+    if json:
+        print_json([asdict(kind) for kind in found])
+    else:
+        print_rich(robots_view(found))
+
+
+@app.command("virtual-robot")
+def virtual_robot(
+    world: Annotated[Path, typer.Option(help="The world file that tells where the robot is.")],
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="Of the ROS master; that of ROS_MASTER_URI, or 11311, by default."
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="How many of the robot's seconds pass in a real one.")] = 1.0,
+    ros_python: Annotated[
+        Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
+    ] = Path("/usr/bin/python3"),
+) -> None:
+    """Offer a simulated robot's skills on ROS 1, until Ctrl-C; starts a ROS master if none answers."""
+    from contextlib import suppress
+
+    from codebotler.robots.virtual import VirtualRobot
+    from codebotler.terminal import visible
+    from codebotler.world import World
+
+    def show(line: str) -> None:
+        with suppress(OSError):  # the robot goes on where nobody reads any more
+            print(visible(line), flush=True)
+
+    robot = VirtualRobot(World.read(world), speed=speed, port=port, python=ros_python, told=show)
+    try:
+        started = robot.start()
+        what = "a ROS master was started" if started else "joined the ROS master"
+        print(f"{what} at {robot.address}; the robot is ready, Ctrl-C ends it", file=sys.stderr)
+        robot.wait()
+    finally:
+        robot.stop()
+
+
 def obey(app: typer.Typer, name: str) -> NoReturn:
     """Run a command line and end the process; what a user can cause ends in one sentence.
 
@@ -193,6 +314,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for one that a user cannot cause."""
     from codebotler.badinput import BadInput
     from codebotler.models.base import BudgetSpentError, ModelError
+    from codebotler.robots.base import NotReadyError, RobotLostError
     from codebotler.simulator.engine import EngineError
 
     if isinstance(error, USAGE):
@@ -201,7 +323,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 2, message[:1].lower() + message[1:] + where
     if isinstance(error, BadInput):
         return 2, str(error)
-    if isinstance(error, EngineError | BudgetSpentError):
+    if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
         return 1, str(error)
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence

@@ -43,12 +43,27 @@ class Recording:
 
 @dataclass(frozen=True)
 class RosAction:
-    """The ROS action that carries a skill to a robot (paper, section III.C)."""
+    """The ROS action that carries a skill to a robot (paper, section III.C).
+
+    Args:
+        type: of the action, in the package `robot_actions_pkg`.
+        server: the topic under which the robot offers it.
+        goal: its fields, in the order of the skill's parameters.
+        result: the type of its only field, if it has one.
+        failure: the kind of the error where the skill can fail in one way only; else the robot must name it.
+    """
 
     type: str
     server: str
     goal: tuple[str, ...] = ()
     result: str | None = None
+    failure: str = ""
+
+    @property
+    def definition(self) -> str:
+        """The text of its .action file; names and order decide whether robots understand it."""
+        result = "" if self.result is None else f"{self.result} result\n"
+        return "".join(f"{line}\n" for line in self.goal) + f"---\n{result}---\n"
 
 
 @dataclass(frozen=True)
@@ -151,7 +166,7 @@ SKILLS = SkillTable(
             "None",
             "Drive to a room.",
             Recording("goto", "location"),
-            RosAction("GoTo", "/go_to_server", ("string location",)),
+            RosAction("GoTo", "/go_to_server", ("string location",), failure="GoToInvalidLocation"),
         ),
         Skill(
             "ask",
@@ -185,7 +200,7 @@ SKILLS = SkillTable(
             "None",
             "Put down the object that the robot holds.",
             Recording("place", "obj"),
-            RosAction("Place", "/place_server", ("string obj",)),
+            RosAction("Place", "/place_server", ("string obj",), failure="PlaceNoObject"),
         ),
     )
 )

@@ -23,13 +23,13 @@ def print_rich(what: RenderableType) -> None:
 
     console = Console()
     if console.is_terminal:
-        console.print(what)
+        console.print(what, crop=False)
         return
     if "COLUMNS" not in os.environ:
         natural = Measurement.get(console, console.options.update(max_width=WIDEST), what).maximum
         console.width = max(console.width, natural)
     with console.capture() as drawn:
-        console.print(what)
+        console.print(what, crop=False)
     print("\n".join(line.rstrip() for line in drawn.get().splitlines()))
 
 
@@ -66,6 +66,12 @@ def print_json(data: object) -> None:
 def note(sentence: str) -> None:
     """Say something beside the results."""
     print(sentence, file=sys.stderr)
+
+
+def says_yes(question: str) -> bool:
+    """Ask the person who reads this; whoever says nothing, or is not there, does not say yes."""
+    print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
+    return sys.stdin.readline().strip().lower() in {"y", "yes"}
 
 
 def visible(text: str) -> str:

@@ -1,0 +1,114 @@
+"""Missions as they lie on the disk: found, listed, and closed where the tool died."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from codebotler.badinput import BadInput
+from codebotler.live import in_words
+from codebotler.mission import STEPS, State
+from codebotler.missionlog import SUMMARY, Line, Log, Summary, doing, events_of
+
+ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
+
+
+def missions(home: Path) -> list[Summary]:
+    """All missions in the order in which they began.
+
+    Args:
+        home: the folder of missions.
+
+    Raises:
+        BadInput: one cannot be read.
+    """
+    return sorted(map(Summary.read, _folders(home)), key=lambda summary: (summary.created, summary.id))
+
+
+def find(home: Path, name: str) -> Path:
+    """The folder of a mission.
+
+    Args:
+        home: the folder of missions.
+        name: the mission's own, or `last`.
+
+    Raises:
+        BadInput: there is none of that name.
+    """
+    if name == "last" and (known := missions(home)):
+        return home / "missions" / known[-1].id
+    folder = home / "missions" / name
+    if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
+        raise BadInput(f'there is no mission "{name}"; `codebotler missions` lists those there are')
+    return folder
+
+
+def recover(home: Path) -> list[Summary]:
+    """Close the missions that a tool left behind when it died: they were interrupted.
+
+    Args:
+        home: the folder of missions.
+
+    Returns:
+        those that were not known to be before; what cannot be read is left to `missions` to complain about,
+        so that it keeps no robot from working.
+
+    Raises:
+        OSError: one cannot be written.
+    """
+    found = []
+    for folder in _folders(home):
+        with suppress(BadInput):
+            found += _interrupted(folder)
+    return found
+
+
+def _folders(home: Path) -> Iterator[Path]:
+    return (path.parent for path in sorted((home / "missions").glob(f"*/{SUMMARY}")))
+
+
+def _interrupted(folder: Path) -> list[Summary]:
+    """The mission, if it was, and nobody had noticed."""
+    if State(Summary.read(folder).state) not in STEPS:
+        return []
+    try:
+        log = Log(folder)
+    except BlockingIOError:
+        return []  # another tool is on it
+    try:
+        summary = Summary.read(folder)
+        if State(summary.state) not in STEPS:
+            return []
+        events = events_of(folder)
+        told = _last_told(events)
+        if told is not None and State(told["state"]) not in STEPS:
+            summary.state, summary.reason, summary.ended = told["state"], told.get("reason", ""), told["time"]
+            summary.write(folder)
+            return []
+        summary.reason, clock = _how(summary, events), events[-1]["clock"] if events else 0.0
+        summary.state, summary.ended = State.INTERRUPTED, time.time()
+        log.add("state", clock=clock, state=summary.state, reason=summary.reason)
+        summary.write(folder)
+        return [summary]
+    finally:
+        log.close()
+
+
+def _last_told(events: list[Line]) -> Line | None:
+    """The last event that tells of a state."""
+    return next((line for line in reversed(events) if line["event"] == "state"), None)
+
+
+def _how(summary: Summary, events: list[Line]) -> str:
+    if State(summary.state) not in {State.RUNNING, State.STOPPING}:
+        return f"the tool died while the mission was {summary.state}; nothing had moved"
+    skill = doing(events)
+    if skill is None:
+        return f"the tool died while the robot did nothing; {summary.if_tool_dies}"
+    going = in_words(skill["skill"], list(skill["arguments"].values()))
+    where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
+    where = f" ({where})" if where else ""
+    return f"the tool died during {going}{where}; {summary.if_tool_dies}"

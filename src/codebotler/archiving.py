@@ -1,0 +1,75 @@
+"""What `codebotler missions` does: lists missions, shows one, writes one for other tools."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+from codebotler.archive import find, missions, recover
+from codebotler.missionlog import Summary, events_of
+from codebotler.missionmcap import Clock, export
+from codebotler.missionview import list_view, mission_view
+from codebotler.terminal import note, print_json, print_rich, visible
+
+
+def show_missions(home: Path, *, json: bool) -> None:
+    """Print all missions, the last one last.
+
+    Args:
+        home: the folder of missions.
+        json: whether for machines.
+
+    Raises:
+        BadInput: one cannot be read.
+    """
+    _tell_interrupted(home)
+    known = missions(home)
+    if json:
+        print_json([asdict(summary) for summary in known])
+    else:
+        print_rich(list_view(known))
+
+
+def show_mission(home: Path, name: str, *, json: bool) -> None:
+    """Print what happened in a mission.
+
+    Args:
+        home: the folder of missions.
+        name: its name, or `last`.
+        json: whether for machines.
+
+    Raises:
+        BadInput: there is none of that name, or it cannot be read.
+    """
+    _tell_interrupted(home)
+    folder = find(home, name)
+    summary, events = Summary.read(folder), events_of(folder)
+    if json:
+        print_json({**asdict(summary), "events": events})
+    else:
+        print_rich(mission_view(summary, events))
+
+
+def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
+    """Write a mission as an MCAP file.
+
+    Args:
+        home: the folder of missions.
+        name: its name, or `last`.
+        path: the file.
+        clock: by which its messages are timed.
+
+    Raises:
+        BadInput: there is none of that name, or it cannot be read.
+        OSError: the file cannot be written.
+    """
+    _tell_interrupted(home)
+    folder = find(home, name)
+    summary, events = Summary.read(folder), events_of(folder)
+    export(path, summary, events, clock)
+    note(f"wrote {len(events):,} messages of mission {summary.id} to {path}")
+
+
+def _tell_interrupted(home: Path) -> None:
+    for summary in recover(home):
+        note(f"mission {summary.id} was interrupted: {visible(summary.reason)}")

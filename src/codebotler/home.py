@@ -1,0 +1,15 @@
+"""The folder in which missions and what belongs to them lie."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+def home() -> Path:
+    """What CODEBOTLER_HOME names; without it, a folder among the user's state. It need not exist."""
+    named = os.environ.get("CODEBOTLER_HOME")
+    if named:
+        return Path(named).absolute()
+    state = os.environ.get("XDG_STATE_HOME")
+    return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"

@@ -1,0 +1,168 @@
+"""A mission as an MCAP file, which Foxglove and other tools of roboticists open."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import IO, Any, Literal, TypeAlias
+
+from mcap.writer import Writer
+
+from codebotler import __version__
+from codebotler.missionlog import Line, Summary
+from codebotler.skills import SKILLS, Skill, SkillTable
+
+Clock: TypeAlias = Literal["wall", "robot"]
+Schema: TypeAlias = Mapping[str, Any]
+
+TEXT: Schema = {"type": "string"}
+TEXTS: Schema = {"type": "array", "items": TEXT}
+NUMBER: Schema = {"type": "number"}
+TYPES: Mapping[str, Schema] = {"str": TEXT, "list[str]": TEXTS, "bool": {"type": "boolean"}}
+SECOND = 1_000_000_000
+STATES, NOTES = "/mission/state", "/mission/log"
+DETAILS = ("text", "message", "reason", "by")
+"""Where an event that is no skill's has what it says."""
+GOES_ON: Mapping[str, Schema] = {
+    "number": {"type": "integer"},
+    "event": TEXT,
+    "text": TEXT,
+    "clock": NUMBER,
+}
+
+
+def write_mcap(
+    file: IO[bytes],
+    summary: Summary,
+    events: Sequence[Line],
+    *,
+    clock: Clock = "wall",
+    skills: SkillTable = SKILLS,
+) -> None:
+    """Write a mission: a channel for each skill, one for states and one for the rest, the program attached.
+
+    Args:
+        file: open for writing.
+        summary: of the mission.
+        events: in their order.
+        clock: by which the messages are timed: the wall's, or the robot's, put to start with the mission.
+        skills: what the robot could be asked to do.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    began = round(summary.created * SECOND)
+
+    def time(line: Line) -> int:
+        seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
+        return round(seconds * SECOND)
+
+    writer = Writer(file)
+    writer.start(profile="", library=f"codebotler {__version__}")
+    channels = Channels(writer)
+    for number, line in enumerate(events):
+        topic, properties, message = _message(line, skills)
+        channel = channels.channel(topic, properties)
+        at = time(line)
+        writer.add_message(channel, at, json.dumps(message).encode(), at, sequence=number)
+    last = time(events[-1]) if events else began
+    name = "program.py"
+    writer.add_attachment(began, last, name, "text/x-python", summary.program.encode(errors="surrogatepass"))
+    writer.add_metadata("mission", _about(summary))
+    writer.finish()  # type: ignore[no-untyped-call]  # theirs
+
+
+class Channels:
+    """The channels of a file, each with a schema of its own.
+
+    Args:
+        writer: of the file.
+    """
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._numbers: dict[str, int] = {}
+
+    def channel(self, topic: str, properties: Mapping[str, Schema]) -> int:
+        """The channel of a topic.
+
+        Args:
+            topic: such as `/skill/go_to`.
+            properties: of its messages, with their types.
+        """
+        if topic not in self._numbers:
+            name = "codebotler." + topic.strip("/").replace("/", ".")
+            schema = {"type": "object", "properties": properties}
+            number = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
+            self._numbers[topic] = self._writer.register_channel(topic, "json", number)
+        return self._numbers[topic]
+
+
+def schema_of(skill: Skill) -> dict[str, Schema]:
+    """What messages about a skill may hold: its arguments, what it gave back, and how it went on."""
+    arguments = {f"{p.name}": TYPES[p.annotation] for p in skill.parameters}
+    result = {"result": TYPES[skill.returns]} if skill.returns in TYPES else {}
+    return {**GOES_ON, **arguments, **result}
+
+
+def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema], dict[str, object]]:
+    """The topic, the schema and the message of an event."""
+    event, name = line["event"], str(line.get("skill"))
+    message: dict[str, object] = {"event": event, "clock": line["clock"]}
+    text = next((str(line[key]) for key in DETAILS if key in line), None)
+    if text is not None:
+        message["text"] = f"{line['kind']}: {text}" if "kind" in line else text
+    if name not in skills:
+        if event == "state":
+            return STATES, {**GOES_ON, "state": TEXT}, {**message, "state": line["state"]}
+        if "seconds" in line:
+            message["seconds"] = line["seconds"]
+        return NOTES, {**GOES_ON, "seconds": NUMBER}, message
+    result = {"result": line["result"]} if line.get("result") is not None else {}
+    arguments = line.get("arguments", {})
+    return (
+        f"/skill/{name}",
+        schema_of(skills[name]),
+        {
+            **message,
+            "number": line["number"],
+            **arguments,
+            **result,
+        },
+    )
+
+
+def _about(summary: Summary) -> dict[str, str]:
+    began = datetime.fromtimestamp(summary.created).astimezone()
+    return {
+        "id": summary.id,
+        "state": summary.state,
+        "reason": summary.reason,
+        "robot": summary.robot,
+        "instruction": summary.instruction,
+        "model": summary.model,
+        "began": began.isoformat(timespec="seconds"),
+    }
+
+
+def export(path: Path, summary: Summary, events: Sequence[Line], clock: Clock) -> None:
+    """Write a mission as an MCAP file, whole or not at all.
+
+    Args:
+        path: the file.
+        summary: of the mission.
+        events: in their order.
+        clock: by which the messages are timed.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    new = path.with_name(f"{path.name}.new")
+    try:
+        with new.open("wb") as file:
+            write_mcap(file, summary, events, clock=clock)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)

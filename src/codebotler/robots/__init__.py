@@ -1,0 +1,1 @@
+"""Robots: whatever executes skills and can be stopped, simulated or real."""

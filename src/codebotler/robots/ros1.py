@@ -1,0 +1,62 @@
+"""A robot on ROS 1: real actionlib, in a worker of the robot's own Python."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from codebotler.robots.base import Options, Readiness
+from codebotler.robots.ros import Ros, RosRobot, Waits
+from codebotler.robots.worker import lacks
+from codebotler.skills import SKILLS, SkillTable
+
+SCRIPT = Path(__file__).with_name("ros1_worker.py")
+MASTER = "http://localhost:11311"
+PYTHON = Path("/usr/bin/python3")
+NEEDS = ("rospy", "actionlib", "actionlib_msgs", "genpy", "genmsg", "netifaces")
+MEND = (
+    "apt-get install -y --no-install-recommends python3-rospy python3-actionlib python3-actionlib-msgs "
+    "python3-genmsg python3-genpy python3-netifaces python3-rosmaster"
+)
+
+
+class Ros1(RosRobot):
+    """A robot on ROS 1.
+
+    Args:
+        master: the URI of its master; empty for that of ROS_MASTER_URI.
+        python: the interpreter that has its rospy.
+        skills: what it can be asked to do.
+        speed: of its clock.
+        waits: for how long what is waited for.
+    """
+
+    def __init__(
+        self,
+        master: str = "",
+        *,
+        python: Path = PYTHON,
+        skills: SkillTable = SKILLS,
+        speed: float | None = 1.0,
+        waits: Waits | None = None,
+    ) -> None:
+        address = master or os.environ.get("ROS_MASTER_URI") or MASTER
+        ros = Ros("ros1", SCRIPT, python, {"ROS_MASTER_URI": address}, address)
+        super().__init__(ros, skills, speed, waits)
+
+
+def readiness(python: Path = PYTHON) -> Readiness:
+    """Whether the interpreter has rospy and what belongs to it."""
+    missing = lacks(python, NEEDS)
+    if missing is None:
+        return Readiness(
+            "ros1", works=False, missing=f"{python} cannot be run", mend="name another: --ros-python"
+        )
+    if missing:
+        return Readiness("ros1", works=False, missing=f"{python} lacks {', '.join(missing)}", mend=MEND)
+    return Readiness("ros1", works=True, note=f"by {python}; needs a master, see ROS_MASTER_URI")
+
+
+def robot(options: Options) -> Ros1:
+    """The robot that a user means."""
+    return Ros1(options.address, python=options.ros_python, skills=options.skills, speed=options.speed)

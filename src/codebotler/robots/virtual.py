@@ -1,0 +1,161 @@
+"""The virtual robot: a simulated one that offers its skills on a real ROS graph, as a real one does."""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from codebotler.robots.base import Argument, CancelledError, RobotLostError, untold
+from codebotler.robots.ros import actions_of
+from codebotler.robots.ros1 import MASTER, PYTHON
+from codebotler.robots.simulated import Simulated
+from codebotler.robots.worker import Message, Worker
+from codebotler.simulator.robot import RobotError
+from codebotler.skills import SKILLS, SkillTable
+from codebotler.world import World
+
+SCRIPT = Path(__file__).with_name("ros1_servers.py")
+NODE = "virtual_robot"
+HERE = ("localhost", "127.0.0.1")
+HEARS = 3600.0  # seconds of one turn of listening
+
+
+class VirtualRobot:
+    """A robot with one body: goals are executed one after the other.
+
+    Where no master answers, it starts one that is reached from this machine only.
+
+    Args:
+        world: where it is.
+        speed: how many seconds of its clock pass in a real one; None if nothing takes real time.
+        port: of the master; None for that of ROS_MASTER_URI.
+        python: an interpreter that has rospy, and rosmaster if a master is to be started.
+        skills: what it offers.
+        told: told what it does, in lines.
+
+    Raises:
+        BadInput: the speed is out of its range.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        *,
+        speed: float | None = 1.0,
+        port: int | None = None,
+        python: Path = PYTHON,
+        skills: SkillTable = SKILLS,
+        told: Callable[[str], None] = untold,
+    ) -> None:
+        self._speed, self._python, self._skills, self._told = speed, python, skills, told
+        self.address = f"http://localhost:{port}" if port else os.environ.get("ROS_MASTER_URI") or MASTER
+        self._body = self._at_start(world)
+        self._goals: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._current = ""
+        self._cancelled: set[str] = set()
+        self._worker: Worker | None = None
+        self._threads: list[threading.Thread] = []
+        self._ended = threading.Event()
+
+    def start(self) -> bool:
+        """Offer the skills; whether a master was started for that.
+
+        Raises:
+            NotReadyError: there is no ROS, or no master and none may be started.
+        """
+        actions = actions_of(self._skills)
+        where = urlsplit(self.address)
+        port = (where.port or 11311) if where.hostname in HERE else None
+        environment = {"ROS_MASTER_URI": self.address}
+        if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
+            environment["ROS_HOSTNAME"] = "localhost"
+        self._worker = Worker(
+            self._python, SCRIPT, {"node": NODE, "actions": actions, "port": port}, environment
+        )
+        self._threads = [threading.Thread(target=run, daemon=True) for run in (self._listen, self._work)]
+        for thread in self._threads:
+            thread.start()
+        return bool(self._worker.about["has_master"])
+
+    def enter(self, world: World) -> None:
+        """Be in another world, at its start; nothing may be going on."""
+        self._body = self._at_start(world)
+
+    def wait(self) -> None:
+        """Serve for ever.
+
+        Raises:
+            RobotLostError: the worker died.
+        """
+        self._ended.wait()
+        assert self._worker is not None, "it was not started"
+        raise RobotLostError(f"the worker of the virtual robot has died ({self._worker.epitaph()})")
+
+    def stop(self) -> None:
+        """End what goes on, and leave the graph."""
+        self._body.cancel()
+        if self._worker is not None:
+            self._worker.leave()
+        for thread in self._threads:
+            thread.join(HEARS)
+
+    @property
+    def pid(self) -> int:
+        """Of the process with the action servers."""
+        assert self._worker is not None, "it was not started"
+        return self._worker.pid
+
+    def _at_start(self, world: World) -> Simulated:
+        body = Simulated(world, speed=self._speed, skills=self._skills)
+        body.connect()
+        return body
+
+    def _listen(self) -> None:
+        assert self._worker is not None, "it was not started"
+        while True:
+            match self._worker.receive(HEARS):
+                case {"is": "goal"} as goal:
+                    self._goals.put(goal)
+                case {"is": "cancel", "id": str(number)}:
+                    self._cancel(number)
+                case {"is": "ended"}:
+                    self._goals.put(None)
+                    self._ended.set()
+                    return
+
+    def _cancel(self, number: str) -> None:
+        with self._lock:
+            self._cancelled.add(number)
+            if number == self._current:
+                self._body.cancel()
+
+    def _work(self) -> None:
+        for goal in iter(self._goals.get, None):
+            number, skill = goal["id"], goal["skill"]
+            arguments = [tuple(a) if isinstance(a, list) else a for a in goal["arguments"]]
+            self._told(f"{skill}({', '.join(map(str, arguments))})")
+            with self._lock:
+                is_wanted = number not in self._cancelled
+                self._current = number if is_wanted else ""
+            ending = self._ending(skill, arguments) if is_wanted else {"do": "cancelled"}
+            with self._lock:
+                self._current = ""
+                if number in self._cancelled:
+                    self._cancelled.remove(number)
+                    self._body.resume()
+            self._told("  " + " ".join(str(part) for part in ending.values()))
+            assert self._worker is not None, "it was not started"
+            self._worker.send({**ending, "id": number})
+
+    def _ending(self, skill: str, arguments: Sequence[Argument]) -> Message:
+        try:
+            return {"do": "succeed", "value": self._body.perform(skill, arguments)}
+        except RobotError as error:
+            return {"do": "abort", "text": f"{error.kind}: {error}"}
+        except CancelledError:
+            return {"do": "cancelled"}

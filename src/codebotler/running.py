@@ -1,0 +1,215 @@
+"""What `codebotler run` does: a program or an instruction, a check, somebody's word, and the robot's work."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from codebotler.archive import recover
+from codebotler.badinput import BadInput
+from codebotler.check import check
+from codebotler.checking import check_view, read_program
+from codebotler.drives import named_rooms
+from codebotler.generating import generated
+from codebotler.mission import GRACE, Mission, MissionError, State
+from codebotler.missionview import Watcher, ending, source_view
+from codebotler.models.base import Model
+from codebotler.problems import no_room
+from codebotler.prompts import prompt_for
+from codebotler.robots.base import NotReadyError, Robot, RobotLostError
+from codebotler.robots.reservation import Reservation
+from codebotler.simulator.imagined import Plan
+from codebotler.simulator.robot import RobotError, is_found_by_itself
+from codebotler.terminal import note, print_rich, says_yes, shortened, visible
+from codebotler.world import Room, World
+
+SIGNALS = {
+    signal.SIGINT: "Ctrl-C",
+    signal.SIGTERM: "a signal to end",
+    signal.SIGHUP: "the end of the terminal",
+}
+OF_SIGNALS = 128  # what shells add to the number of a signal, for the status of a process that it ended
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a user asks for.
+
+    Args:
+        what: a file, `-` for standard input, or an instruction.
+        model: gives who writes the program for an instruction; called only then.
+        yes: whether the program may be run without asking.
+        despite_problems: whether it may be run if the check finds problems.
+
+    Raises:
+        BadInput: it names a program that does not exist, or nothing, or nobody could be asked.
+    """
+
+    what: str
+    model: Callable[[], Model]
+    yes: bool = False
+    despite_problems: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.what.strip():
+            raise BadInput("nothing is asked for; name a program, or say what the robot is to do")
+        if self.what.endswith(".py") and not self.is_program:
+            raise BadInput("there is no such file; name one, or write an instruction", file=self.what)
+        if self.what == "-" and not self.yes:
+            raise BadInput(
+                "the program comes on standard input, so that nobody can be asked there; add --yes"
+            )
+
+    @property
+    def is_program(self) -> bool:
+        """Whether it names a program, and does not ask for one."""
+        try:
+            return self.what == "-" or Path(self.what).exists()
+        except (OSError, ValueError):  # too long for a name, or with a null character
+            return False
+
+
+def run(robot: Robot, request: Request, home: Path) -> int:
+    """Bring a mission from a user's request to its end, and show all of it.
+
+    Args:
+        robot: not yet connected.
+        request: what the user asks for.
+        home: the folder of missions.
+
+    Returns:
+        the exit status: 0 if it is done, 1 if it is not, 128 and the number of the signal that stopped it.
+
+    Raises:
+        NotReadyError: the robot cannot be used.
+        BadInput: the program cannot be read, or the model not be asked.
+        ModelError: no whole reply came.
+    """
+    program = read_program(request.what) if request.is_program else None
+    for summary in recover(home):
+        note(f"mission {summary.id} was interrupted: {visible(summary.reason)}")
+    instruction = "" if request.is_program else request.what
+    with Reservation(robot, home) as reserved, Mission(home, robot.name, instruction) as mission:
+        plan = preflight(robot)
+        if program is None:
+            model = request.model()
+            program = written(model, request.what, plan)
+            mission.draft(program, model.name)
+        else:
+            mission.draft(program)
+        if not _is_approved(mission, program, plan, request):
+            return 1
+        return _watched(mission, reserved, plan)
+
+
+def preflight(robot: Robot) -> Plan | None:
+    """What a connected robot says of its rooms, as a check takes it; None if it says nothing.
+
+    Raises:
+        NotReadyError: it does not answer.
+    """
+    try:
+        rooms = robot.perform("get_all_rooms", ()) if "get_all_rooms" in robot.skills else None
+        here = robot.perform("get_current_location", ()) if "get_current_location" in robot.skills else None
+    except RobotError as error:
+        note(f"the robot does not say which rooms it knows: {visible(str(error))}")
+        return None
+    except RobotLostError as error:
+        raise NotReadyError(f"the robot does not say which rooms it knows: {error.sentence}") from None
+    if not isinstance(rooms, list) or not rooms:
+        return None
+    names = {room: room if is_found_by_itself(room) else re.escape(room) for room in rooms}
+    return Plan(tuple(names.values()), names.get(str(here), names[rooms[0]]))
+
+
+def unknown_rooms(program: str, plan: Plan) -> list[str]:
+    """For each room that a program names and the robot does not know, a sentence.
+
+    Args:
+        program: its source.
+        plan: the robot's rooms.
+    """
+
+    def is_part(name: str) -> bool:
+        return any(name.casefold() in room.casefold() for room in plan.rooms)
+
+    named = named_rooms(program)
+    return [no_room(name, plan) for name in named if plan.room(name) is None and not is_part(name)]
+
+
+def written(model: Model, instruction: str, plan: Plan | None) -> str:
+    """The program that a model writes for an instruction, with the rooms of the robot in mind."""
+    if plan is None:
+        return generated(model, prompt_for(instruction)).program
+    world = World(tuple(Room(name) for name in plan.rooms), plan.start)
+    return generated(model, prompt_for(instruction, rooms=plan.rooms), world=world).program
+
+
+def _is_approved(mission: Mission, program: str, plan: Plan | None, request: Request) -> bool:
+    """Show what a check finds, and ask."""
+    rooms, start = (plan.rooms, plan.start) if plan else (None, None)
+    found = check(program, rooms=rooms, start=start)
+    name = request.what if request.is_program and request.what != "-" else "the program"
+    if not request.is_program:
+        print_rich(source_view(program))
+    print_rich(check_view(found, program, name))
+    problems = [problem.sentence for problem in found.problems]
+    mission.check(problems)
+    _tell_unknown(mission, unknown_rooms(program, plan) if plan and not problems else [])
+    if problems and not request.despite_problems:
+        mission.fail(f"the check found {'a problem' if len(problems) == 1 else 'problems'}")
+        note("not run, since it has problems; --despite-problems runs it all the same")
+        return False
+    if not request.yes and not says_yes(f"run it on the robot {mission.summary.robot}?"):
+        mission.stop("the word of a person")
+        note("not run; nothing has moved")
+        return False
+    mission.approve(despite_problems=request.despite_problems)
+    return True
+
+
+def _tell_unknown(mission: Mission, sentences: Sequence[str]) -> None:
+    for sentence in sentences:
+        told = f"before it moves: {sentence}"
+        mission.note(told)
+        note(shortened(told))
+
+
+def _watched(mission: Mission, reserved: Reservation, plan: Plan | None) -> int:
+    """Run it before a user's eyes."""
+    with _stopped_by_signals(mission) as got, Watcher(mission.summary) as watcher:
+        mission.told = watcher
+        with contextlib.suppress(MissionError):  # it was stopped before it could run
+            mission.run(reserved, plan.start if plan else "")
+    print_rich(ending(mission.summary))
+    if mission.state is State.STOPPED and got:
+        return OF_SIGNALS + got[0]
+    return 0 if mission.state is State.DONE else 1
+
+
+@contextlib.contextmanager
+def _stopped_by_signals(mission: Mission) -> Iterator[list[int]]:
+    """Stop the mission when a signal comes, and tell which came; a second one cancels once more."""
+    got: list[int] = []
+
+    def stop(name: str) -> None:
+        with contextlib.suppress(MissionError, OSError):
+            mission.stop(name)
+
+    def obey(number: int, _frame: object) -> None:
+        threading.Thread(target=stop, args=(SIGNALS[signal.Signals(number)],), daemon=True).start()
+        got.append(number)
+        if len(got) > 1:
+            note(f"\nthe robot was told to stop; it has {GRACE:g} s to confirm that")
+
+    before = {number: signal.signal(number, obey) for number in SIGNALS}
+    try:
+        yield got
+    finally:
+        for number, handler in before.items():  # who was impatient must not break the tidying up
+            signal.signal(number, signal.SIG_IGN if got else handler)

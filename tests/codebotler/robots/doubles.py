@@ -1,0 +1,59 @@
+"""Robots that answer as a test tells them to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from codebotler.robots.base import Argument, CancelledError, Feedback, Result, untold
+from codebotler.robots.clock import Clock
+from codebotler.skills import SKILLS
+
+
+class Answering:
+    """A robot that does nothing but to answer.
+
+    Args:
+        answer: gives or raises the answer to a skill, given its name and its first argument.
+    """
+
+    name, address, if_tool_dies = "answering", "", "it ended with the tool"
+
+    def __init__(self, answer: Callable[[str, str], Result] = lambda *_: None) -> None:
+        self.answer, self.clock, self.skills = answer, Clock(None), SKILLS
+        self.done: list[str] = []
+        self.cancels = self.connections = 0
+
+    def connect(self) -> None:
+        self.connections += 1
+        self.cancels = 0
+        self.clock.restart()
+
+    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
+        if self.cancels:
+            raise CancelledError
+        first = str(arguments[0]) if arguments else ""
+        told(f"doing {skill}")
+        result = self.answer(skill, first)
+        self.done.append(first or skill)
+        return result
+
+    def cancel(self) -> None:
+        self.cancels += 1
+
+    def disconnect(self) -> None:
+        self.connections -= 1
+
+
+def raising(error: Exception) -> Callable[[str, str], Result]:
+    """An answer that is an error."""
+
+    def answer(_skill: str, _first: str) -> Result:
+        raise error
+
+    return answer
+
+
+def giving(*results: Result) -> Callable[[str, str], Result]:
+    """Answers, one after the other."""
+    rest = iter(results)
+    return lambda _skill, _first: next(rest)

@@ -1,0 +1,134 @@
+"""The simulated robot drives at walking pace, tells where it is, and stops in the middle of everything."""
+
+import math
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.robots.base import CancelledError, Options, Robot
+from codebotler.robots.open import all_readiness, open_robot
+from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
+from codebotler.simulator.robot import RobotError
+from codebotler.world import Person, Room, World
+
+WORLD = World(
+    (
+        Room("hall", footprint=((0, 0), (2, 0), (2, 2), (0, 2)), stand_at=(1.0, 1.0)),
+        Room("kitchen", ("mug",), (Person("ann", ("yes",)),), ((4, 0), (8, 0), (8, 6), (4, 6)), (4.0, 5.0)),
+    ),
+    "hall",
+)
+
+
+def connected(speed: float | None = None, *, metres_per_second: float = METRES_PER_SECOND) -> Simulated:
+    robot = Simulated(WORLD, speed=speed, metres_per_second=metres_per_second)
+    robot.connect()
+    return robot
+
+
+def test_driving_takes_as_long_as_the_way_is() -> None:
+    robot = connected()
+    robot.perform("go_to", ["Kitchen"])
+    assert robot.clock.now == pytest.approx(5 / METRES_PER_SECOND)
+    assert robot.perform("get_current_location", []) == "kitchen"
+    robot.perform("go_to", ["the kitchen"])
+    assert robot.clock.now == pytest.approx(5 / METRES_PER_SECOND)
+
+
+def test_driving_may_take_no_time() -> None:
+    robot = connected(metres_per_second=math.inf)
+    robot.perform("go_to", ["kitchen"])
+    assert robot.clock.now == 0
+
+
+def test_feedback_tells_places_on_the_way() -> None:
+    told: list[str] = []
+    connected(speed=10).perform("go_to", ["kitchen"], told.append)
+    assert told[-1] == "at (4.0, 5.0)"
+    assert 2 <= len(told) <= 8
+    places = [tuple(map(float, text.removeprefix("at (").removesuffix(")").split(", "))) for text in told]
+    assert places == sorted(places)
+    assert all(abs((x - 1) * 4 / 3 - (y - 1)) < 0.2 for x, y in places)
+
+
+def test_skills_do_what_they_do_in_the_simulator() -> None:
+    robot = connected()
+    robot.perform("go_to", ["kitchen"])
+    assert robot.perform("get_all_rooms", []) == ["hall", "kitchen"]
+    assert robot.perform("is_in_room", ["mug"]) is True
+    assert robot.perform("pick", ["mug"]) is None
+    assert robot.perform("is_in_room", ["mug"]) is True, "ann answers to any name"
+    assert robot.perform("ask", ["ann", "Tea?", ("No", "Yes")]) == "Yes"
+    assert robot.perform("ask", ["ann", "Yes?", ("Yes", "No")]) == "Yes"
+
+
+@pytest.mark.parametrize(
+    ("skill", "arguments", "kind"),
+    [
+        ("go_to", ["cellar"], "GoToInvalidLocation"),
+        ("pick", ["mug"], "PickInvalidObject"),
+        ("place", ["mug"], "PlaceNoObject"),
+        ("ask", ["ann", "Tea?", ("Yes",)], "AskNoPerson"),
+    ],
+)
+def test_errors_are_those_of_the_simulator(skill: str, arguments: list[str], kind: str) -> None:
+    with pytest.raises(RobotError) as error:
+        connected().perform(skill, arguments)
+    assert error.value.kind == kind
+
+
+def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after() -> None:
+    robot = connected(speed=0.01)
+    with ThreadPoolExecutor(1) as thread:
+        on_the_way = threading.Event()
+        driving = thread.submit(robot.perform, "go_to", ["kitchen"], lambda _: on_the_way.set())
+        assert on_the_way.wait(30)
+        began = time.monotonic()
+        robot.cancel()
+        with pytest.raises(CancelledError):
+            driving.result(5)
+        assert time.monotonic() - began < 2
+    for skill, argument in (("say", "hello"), ("go_to", "kitchen"), ("go_to", "cellar")):
+        with pytest.raises(CancelledError):
+            robot.perform(skill, [argument])
+    with pytest.raises(CancelledError):
+        robot.perform("get_current_location", [])
+    robot.connect()
+    assert robot.perform("get_current_location", []) == "hall"
+
+
+def test_cancel_before_anything_goes_on_is_not_forgotten() -> None:
+    robot = connected()
+    robot.cancel()
+    with pytest.raises(CancelledError):
+        robot.perform("say", ["hello"])
+
+
+def test_world_is_as_at_the_start_after_connecting_again() -> None:
+    robot = connected()
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("pick", ["mug"])
+    robot.disconnect()
+    robot.disconnect()
+    robot.connect()
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("pick", ["mug"])
+
+
+def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
+    robot: Robot = open_robot("sim", Options(world=WORLD, speed=3))
+    assert (robot.name, robot.clock.speed) == ("simulated", 3)
+    with pytest.raises(BadInput, match="--world FILE"):
+        open_robot("sim")
+    with pytest.raises(BadInput, match='no robot "simm"; there are sim, pyrobosim, ros1, rosbridge, ros2'):
+        open_robot("simm")
+
+
+def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
+    kinds = {kind.name: kind for kind in all_readiness()}
+    assert list(kinds) == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
+    assert kinds["sim"].works
+    assert all(kind.works or kind.missing for kind in kinds.values())

@@ -1,0 +1,363 @@
+"""The commands around missions: they check, ask, run, are stopped and killed, and show it all again."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from codebotler.models.recorded import recorded_model
+from processes import are_gone, children_of
+from roboeval.suite import Suite
+
+GOOD = """def task_program():
+    go_to("kitchen")
+    if is_in_room("mug"):
+        pick("mug")
+        say("I have it")
+"""
+BAD = 'def task_program():\n    go_to("cellar")\n'
+FAR = """def task_program():
+    while True:
+        try:
+            for room in get_all_rooms():
+                go_to(room)
+        except BaseException:
+            pass
+"""
+WORLD = "robot: hall\nrooms: [hall, kitchen, study, lab]\nobjects: {kitchen: [mug]}\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, text in (("good.py", GOOD), ("bad.py", BAD), ("far.py", FAR), ("world.yaml", WORLD)):
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def command(folder: Path, *arguments: str | Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "codebotler.cli", *map(str, arguments)],
+        cwd=folder,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "CODEBOTLER_HOME": str(folder / "home"), "COLUMNS": "100", "NO_COLOR": "1"},
+    )
+
+
+def ended(folder: Path, *arguments: str | Path, given: str = "") -> tuple[int, str, str]:
+    process = command(folder, *arguments)
+    out, err = process.communicate(given, timeout=60)
+    return process.returncode, out, err
+
+
+def run(folder: Path, *arguments: str | Path, given: str = "") -> tuple[int, str, str]:
+    return ended(folder, "run", *arguments, "--world", "world.yaml", "--speed", "0", given=given)
+
+
+def states(folder: Path) -> list[str]:
+    status, out, _ = ended(folder, "missions", "--json")
+    assert status == 0
+    return [mission["state"] for mission in json.loads(out)]
+
+
+def shown(out: str) -> list[str]:
+    """What was printed while the robot worked, without times."""
+    _, _, story = out.partition("running on the robot simulated\n")
+    return [re.sub(r"^ *([\d.]+ s  )?", "", line) for line in story.splitlines()]
+
+
+# --- run
+
+
+def test_program_is_checked_then_run(folder: Path) -> None:
+    status, out, err = run(folder, "good.py", "--yes")
+    assert (status, err) == (0, "")
+    assert out.startswith("accepted: no problem in good.py\n")
+    drives = [line for line in shown(out) if not line.startswith("at (")]
+    assert drives[:6] == [
+        'drives to "kitchen"',
+        'looks for "mug"',
+        "→ found",
+        'picks up "mug"',
+        'says "I have it"',
+        "done",
+    ]
+    assert states(folder) == ["done"]
+
+
+@pytest.mark.parametrize(("answer", "status"), [("y\n", 0), ("Yes\n", 0), ("n\n", 1), ("\n", 1), ("", 1)])
+def test_person_is_asked(folder: Path, answer: str, status: int) -> None:
+    found, out, err = run(folder, "good.py", given=answer)
+    assert found == status
+    assert "run it on the robot simulated? [y/N] " in err
+    assert ("drives to" in out.partition("running on")[2]) == (status == 0)
+    assert states(folder) == [["done", "stopped"][status]]
+
+
+def test_program_with_problems_is_not_run_without_a_word_about_them(folder: Path) -> None:
+    status, out, err = run(folder, "bad.py", "--yes")
+    assert status == 1
+    assert 'line 2: GoToInvalidLocation: there is no room "cellar"' in out
+    assert "--despite-problems" in err
+    assert "running on" not in out
+    status, out, _ = run(folder, "bad.py", "--yes", "--despite-problems")
+    assert status == 1
+    assert shown(out)[:3] == [
+        'drives to "cellar"',
+        'GoToInvalidLocation: there is no room "cellar"',
+        'failed in line 2: GoToInvalidLocation: there is no room "cellar"',
+    ]
+    assert states(folder) == ["failed", "failed"]
+
+
+def test_rooms_that_the_robot_does_not_know_are_told_before_it_moves(folder: Path) -> None:
+    (folder / "careful.py").write_text(
+        'def task_program():\n    try:\n        go_to("kitchn")\n    except Exception:\n        say("oh")\n'
+    )
+    status, out, err = run(folder, "careful.py", "--yes")
+    assert status == 0
+    assert 'before it moves: there is no room "kitchn"; the closest is "kitchen"' in err
+    assert shown(out)[0] == 'drives to "kitchn"'
+
+
+def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) -> None:
+    task = paper.tasks["StaplerDelivery"]
+    instruction = task.prompts[0]
+    (folder / "world.yaml").write_text(task.scenarios[0].world.to_yaml())
+    status, out, _ = run(folder, instruction, "--yes")
+    assert status == 0
+    assert "accepted: no problem in the program" in out
+    program = "".join(line.removeprefix("    ") for line in out.splitlines(keepends=True)[:40])
+    assert recorded_model("recorded:careful").reply(instruction, 0).program in program
+    status, out, _ = ended(folder, "missions", "last", "--json")
+    mission = json.loads(out)
+    assert (mission["instruction"], mission["model"]) == (instruction, "recorded:careful")
+
+
+def test_program_on_standard_input(folder: Path) -> None:
+    status, out, _ = run(folder, "-", "--yes", given=GOOD)
+    assert (status, "done" in shown(out)) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["none.py", "--yes"], "none.py: there is no such file; name one, or write an instruction"),
+        (["-"], "nobody can be asked there; add --yes"),
+        (["", "--yes"], "nothing is asked for"),
+        (["good.py", "--robot", "simm"], 'there is no robot "simm"; there are sim, pyrobosim'),
+        (["no such thing", "--yes"], "recorded:careful has no program for"),
+    ],
+)
+def test_what_cannot_be_run_is_said_in_a_sentence(folder: Path, arguments: list[str], sentence: str) -> None:
+    status, out, err = run(folder, *arguments)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert sentence in err
+    assert "running" not in states(folder)
+
+
+def test_simulated_robot_needs_a_world(folder: Path) -> None:
+    status, _, err = ended(folder, "run", "good.py", "--yes")
+    assert (status, "--world FILE" in err) == (2, True)
+
+
+def test_feedback_comes_while_the_robot_drives(folder: Path) -> None:
+    process = command(folder, "run", "good.py", "--yes", "--world", "world.yaml", "--speed", "5")
+    with stopping(process):
+        read_until(process, "at (")
+        assert process.poll() is None
+        out, _ = process.communicate(timeout=60)
+    assert "says" in out
+
+
+# --- the stop
+
+
+@contextlib.contextmanager
+def stopping(process: subprocess.Popen[str]) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def read_until(process: subprocess.Popen[str], text: str) -> str:
+    assert process.stdout is not None
+    lines = ""
+    watchdog = threading.Timer(30, process.kill)
+    watchdog.start()
+    try:
+        for line in process.stdout:
+            lines += line
+            if text in line and "running on" in lines:
+                return lines
+    finally:
+        watchdog.cancel()
+    raise AssertionError(lines)
+
+
+def driving(folder: Path) -> subprocess.Popen[str]:
+    """A tool whose robot is on its way."""
+    arguments = ("far.py", "--yes", "--despite-problems", "--world", "world.yaml", "--speed", "1")
+    process = command(folder, "run", *arguments)
+    read_until(process, "at (")
+    return process
+
+
+@pytest.mark.parametrize(
+    ("signals", "status"),
+    [([signal.SIGINT], 130), ([signal.SIGINT] * 3, 130), ([signal.SIGTERM], 143), ([signal.SIGHUP], 129)],
+)
+def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: int) -> None:
+    process = driving(folder)
+    with stopping(process):
+        family = children_of(process.pid)
+        for number in signals:
+            process.send_signal(number)
+            time.sleep(0.01)
+        out, err = process.communicate(timeout=30)
+    assert process.returncode == status
+    assert "stopped in the middle of it\n" in out
+    assert "the robot has stopped\n" in out
+    assert "Traceback" not in err
+    assert family
+    assert are_gone(family)
+    assert states(folder) == ["stopped"]
+
+
+def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
+    process = command(folder, "run", "good.py", "--world", "world.yaml")
+    with stopping(process):
+        assert process.stderr is not None
+        said = ""
+        while not said.endswith("[y/N] ") and (letter := process.stderr.read(1)):
+            said += letter
+        process.send_signal(signal.SIGINT)
+        process.wait(30)
+    assert process.returncode == 130
+    assert states(folder) == ["stopped"]
+
+
+def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        family = children_of(process.pid)
+        process.kill()
+        process.wait(30)
+        assert are_gone(family)
+    status, out, err = run(folder, "good.py", "--yes")
+    assert status == 0
+    assert re.match(
+        r"mission \d{8}-\d{6} was interrupted: the tool died during go_to\(\"\w+\"\) \(at .*\); "
+        r"the simulated robot ended with the tool\n",
+        err,
+    )
+    assert states(folder) == ["interrupted", "done"]
+    status, out, err = ended(folder, "missions")
+    assert (status, err) == (0, "")
+    assert "interrupted" in out
+
+
+def test_two_tools_on_one_robot(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        status, out, err = run(folder, "good.py", "--yes")
+        assert (status, out) == (1, "")
+        assert f"another tool (process {process.pid}, since " in err
+        assert states(folder) == ["running"]
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+    assert run(folder, "good.py", "--yes")[0] == 0
+    assert states(folder) == ["stopped", "done"]
+
+
+def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        assert process.stdout is not None
+        process.stdout.close()
+        process.stdout = None
+        assert process.wait(30) == 1
+    assert states(folder) == ["failed"]
+
+
+# --- missions, robots
+
+
+def test_missions_are_listed_and_shown(folder: Path) -> None:
+    assert ended(folder, "missions") == (0, "there are no missions yet\n", "")
+    assert ended(folder, "missions", "--json") == (0, "[]\n", "")
+    run(folder, "good.py", "--yes")
+    _, out, _ = ended(folder, "missions")
+    (line,) = out.splitlines()
+    name, state, robot, *_ = line.split()
+    assert (state, robot) == ("done", "simulated")
+    status, out, _ = ended(folder, "missions", name)
+    assert status == 0
+    assert 'go_to("kitchen")' in out
+    assert 'picks up "mug"' in out
+    _, out, _ = ended(folder, "missions", name, "--json")
+    data = json.loads(out)
+    assert (data["id"], data["events"][-1]["state"]) == (name, "done")
+
+
+def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
+    line = f"    say({'long ' * 40!r})"
+    (folder / "long.py").write_text(f"def task_program():\n{line}\n")
+    run(folder, "long.py", "--yes")
+    assert f"    {line}\n" in ended(folder, "missions", "last")[1]
+
+
+def test_mission_is_written_as_mcap(folder: Path) -> None:
+    run(folder, "good.py", "--yes")
+    for clock in ("wall", "robot"):
+        status, out, err = ended(folder, "missions", "last", "--mcap", "one.mcap", "--clock", clock)
+        assert (status, out) == (0, "")
+        assert err.startswith("wrote ")
+        with (folder / "one.mcap").open("rb") as file:
+            topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+        assert topics == {"/mission/state", "/skill/go_to", "/skill/is_in_room", "/skill/pick", "/skill/say"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["none"], 'there is no mission "none"; `codebotler missions` lists those there are'),
+        (["--mcap", "x.mcap"], "--mcap writes one mission; name it, or `last`"),
+        (["last", "--mcap", "x.mcap"], 'there is no mission "last"'),
+        (["last", "--clock", "sun"], '"sun" is no clock; write wall or robot'),
+    ],
+)
+def test_what_missions_cannot_show_is_said_in_a_sentence(
+    folder: Path, arguments: list[str], sentence: str
+) -> None:
+    status, out, err = ended(folder, "missions", *arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert sentence in err
+    assert not (folder / "x.mcap").exists()
+
+
+def test_robots_are_listed_with_what_is_missing(folder: Path) -> None:
+    status, out, err = ended(folder, "robots")
+    assert (status, err) == (0, "")
+    assert re.search(r"^sim +works", out, re.MULTILINE)
+    _, out, _ = ended(folder, "robots", "--json")
+    kinds = json.loads(out)
+    assert [kind["name"] for kind in kinds] == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
+    assert all(kind["works"] or kind["missing"] for kind in kinds)

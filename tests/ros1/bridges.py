@@ -1,0 +1,139 @@
+"""A double of rosbridge for ROS 1, over a real graph, and a stand-in for its operations of ROS 2."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.server import ServerConnection, serve
+
+from codebotler.robots.ros import actions_of
+from codebotler.robots.ros1 import PYTHON, SCRIPT
+from codebotler.skills import SKILLS
+
+ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
+
+
+class Bridge:
+    """A websocket server; each connection is handled by one function.
+
+    Args:
+        handle: talks on a connection until it is closed.
+    """
+
+    def __init__(self, handle: Callable[[ServerConnection], None]) -> None:
+        self.open: list[ServerConnection] = []
+        self._handle = handle
+        self._server = serve(self._talk, "127.0.0.1", 0)
+        self.address = f"ws://127.0.0.1:{self._server.socket.getsockname()[1]}"
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self._thread.start()
+
+    def _talk(self, connection: ServerConnection) -> None:
+        self.open.append(connection)
+        with suppress(ConnectionClosed):
+            self._handle(connection)
+        self.open.remove(connection)
+
+    def cut(self) -> None:
+        """Lose all connections."""
+        for connection in list(self.open):
+            connection.close_socket()
+
+    def end(self) -> None:
+        self._server.shutdown()
+        self._thread.join()
+
+
+@contextmanager
+def bridge(handle: Callable[[ServerConnection], None]) -> Iterator[Bridge]:
+    double = Bridge(handle)
+    yield double
+    double.cut()
+    double.end()
+
+
+def over_ros(master: str, skills: tuple[str, ...] = tuple(SKILLS)) -> Callable[[ServerConnection], None]:
+    """Handles connections by a node of their own on a real ROS graph.
+
+    Args:
+        master: of the graph.
+        skills: whose messages it knows.
+    """
+    actions = [action for skill, action in actions_of(SKILLS).items() if skill in skills]
+
+    def handle(connection: ServerConnection) -> None:
+        with subprocess.Popen(
+            [str(PYTHON), str(ROS_SIDE), str(SCRIPT.parent), json.dumps(actions)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "ROS_MASTER_URI": master},
+        ) as node:
+            assert node.stdin is not None
+            assert node.stdout is not None
+
+            def forward() -> None:
+                assert node.stdout is not None
+                try:
+                    for line in node.stdout:
+                        connection.send(line)
+                except ConnectionClosed:
+                    node.kill()
+
+            thread = threading.Thread(target=forward, daemon=True)
+            thread.start()
+            try:
+                for text in connection:
+                    node.stdin.write(f"{text!s}\n")
+                    node.stdin.flush()
+            except (ConnectionClosed, BrokenPipeError):
+                pass
+            finally:
+                node.kill()
+                node.wait()
+                thread.join()
+
+    return handle
+
+
+def like_ros_2(heard: list[dict[str, Any]]) -> Callable[[ServerConnection], None]:
+    """Handles connections as a rosbridge of ROS 2 is documented to; a goal's first text says how it goes.
+
+    Args:
+        heard: gets what was sent to it.
+    """
+
+    def handle(connection: ServerConnection) -> None:
+        def tell(operation: str, **more: object) -> None:
+            connection.send(json.dumps({"op": operation, **more}))
+
+        for text in connection:
+            message = json.loads(text)
+            heard.append(message)
+            match message:
+                case {"op": "call_service", "id": called}:
+                    values = {"version": 2, "distro": "jazzy"}
+                    tell("service_response", id=called, result=True, values=values)
+                case {"op": "send_action_goal", "id": goal, "action": action, "args": args}:
+                    word = next(iter(args.values()), "")
+                    if word == "unknown":
+                        tell("action_result", id=goal, action=action, values="no such action", result=False)
+                    elif word != "never":
+                        tell("action_feedback", id=goal, action=action, values={"near": "the hall"})
+                        status = 6 if word == "abort" else 4
+                        values = {"result": "yes"} if action == "/ask_server" else {}
+                        tell(
+                            "action_result", id=goal, action=action, values=values, status=status, result=True
+                        )
+                case {"op": "cancel_action_goal", "id": goal, "action": action}:
+                    tell("action_result", id=goal, action=action, values={}, status=5, result=True)
+
+    return handle

@@ -1,0 +1,44 @@
+"""What tests on ROS 1 share; where there is no ROS, they are skipped, and say why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from codebotler.robots.ros1 import MEND, NEEDS, PYTHON
+from codebotler.robots.worker import lacks
+from ros_graph import Graph
+
+HERE = Path(__file__).parent
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    missing = lacks(PYTHON, (*NEEDS, "rosmaster"))
+    if missing is None or missing:
+        reason = f"{PYTHON} lacks {missing or 'Python'}: {MEND}"
+        for item in items:
+            if HERE in item.path.parents:
+                item.add_marker(pytest.mark.skip(reason=reason))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def ros_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    home = tmp_path_factory.mktemp("ros")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_HOME", str(home))
+        patch.setenv("ROS_LOG_DIR", str(home / "log"))
+        patch.setenv("ROS_HOSTNAME", "localhost")
+        patch.delenv("ROS_MASTER_URI", raising=False)
+        patch.delenv("ROS_IP", raising=False)
+        yield home
+
+
+@pytest.fixture
+def graph() -> Iterator[Graph]:
+    graph = Graph()
+    try:
+        yield graph
+    finally:
+        graph.end()

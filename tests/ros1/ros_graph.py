@@ -1,0 +1,144 @@
+"""A real ROS graph: a rosmaster on a free port, and action servers in processes of their own."""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import signal
+import socket
+import subprocess
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from codebotler.robots.ros import Waits
+from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
+from codebotler.skills import SKILLS, Skill
+
+HERE = Path(__file__).parent
+MASTER = HERE / "ros_master.py"
+SERVER = HERE / "action_servers.py"
+LONG = 30.0  # seconds after which what is waited for has failed
+GO_TO, SAY = SKILLS["go_to"], SKILLS["say"]
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Process:
+    """A script under the Python that has rospy; it ends with its input, and says JSON, line by line."""
+
+    def __init__(self, script: Path, *arguments: str, master: str = "", **environment: str) -> None:
+        self.said: queue.Queue[list[Any]] = queue.Queue()
+        self.process = subprocess.Popen(
+            [str(PYTHON), str(script), *arguments],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "ROS_MASTER_URI": master, **environment},
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if line.startswith("["):
+                self.said.put(json.loads(line))
+
+    def expect(self, *what: str) -> None:
+        """Wait until it says this next."""
+        assert self.said.get(timeout=LONG) == list(what)
+
+    def end(self) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self._reader.join(LONG)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+    def kill(self) -> None:
+        os.kill(self.process.pid, signal.SIGKILL)
+        self.end()
+
+
+class Graph:
+    """A ROS graph of its own."""
+
+    def __init__(self) -> None:
+        self.port = free_port()
+        self.uri = f"http://localhost:{self.port}"
+        self.processes: list[Process] = []
+        self.robots: list[Ros1] = []
+        self.start_master()
+
+    def start_master(self) -> None:
+        self.master = Process(MASTER, str(self.port))
+        self.master.expect("ready")
+
+    def serve(self, *skills: Skill, **environment: str) -> Process:
+        """An action server for each skill; what a goal says is how it goes."""
+        actions = [[s.ros.type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
+        server = Process(SERVER, str(SCRIPT.parent), json.dumps(actions), master=self.uri, **environment)
+        self.processes.append(server)
+        server.expect("ready")
+        return server
+
+    def robot(self, **options: Any) -> Ros1:  # noqa: ANN401 - those of Ros1
+        options.setdefault("waits", Waits(patience=1.5, silence=1.5, longest=20.0))
+        robot = Ros1(self.uri, **options)
+        self.robots.append(robot)
+        return robot
+
+    def end(self) -> None:
+        for robot in self.robots:
+            robot.disconnect()
+        for process in [*self.processes, self.master]:
+            process.end()
+
+
+@contextmanager
+def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
+    """Something that goes on in a thread; what it returned or raised is there at the end."""
+    ended: dict[str, object] = {}
+
+    def run() -> None:
+        try:
+            ended["value"] = does()
+        except Exception as error:  # noqa: BLE001 - looked at by the test
+            ended["error"] = error
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    yield ended
+    thread.join(LONG)
+    assert not thread.is_alive()
+
+
+INSTALLED = """
+import sys
+sys.path.insert(0, {worker!r})
+from ros1_worker import build
+build(sys.modules[__name__], {name!r}, {definition!r})
+"""
+
+
+def installed(folder: Path, name: str, definition: str) -> str:
+    """Install the robot's package with one action; what is then on the path."""
+    package = folder / "robot_actions_pkg" / "msg"
+    package.mkdir(parents=True)
+    package.with_name("__init__.py").touch()
+    code = INSTALLED.format(worker=str(SCRIPT.parent), name=name, definition=definition)
+    (package / "__init__.py").write_text(code)
+    return str(folder)

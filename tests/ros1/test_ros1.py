@@ -1,0 +1,470 @@
+"""The robot on ROS 1 and all that can go wrong, on a real graph with real actionlib."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.ros import Waits
+from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
+from codebotler.simulator.robot import RobotError
+from codebotler.skills import SKILLS, Parameter, RosAction, Skill
+from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
+
+
+def test_goal_is_executed_and_the_result_comes_back(graph: Graph) -> None:
+    server = graph.serve(*SKILLS.rows)
+    robot = graph.robot()
+    robot.connect()
+    assert robot.missing == {}
+    assert robot.perform("go_to", ["the hall"]) is None
+    server.expect("goal", "the hall")
+    assert robot.perform("get_current_location", []) == ""
+    assert robot.perform("get_all_rooms", []) == []
+    assert robot.perform("is_in_room", ["mug"]) is False
+    assert robot.perform("ask", ["ann", "tea?", ("yes", "no")]) == ""
+
+
+@pytest.mark.parametrize(
+    ("goal", "kind", "message"),
+    [
+        ("abort", "GoToInvalidLocation", "the door is shut"),
+        ("reject", "GoToInvalidLocation", "not in this gown"),
+        ("abort, named", "DoorIsShut", "you have no key"),
+        ("abort without a word", "GoToInvalidLocation", "/go_to_server aborted the goal without a reason"),
+    ],
+)
+def test_rejected_or_aborted_goal_is_a_robot_error(graph: Graph, goal: str, kind: str, message: str) -> None:
+    graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(RobotError) as error:
+        robot.perform("go_to", [goal])
+    assert (error.value.kind, str(error.value)) == (kind, message)
+    robot.perform("go_to", ["the hall"])
+
+
+def test_skill_that_fails_in_several_ways_names_itself(graph: Graph) -> None:
+    graph.serve(SKILLS["pick"])
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(RobotError) as error:
+        robot.perform("pick", ["abort"])
+    assert error.value.kind == "PickFailed"
+
+
+def test_no_master_is_said_at_once() -> None:
+    uri = f"http://localhost:{free_port()}"
+    with pytest.raises(NotReadyError, match=f"no ROS master answers at {uri}; start one"):
+        Ros1(uri).connect()
+
+
+def test_no_rospy_is_said_with_the_mend(graph: Graph) -> None:
+    with pytest.raises(NotReadyError, match="has no ROS: No module named"):
+        Ros1(graph.uri, python=Path(sys.executable)).connect()
+    with pytest.raises(NotReadyError, match="name the robot's Python by --ros-python"):
+        Ros1(graph.uri, python=Path("/nowhere/python3")).connect()
+
+
+def test_robot_without_any_server_is_not_ready(graph: Graph) -> None:
+    with pytest.raises(NotReadyError, match=r"no action server at all: there is no action server at /"):
+        graph.robot().connect()
+
+
+def test_missing_server_is_known_before_motion_and_looked_for_again(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    assert set(robot.missing) == set(SKILLS) - {"go_to"}
+    assert robot.missing["say"] == "there is no action server at /say_server; start it"
+    with pytest.raises(RobotLostError, match="there is no action server at /say_server; start it"):
+        robot.perform("say", ["hello"])
+    server = graph.serve(SAY)
+    robot.perform("say", ["hello"])
+    server.expect("goal", "hello")
+
+
+def test_server_with_another_definition_is_told_from_a_missing_one(graph: Graph) -> None:
+    assert GO_TO.ros is not None
+    graph.serve(SAY, replace(GO_TO, ros=replace(GO_TO.ros, goal=("string place",))))
+    robot = graph.robot()
+    robot.connect()
+    assert "its definition of robot_actions_pkg/GoToAction differs (another md5" in robot.missing["go_to"]
+    assert "say" not in robot.missing
+    with pytest.raises(RobotLostError, match="another md5"):
+        robot.perform("go_to", ["the hall"])
+
+
+def test_server_that_died_long_ago_is_said_to_have_died(graph: Graph) -> None:
+    graph.serve(SAY)
+    graph.serve(GO_TO).kill()
+    robot = graph.robot()
+    robot.connect()
+    assert "has died; start it again" in robot.missing["go_to"]
+
+
+def test_server_that_dies_in_a_goal_is_noticed_and_may_come_back(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(RobotLostError, match="the action server at /go_to_server has died: no status"):
+        robot.perform("go_to", ["die"])
+    server = graph.serve(GO_TO)
+    robot.perform("go_to", ["the hall"])
+    server.expect("goal", "the hall")
+
+
+@pytest.mark.parametrize(
+    ("goal", "sentence"),
+    [
+        ("never", "/go_to_server did not end within 1 s; the goal was cancelled"),
+        ("no result", "/go_to_server ended the goal, but sent no result within 1.5 s"),
+    ],
+)
+def test_goal_that_does_not_end_is_cancelled(graph: Graph, goal: str, sentence: str) -> None:
+    server = graph.serve(GO_TO)
+    longest = 1.0 if goal == "never" else 20.0
+    robot = graph.robot(waits=Waits(patience=1.5, silence=3.0, longest=longest))
+    robot.connect()
+    with pytest.raises(RobotLostError) as error:
+        robot.perform("go_to", [goal])
+    assert error.value.sentence == sentence
+    server.expect("goal", goal)
+    if goal == "never":
+        server.expect("cancel", goal)
+
+
+def test_goal_of_which_the_server_takes_no_notice(graph: Graph) -> None:
+    graph.serve(GO_TO, DEAF="1")
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"/go_to_server did not take the goal within 1.5 s"):
+        robot.perform("go_to", ["the hall"])
+
+
+def test_goal_that_somebody_else_cancels_is_cancelled(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(CancelledError):
+        robot.perform("go_to", ["by somebody else"])
+
+
+def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_connect(graph: Graph) -> None:
+    server = graph.serve(GO_TO, SAY)
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        robot.cancel()
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], CancelledError)
+    assert not robot.clock.wait(3600)
+    with pytest.raises(CancelledError):
+        robot.perform("say", ["on I go"])
+    robot.cancel()
+    robot.connect()
+    robot.perform("say", ["again"])
+    server.expect("goal", "again")
+
+
+def test_cancel_right_after_a_goal_always_ends_it(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    for _ in range(20):
+        with started(lambda: robot.perform("go_to", ["never"])) as ended:
+            while robot._number == 0:
+                time.sleep(0)
+            robot.cancel()
+        assert isinstance(ended["error"], CancelledError)
+        robot._stopped, robot._number = False, 0
+    robot._stopped = False
+    robot.perform("go_to", ["the end"])
+    while server.said.get(timeout=LONG) != ["goal", "the end"]:
+        pass
+
+
+def test_cancel_while_a_server_is_waited_for(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    robot = graph.robot(waits=Waits(patience=2.0))
+    robot.connect()
+    with started(lambda: robot.perform("say", ["hello"])) as ended:
+        while robot._number == 0:
+            time.sleep(0.01)
+        robot.cancel()
+    assert isinstance(ended["error"], CancelledError)
+
+
+def test_robot_that_answers_after_a_stop_answers_in_vain(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["late"])) as ended:
+        server.expect("goal", "late")
+        robot.cancel()
+    assert isinstance(ended["error"], CancelledError)
+    robot.connect()
+    with pytest.raises(RobotError, match="the door is shut"):
+        robot.perform("go_to", ["abort"])
+
+
+def test_robot_that_does_not_stop_is_said_not_to(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
+        server.expect("goal", "never, whatever you say")
+        robot.cancel()
+    assert isinstance(ended["error"], RobotLostError)
+    assert ended["error"].sentence == (
+        "/go_to_server was told to stop, and did not say within 1.5 s that it has"
+    )
+
+
+def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        assert robot._worker is not None
+        os.kill(robot._worker.pid, signal.SIGKILL)
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], RobotLostError)
+    assert ended["error"].sentence == (
+        "the worker of ros1 has died (signal 9); another one has cancelled all goals"
+    )
+    robot.connect()
+    robot.perform("go_to", ["the hall"])
+
+
+def test_stop_works_where_the_worker_hangs(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot(waits=Waits(patience=LONG))  # too long for its silence to be noticed
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        assert robot._worker is not None
+        os.kill(robot._worker.pid, signal.SIGSTOP)
+        robot.cancel()
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], RobotLostError)
+
+
+def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        assert robot._worker is not None
+        os.kill(robot._worker.pid, signal.SIGSTOP)
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], RobotLostError)
+    assert ended["error"].sentence == (
+        "the worker of ros1 does not answer; another one has cancelled all goals"
+    )
+
+
+TOOL = """
+import sys
+from codebotler.robots.ros1 import Ros1
+robot = Ros1(sys.argv[1])
+robot.connect()
+robot.perform("go_to", ["never"])
+"""
+
+
+def tool(graph: Graph) -> subprocess.Popen[bytes]:
+    source = str(Path(__file__).parents[2] / "src")
+    return subprocess.Popen([sys.executable, "-c", TOOL, graph.uri], env={**os.environ, "PYTHONPATH": source})
+
+
+def test_killed_tool_leaves_no_moving_robot(graph: Graph) -> None:
+    server = graph.serve(*SKILLS.rows)
+    process = tool(graph)
+    server.expect("goal", "never")
+    process.kill()
+    killed = time.monotonic()
+    server.expect("cancel", "never")
+    took = time.monotonic() - killed
+    process.wait()
+    assert took < 1.0, f"the goal was preempted {took:.2f} s after the tool was killed"
+    graph.robot().connect()
+
+
+def test_goals_of_a_worker_that_was_killed_with_its_tool_are_cancelled_by_the_next(graph: Graph) -> None:
+    server = graph.serve(*SKILLS.rows)
+    first = graph.robot()
+    first.connect()
+    with started(lambda: first.perform("go_to", ["never"])):
+        server.expect("goal", "never")
+        worker, first._worker = first._worker, None  # as if nobody were there to notice
+        assert worker is not None
+        worker.kill()
+        graph.robot().connect()
+        server.expect("cancel", "never")
+
+
+def test_second_tool_is_refused_and_the_first_goes_on(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    first, second = graph.robot(), graph.robot()
+    first.connect()
+    with pytest.raises(NotReadyError, match="another codebotler has this robot: the node /codebotler at"):
+        second.connect()
+    first.perform("go_to", ["the hall"])
+    first.disconnect()
+    second.connect()
+    second.perform("go_to", ["the hall"])
+
+
+def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> None:
+    server = graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        code = "import rospy, sys; rospy.init_node('codebotler', disable_signals=True); sys.stdin.read()"
+        with subprocess.Popen(
+            [str(PYTHON), "-c", code], stdin=subprocess.PIPE, env={**os.environ, "ROS_MASTER_URI": graph.uri}
+        ) as other:
+            server.expect("cancel", "never")
+            assert other.stdin is not None
+            other.stdin.close()
+    assert isinstance(ended["error"], CancelledError)
+
+
+def test_text_that_no_message_can_hold_is_said(graph: Graph) -> None:
+    server = graph.serve(SAY)
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"the goal of /say_server cannot be sent: .*surrogates"):
+        robot.perform("say", ["\ud800"])
+    robot.perform("say", ["hello"])
+    server.expect("goal", "hello")
+
+
+def test_master_that_was_started_anew_between_missions(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    robot.perform("go_to", ["the hall"])
+    graph.master.end()
+    with pytest.raises(NotReadyError, match="no ROS master answers"):
+        graph.robot().connect()
+    graph.processes.pop().kill()
+    with pytest.raises(RobotLostError, match="and so is the ROS master"):
+        robot.perform("go_to", ["the hall"])
+    graph.start_master()
+    server = graph.serve(GO_TO)
+    robot.perform("go_to", ["the lab"])
+    server.expect("goal", "the lab")
+    robot.connect()
+    robot.perform("go_to", ["the den"])
+    server.expect("goal", "the den")
+
+
+def test_five_hundred_goals_in_a_row_and_none_is_lost(graph: Graph) -> None:
+    server = graph.serve(SAY)
+    robot = graph.robot()
+    robot.connect()
+    for number in range(500):
+        robot.perform("say", [str(number)])
+    heard = [server.said.get(timeout=LONG) for _ in range(500)]
+    assert heard == [["goal", str(number)] for number in range(500)]
+
+
+def test_ninth_skill_is_performed(graph: Graph) -> None:
+    wave = Skill(
+        "wave",
+        (Parameter("person"), Parameter("ways", list, "list[str]")),
+        "bool",
+        "Wave at a person.",
+        ros=RosAction("Wave", "/wave_server", ("string person", "string[] ways"), "bool"),
+    )
+    server = graph.serve(wave)
+    robot = graph.robot(skills=SKILLS.with_skill(wave))
+    robot.connect()
+    assert robot.perform("wave", ["ann", ("left", "right")]) is False
+    server.expect("goal", "ann")
+
+
+def test_installed_messages_are_preferred_and_their_feedback_is_told(
+    graph: Graph, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    definition = "string location\n---\n---\nstring near\n"
+    monkeypatch.setenv("PYTHONPATH", installed(tmp_path, "GoTo", definition))
+    graph.serve(GO_TO, SAY)
+    robot = graph.robot()
+    robot.connect()
+    told: list[str] = []
+    robot.perform("go_to", ["feedback"], told.append)
+    assert told == ["near: the hall"]
+    robot.perform("say", ["hello"])
+
+
+MD5 = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+from ros1_worker import message_types
+for name, spec in message_types(json.loads(sys.argv[2])).items():
+    a = spec()
+    for part in (a, a.action_goal, a.action_result, a.action_feedback,
+                 a.action_goal.goal, a.action_result.result, a.action_feedback.feedback):
+        print(part._type, part._md5sum, *part.__slots__)
+"""
+HEADER = "2176decaecbce78abc3b96ef049fabed"
+GOAL_ID = "302881f31927c1df708a2dbab0e80ee8"
+STATUS = "d388f9b87b3c471f784434d671988d4a"
+
+
+def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
+    from hashlib import md5  # noqa: PLC0415 - the way in which ROS tells messages apart
+
+    def digest(*lines: str) -> str:
+        return md5("\n".join(lines).encode(), usedforsecurity=False).hexdigest()
+
+    actions = [{"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None]
+    said = subprocess.run(
+        [str(PYTHON), "-c", MD5, str(SCRIPT.parent), json.dumps(actions)],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    made = {line.split()[0]: line.split()[1:] for line in said.splitlines()}
+    assert len(made) == 7 * len(SKILLS)
+    for skill in SKILLS.rows:
+        assert skill.ros is not None
+        name = f"robot_actions_pkg/{skill.ros.type}"
+        goal = digest(*skill.ros.goal)
+        result = digest(f"{skill.ros.result} result") if skill.ros.result else digest()
+        action_goal = digest(f"{HEADER} header", f"{GOAL_ID} goal_id", f"{goal} goal")
+        action_result = digest(f"{HEADER} header", f"{STATUS} status", f"{result} result")
+        action_feedback = digest(f"{HEADER} header", f"{STATUS} status", f"{digest()} feedback")
+        action = digest(
+            f"{action_goal} action_goal",
+            f"{action_result} action_result",
+            f"{action_feedback} action_feedback",
+        )
+        assert made[f"{name}Goal"] == [goal, *(line.split()[1] for line in skill.ros.goal)]
+        assert made[f"{name}Result"][0] == result
+        assert made[f"{name}ActionGoal"] == [action_goal, "header", "goal_id", "goal"]
+        assert made[f"{name}ActionResult"] == [action_result, "header", "status", "result"]
+        assert made[f"{name}ActionFeedback"] == [action_feedback, "header", "status", "feedback"]
+        assert made[f"{name}Action"][0] == action
+
+
+@pytest.mark.parametrize("name", ["ros1_worker.py", "ros1_servers.py"])
+def test_workers_are_read_by_python_3_8(name: str) -> None:
+    ast.parse(SCRIPT.with_name(name).read_text(), feature_version=(3, 8))

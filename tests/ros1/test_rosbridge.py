@@ -1,0 +1,209 @@
+"""The robot behind a rosbridge: on a real ROS graph through a double of rosbridge.
+
+What concerns ROS 2 is tested against a stand-in for the protocol only: no rosbridge of ROS 2 was at hand.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from bridges import Bridge, bridge, like_ros_2, over_ros
+from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.ros import Waits
+from codebotler.robots.rosbridge import Rosbridge
+from codebotler.simulator.robot import RobotError
+from codebotler.skills import SKILLS
+from ros_graph import GO_TO, SAY, Graph, free_port, started
+
+WAITS = Waits(patience=5.0, silence=1.5, longest=20.0)
+
+
+@pytest.fixture
+def double(graph: Graph) -> Iterator[Bridge]:
+    with bridge(over_ros(graph.uri)) as double:
+        yield double
+
+
+@pytest.fixture
+def robot(double: Bridge) -> Iterator[Rosbridge]:
+    robot = Rosbridge(double.address, waits=WAITS)
+    yield robot
+    robot.disconnect()
+
+
+def test_goal_is_executed_and_the_result_comes_back(graph: Graph, robot: Rosbridge) -> None:
+    server = graph.serve(*SKILLS.rows)
+    robot.connect()
+    assert robot.perform("go_to", ["the hall"]) is None
+    server.expect("goal", "the hall")
+    assert robot.perform("get_all_rooms", []) == []
+    assert robot.perform("is_in_room", ["mug"]) is False
+    assert robot.perform("ask", ["ann", "tea?", ("yes", "no")]) == ""
+    for _ in range(50):
+        robot.perform("say", ["hello"])
+
+
+@pytest.mark.parametrize(
+    ("goal", "kind", "message"),
+    [
+        ("abort", "GoToInvalidLocation", "the door is shut"),
+        ("reject", "GoToInvalidLocation", "not in this gown"),
+        ("abort, named", "DoorIsShut", "you have no key"),
+    ],
+)
+def test_final_status_is_that_of_the_result(
+    graph: Graph, robot: Rosbridge, goal: str, kind: str, message: str
+) -> None:
+    graph.serve(GO_TO)
+    robot.connect()
+    with pytest.raises(RobotError) as error:
+        robot.perform("go_to", [goal])
+    assert (error.value.kind, str(error.value)) == (kind, message)
+
+
+def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_connect(
+    graph: Graph, robot: Rosbridge
+) -> None:
+    server = graph.serve(GO_TO, SAY)
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        robot.cancel()
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], CancelledError)
+    with pytest.raises(CancelledError):
+        robot.perform("say", ["on I go"])
+    robot.connect()
+    robot.perform("say", ["again"])
+    server.expect("goal", "again")
+
+
+def test_cancel_right_after_the_first_goal_ends_it(graph: Graph, robot: Rosbridge) -> None:
+    graph.serve(GO_TO)
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        while robot._going is None:
+            time.sleep(0)
+        robot.cancel()
+    assert isinstance(ended["error"], CancelledError)
+
+
+def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: Rosbridge) -> None:
+    graph.serve(GO_TO)
+    robot.connect()
+    with pytest.raises(RobotLostError, match=r"/go_to_server has died: no status for 1.5 s"):
+        robot.perform("go_to", ["die"])
+
+
+def test_missing_server_is_said(graph: Graph, robot: Rosbridge) -> None:
+    graph.serve(GO_TO)
+    robot.connect()
+    with pytest.raises(RobotLostError, match="there is no action server at /say_server"):
+        robot.perform("say", ["hello"])
+
+
+def test_messages_that_the_robot_does_not_know_are_said(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    with bridge(over_ros(graph.uri, ("say",))) as double:
+        robot = Rosbridge(double.address, waits=WAITS)
+        robot.connect()
+        with pytest.raises(RobotLostError, match="Unable to import robot_actions_pkg/"):
+            robot.perform("ask", ["ann", "tea?", ()])
+        robot.disconnect()
+
+
+def test_robot_that_does_not_stop_is_said_not_to(graph: Graph, double: Bridge) -> None:
+    server = graph.serve(GO_TO)
+    robot = Rosbridge(double.address, waits=Waits(patience=2.0))
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
+        server.expect("goal", "never, whatever you say")
+        robot.cancel()
+    assert isinstance(ended["error"], RobotLostError)
+    assert "was told to stop, and did not say within 2 s" in ended["error"].sentence
+    robot.disconnect()
+
+
+def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
+    graph: Graph, double: Bridge, robot: Rosbridge
+) -> None:
+    server = graph.serve(GO_TO)
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["never"])) as ended:
+        server.expect("goal", "never")
+        double.cut()
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], RobotLostError)
+    assert ended["error"].sentence == (
+        f"the connection with {double.address} was lost; its goal was cancelled over another one"
+    )
+
+
+def test_no_rosbridge_is_said_with_the_mend() -> None:
+    address = f"ws://127.0.0.1:{free_port()}"
+    with pytest.raises(NotReadyError, match=f"no rosbridge answers at {address}"):
+        Rosbridge(address).connect()
+    with pytest.raises(NotReadyError, match="no rosbridge answers at nonsense"):
+        Rosbridge("nonsense").connect()
+
+
+# --- ROS 2, against a stand-in
+
+
+@pytest.fixture
+def heard() -> list[dict[str, Any]]:
+    return []
+
+
+@pytest.fixture
+def second(heard: list[dict[str, Any]]) -> Iterator[Rosbridge]:
+    with bridge(like_ros_2(heard)) as double:
+        robot = Rosbridge(double.address, waits=Waits(patience=1.0, longest=2.0))
+        robot.connect()
+        yield robot
+        robot.disconnect()
+
+
+def test_stand_in_for_ros_2_executes_goals(second: Rosbridge, heard: list[dict[str, Any]]) -> None:
+    told: list[str] = []
+    assert second.perform("ask", ["ann", "tea?", ("yes", "no")], told.append) == "yes"
+    assert told == ["near: the hall"]
+    sent = heard[-1]
+    assert sent.pop("id")
+    assert sent == {
+        "op": "send_action_goal",
+        "action": "/ask_server",
+        "action_type": "robot_actions_pkg/action/Ask",
+        "args": {"person": "ann", "question": "tea?", "options": ["yes", "no"]},
+        "feedback": True,
+    }
+
+
+def test_stand_in_for_ros_2_aborts_and_refuses(second: Rosbridge) -> None:
+    with pytest.raises(RobotError) as error:
+        second.perform("go_to", ["abort"])
+    assert error.value.kind == "GoToInvalidLocation"
+    with pytest.raises(RobotLostError, match="no such action"):
+        second.perform("go_to", ["unknown"])
+
+
+def test_stand_in_for_ros_2_hears_of_a_stop_and_of_what_takes_too_long(
+    second: Rosbridge, heard: list[dict[str, Any]]
+) -> None:
+    with pytest.raises(RobotLostError, match="did not end within 2 s; the goal was cancelled"):
+        second.perform("go_to", ["never"])
+    while len(heard) < 3:
+        time.sleep(0.01)
+    assert heard[-1]["op"] == "cancel_action_goal"
+    with started(lambda: second.perform("go_to", ["never"])) as ended:
+        while len(heard) < 4:
+            time.sleep(0.01)
+        second.cancel()
+        while len(heard) < 5:
+            time.sleep(0.01)
+    assert isinstance(ended["error"], CancelledError)
+    assert heard[-1]["id"] == heard[-2]["id"]

@@ -1,0 +1,167 @@
+"""The virtual robot: the whole path over a real ROS graph, from an instruction to the end of its program."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from codebotler.live import LiveRobot
+from codebotler.models.recorded import recorded_model
+from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.ros1 import Ros1
+from codebotler.robots.simulated import AS_WRITTEN
+from codebotler.robots.virtual import VirtualRobot
+from codebotler.simulator.engine import run
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import RobotError
+from codebotler.trace import Status
+from codebotler.world import Person, Room, World
+from roboeval.suite import Suite
+from ros_graph import Graph, free_port, started
+
+WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
+SPEED = 200.0  # of the virtual robot's clock, so that it drives at 100 m/s
+
+
+@pytest.fixture
+def virtual(graph: Graph) -> Iterator[VirtualRobot]:
+    virtual = VirtualRobot(WORLD, speed=None, port=graph.port)
+    assert not virtual.start()
+    yield virtual
+    virtual.stop()
+
+
+@pytest.mark.usefixtures("virtual")
+def test_it_does_on_the_graph_what_the_simulated_robot_does(graph: Graph) -> None:
+    robot = graph.robot()
+    robot.connect()
+    assert robot.missing == {}
+    assert robot.perform("get_all_rooms", []) == ["hall", "kitchen"]
+    assert robot.perform("go_to", ["kitchen"]) is None
+    assert robot.perform("get_current_location", []) == "kitchen"
+    assert robot.perform("is_in_room", ["mug"]) is True
+    assert robot.perform("ask", ["ann", "Tea, „ann”?", ("yes", "no")]) == "yes"
+    assert robot.perform("pick", ["mug"]) is None
+    with pytest.raises(RobotError) as error:
+        robot.perform("pick", ["mug"])
+    assert error.value.kind == "PickWhileHolding"
+    assert str(error.value) == 'the robot holds "mug" and cannot pick up "mug" as well'
+
+
+def test_it_stops_and_goes_on_where_it_was(graph: Graph) -> None:
+    virtual = VirtualRobot(WORLD, speed=1.0, port=graph.port)
+    virtual.start()
+    robot = graph.robot()
+    robot.connect()
+    with started(lambda: robot.perform("go_to", ["kitchen"])) as ended:
+        while not virtual._current:
+            time.sleep(0.01)
+        robot.cancel()
+    assert isinstance(ended["error"], CancelledError)
+    robot.connect()
+    assert robot.perform("get_current_location", []) == "hall"
+    virtual.stop()
+
+
+def test_goals_wait_for_each_other_and_one_that_waits_can_be_cancelled(virtual: VirtualRobot) -> None:
+    virtual._current = "another"
+    virtual._cancel("waits")
+    assert virtual._cancelled == {"waits"}
+    assert virtual._body.clock.wait(0)
+    virtual._cancel("another")
+    assert not virtual._body.clock.wait(0)
+
+
+def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
+    paper: Suite, graph: Graph
+) -> None:
+    model = recorded_model("recorded:careful")
+    tasks = [(task.name, task.prompts[0], task.scenarios[0].world) for task in paper.tasks.values()]
+    programs = [model.reply(instruction, 0).program for _, instruction, _ in tasks]
+    worlds = [world for _, _, world in tasks]
+    simulated = list(run(zip(programs, worlds, strict=True), workers=1, rules=AS_WRITTEN))
+    assert len(tasks) == 16
+
+    virtual = VirtualRobot(worlds[0], speed=SPEED, port=graph.port)
+    virtual.start()
+    robot = graph.robot(speed=SPEED)
+    lane = Lane()
+    try:
+        for (name, _, world), program, expected in zip(tasks, programs, simulated, strict=True):
+            virtual.enter(world)
+            robot.connect()
+            live = LiveRobot(robot, lambda *_, **__: None, clock_starts=AS_WRITTEN.clock_starts)
+            outcome = lane.run_live(program, live)
+            assert outcome.status == Status.FINISHED == expected.status, (name, outcome)
+            assert outcome.trace == expected.trace, name
+    finally:
+        lane.close()
+        virtual.stop()
+
+
+def test_taken_port_and_distant_master_are_said() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        with pytest.raises(NotReadyError, match=f"port {port} is taken by what is no ROS master"):
+            VirtualRobot(WORLD, port=port).start()
+
+
+def test_master_elsewhere_is_never_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.2:{free_port()}")
+    with pytest.raises(NotReadyError, match=r"no ROS master answers at http://127.0.0.2"):
+        VirtualRobot(WORLD).start()
+
+
+def test_second_virtual_robot_is_refused(graph: Graph, virtual: VirtualRobot) -> None:
+    with pytest.raises(NotReadyError, match="the node /virtual_robot at http"):
+        VirtualRobot(WORLD, port=graph.port).start()
+    assert virtual.pid
+
+
+def test_killed_worker_is_said(virtual: VirtualRobot) -> None:
+    os.kill(virtual.pid, signal.SIGKILL)
+    with pytest.raises(RobotLostError, match=r"the worker of the virtual robot has died \(signal 9\)"):
+        virtual.wait()
+
+
+def test_command_starts_a_master_that_ends_with_it(tmp_path: Path) -> None:
+    world, port = tmp_path / "world.yaml", free_port()
+    world.write_text(WORLD.to_yaml())
+    command = [sys.executable, "-m", "codebotler.cli", "virtual-robot", "--world", str(world)]
+    process = subprocess.Popen(
+        [*command, "--port", str(port), "--speed", "100"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2] / "src")},
+    )
+    assert process.stderr is not None
+    assert process.stderr.readline() == (
+        f"a ROS master was started at http://localhost:{port}; the robot is ready, Ctrl-C ends it\n"
+    )
+    robot = Ros1(f"http://localhost:{port}")
+    robot.connect()
+    robot.perform("go_to", ["kitchen"])
+    with pytest.raises(RobotError):
+        robot.perform("go_to", ["moon"])
+    robot.disconnect()
+    process.send_signal(signal.SIGINT)
+    said, errors = process.communicate(timeout=20)
+    assert said.splitlines() == [
+        "go_to(kitchen)",
+        "  succeed None",
+        "go_to(moon)",
+        '  abort GoToInvalidLocation: there is no room "moon"',
+    ]
+    assert (process.returncode, errors) == (130, "codebotler: stopped\n")
+    with pytest.raises(NotReadyError, match="no ROS master answers"):
+        robot.connect()

@@ -1,0 +1,3 @@
+class CancelGoal:
+    class Request:
+        pass

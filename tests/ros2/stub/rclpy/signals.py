@@ -1,0 +1,5 @@
+from enum import IntEnum
+
+
+class SignalHandlerOptions(IntEnum):
+    NO = 0

@@ -1,0 +1,150 @@
+"""The robot on ROS 2, against a stand-in for rclpy: no ROS 2 graph was at hand."""
+
+from __future__ import annotations
+
+import ast
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.ros import Waits
+from codebotler.robots.ros2 import NOTE, SCRIPT, Ros2, readiness
+from codebotler.simulator.robot import RobotError
+from codebotler.skills import SKILLS
+
+STUB = Path(__file__).parent / "stub"
+WAITS = Waits(patience=1.0, silence=0.5, longest=20.0)
+
+
+@pytest.fixture(autouse=True)
+def notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    path = tmp_path / "notes"
+    path.touch()
+    monkeypatch.setenv("NOTES", str(path))
+    monkeypatch.setenv("PYTHONPATH", str(STUB))
+    return path
+
+
+@pytest.fixture
+def robot() -> Iterator[Ros2]:
+    robot = Ros2(python=Path(sys.executable), waits=WAITS)
+    robot.connect()
+    yield robot
+    robot.disconnect()
+
+
+def until(noted: Callable[[], bool]) -> None:
+    ends = time.monotonic() + 20
+    while not noted():
+        assert time.monotonic() < ends
+        time.sleep(0.01)
+
+
+def stopped(robot: Ros2, notes: Path, goal: str) -> BaseException | None:
+    """What a goal ends with that is cancelled once it is sent."""
+    ended: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            robot.perform("go_to", [goal])
+        except (CancelledError, RobotLostError) as error:
+            ended.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    until(lambda: f"goal {goal}\n" in notes.read_text())
+    robot.cancel()
+    thread.join()
+    return ended[0] if ended else None
+
+
+def test_goal_is_executed_and_the_result_comes_back(robot: Ros2, notes: Path) -> None:
+    told: list[str] = []
+    assert robot.missing == {}
+    assert robot.perform("go_to", ["feedback"], told.append) is None
+    assert told == ["near: the hall"]
+    assert robot.perform("get_current_location", []) == "hall"
+    assert robot.perform("get_all_rooms", []) == ["hall", "lab"]
+    assert robot.perform("is_in_room", ["mug"]) is True
+    assert robot.perform("ask", ["ann", "tea?", ("yes", "no")]) == "yes"
+    assert "goal ann tea? ['yes', 'no']\n" in notes.read_text()
+
+
+@pytest.mark.parametrize("state", ["abort", "reject"])
+def test_rejected_or_aborted_goal_is_a_robot_error(robot: Ros2, state: str) -> None:
+    with pytest.raises(RobotError) as error:
+        robot.perform("go_to", [state])
+    assert (error.value.kind, str(error.value)) == (
+        "GoToInvalidLocation",
+        f"/go_to_server {state}ed the goal without a reason",
+    )
+
+
+def test_cancel_reaches_the_server(robot: Ros2, notes: Path) -> None:
+    assert isinstance(stopped(robot, notes, "never"), CancelledError)
+    assert "cancel never\n" in notes.read_text()
+
+
+def test_cancel_before_the_server_has_taken_the_goal(robot: Ros2, notes: Path) -> None:
+    assert isinstance(stopped(robot, notes, "slow"), CancelledError)
+    assert "cancel never\n" in notes.read_text()
+
+
+def test_goal_that_somebody_else_cancels_is_cancelled(robot: Ros2) -> None:
+    with pytest.raises(CancelledError):
+        robot.perform("go_to", ["by somebody else"])
+
+
+def test_robot_that_does_not_stop_is_said_not_to(robot: Ros2, notes: Path) -> None:
+    error = stopped(robot, notes, "never, whatever you say")
+    assert isinstance(error, RobotLostError)
+    assert "was told to stop, and did not say within 1 s" in error.sentence
+
+
+def test_server_that_dies_or_takes_no_notice(robot: Ros2) -> None:
+    with pytest.raises(RobotLostError, match="did not take the goal within 1 s"):
+        robot.perform("say", ["ignore"])
+    with pytest.raises(RobotLostError, match=r"/go_to_server has died: no status for 0.5 s"):
+        robot.perform("go_to", ["die"])
+
+
+def test_missing_server_and_second_tool(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LACKS", "/pick_server")
+    robot = Ros2(python=Path(sys.executable), waits=WAITS)
+    robot.connect()
+    assert set(robot.missing) == {"pick"}
+    assert "there is no action server of robot_actions_pkg/action/Pick" in robot.missing["pick"]
+    robot.disconnect()
+    monkeypatch.setenv("NODES", "camera codebotler")
+    with pytest.raises(NotReadyError, match="there is a node codebotler on the graph; stop that one first"):
+        robot.connect()
+
+
+def test_killed_worker_is_replaced_by_one_that_cancels_all(robot: Ros2, notes: Path) -> None:
+    def kill() -> None:
+        until(lambda: "goal never\n" in notes.read_text())
+        assert robot._worker is not None
+        os.kill(robot._worker.pid, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with pytest.raises(RobotLostError, match="another one has cancelled all goals"):
+        robot.perform("go_to", ["never"])
+    killer.join()
+    assert notes.read_text().count("cancel all /") == len(SKILLS)
+
+
+def test_it_is_said_how_far_it_was_tested() -> None:
+    assert readiness(Path(sys.executable)).note == NOTE == readiness(Path("/nowhere")).note
+    assert "never on a ROS 2 graph" in NOTE
+
+
+def test_worker_is_read_by_python_3_8() -> None:
+    ast.parse(SCRIPT.read_text(), feature_version=(3, 8))
