@@ -194,7 +194,10 @@ def _watched(mission: Mission, reserved: Reservation, plan: Plan | None) -> int:
 
 @contextlib.contextmanager
 def _stopped_by_signals(mission: Mission) -> Iterator[list[int]]:
-    """Stop the mission when a signal comes, and tell which came; a second one cancels once more."""
+    """Stop the mission when a signal comes, and tell which came; a second one cancels once more.
+
+    Whoever began this with `nohup` wants it to outlive the terminal.
+    """
     got: list[int] = []
 
     def stop(name: str) -> None:
@@ -207,7 +210,9 @@ def _stopped_by_signals(mission: Mission) -> Iterator[list[int]]:
         if len(got) > 1:
             note(f"\nthe robot was told to stop; it has {GRACE:g} s to confirm that")
 
-    before = {number: signal.signal(number, obey) for number in SIGNALS}
+    outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]
+    before = {number: signal.signal(number, obey) for number in obeyed}
     try:
         yield got
     finally:

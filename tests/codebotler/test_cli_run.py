@@ -46,9 +46,9 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def command(folder: Path, *arguments: str | Path) -> subprocess.Popen[str]:
+def command(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -> subprocess.Popen[str]:
     return subprocess.Popen(
-        [sys.executable, "-m", "codebotler.cli", *map(str, arguments)],
+        [*wrapper, sys.executable, "-m", "codebotler.cli", *map(str, arguments)],
         cwd=folder,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -205,17 +205,17 @@ def read_until(process: subprocess.Popen[str], text: str) -> str:
     try:
         for line in process.stdout:
             lines += line
-            if text in line and "running on" in lines:
+            if text in line:
                 return lines
     finally:
         watchdog.cancel()
     raise AssertionError(lines)
 
 
-def driving(folder: Path) -> subprocess.Popen[str]:
+def driving(folder: Path, *wrapper: str) -> subprocess.Popen[str]:
     """A tool whose robot is on its way."""
     arguments = ("far.py", "--yes", "--despite-problems", "--world", "world.yaml", "--speed", "1")
-    process = command(folder, "run", *arguments)
+    process = command(folder, "run", *arguments, wrapper=wrapper)
     read_until(process, "at (")
     return process
 
@@ -239,6 +239,16 @@ def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: in
     assert family
     assert are_gone(family)
     assert states(folder) == ["stopped"]
+
+
+def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
+    process = driving(folder, "nohup")
+    with stopping(process):
+        process.send_signal(signal.SIGHUP)
+        read_until(process, "at (")
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+    assert process.returncode == 130
 
 
 def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
