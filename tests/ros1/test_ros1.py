@@ -14,7 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.badinput import BadInput
+from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
+from codebotler.robots.open import open_robot
 from codebotler.robots.ros import Waits
 from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
 from codebotler.simulator.robot import RobotError
@@ -67,6 +69,14 @@ def test_no_master_is_said_at_once() -> None:
     uri = f"http://localhost:{free_port()}"
     with pytest.raises(NotReadyError, match=f"no ROS master answers at {uri}; start one"):
         Ros1(uri).connect()
+
+
+@pytest.mark.parametrize("uri", ["robot", "http://robot", "http://robot:a", "ws://robot:9090"])
+def test_address_that_is_no_uri_is_refused(uri: str) -> None:
+    with pytest.raises(
+        BadInput, match=r"is no URI of a ROS master; write one such as http://localhost:11311"
+    ):
+        open_robot("ros1", Options(address=uri))
 
 
 def test_no_rospy_is_said_with_the_mend(graph: Graph) -> None:
@@ -364,7 +374,7 @@ def test_master_that_was_started_anew_between_missions(graph: Graph) -> None:
     with pytest.raises(NotReadyError, match="no ROS master answers"):
         graph.robot().connect()
     graph.processes.pop().kill()
-    with pytest.raises(RobotLostError, match="and so is the ROS master"):
+    with pytest.raises(RobotLostError, match=r"and so is the ROS master|has died"):
         robot.perform("go_to", ["the hall"])
     graph.start_master()
     server = graph.serve(GO_TO)

@@ -13,7 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.badinput import BadInput
+from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
+from codebotler.robots.open import open_robot
 from codebotler.robots.ros import Waits
 from codebotler.robots.ros2 import NOTE, SCRIPT, Ros2, readiness
 from codebotler.simulator.robot import RobotError
@@ -144,6 +146,12 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(robot: Ros2, notes: P
 def test_it_is_said_how_far_it_was_tested() -> None:
     assert readiness(Path(sys.executable)).note == NOTE == readiness(Path("/nowhere")).note
     assert "never on a ROS 2 graph" in NOTE
+
+
+def test_address_is_a_domain() -> None:
+    assert open_robot("ros2", Options(address="7")).address == "7"
+    with pytest.raises(BadInput, match='"robot" is no ROS_DOMAIN_ID; write a number such as 0'):
+        open_robot("ros2", Options(address="robot"))
 
 
 def test_worker_is_read_by_python_3_8() -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from urllib.parse import urlsplit
 
+from codebotler.badinput import BadInput
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
@@ -29,6 +31,9 @@ class Ros1(RosRobot):
         skills: what it can be asked to do.
         speed: of its clock.
         waits: for how long what is waited for.
+
+    Raises:
+        BadInput: the URI is none.
     """
 
     def __init__(
@@ -40,9 +45,26 @@ class Ros1(RosRobot):
         speed: float | None = 1.0,
         waits: Waits | None = None,
     ) -> None:
-        address = master or os.environ.get("ROS_MASTER_URI") or MASTER
+        address = master_uri(master)
         ros = Ros("ros1", SCRIPT, python, {"ROS_MASTER_URI": address}, address)
         super().__init__(ros, skills, speed, waits)
+
+
+def master_uri(address: str = "") -> str:
+    """The URI of a master: the one that is named, that of ROS_MASTER_URI, or the usual one.
+
+    Raises:
+        BadInput: it is no URI of a master.
+    """
+    uri = address or os.environ.get("ROS_MASTER_URI") or MASTER
+    try:
+        parts = urlsplit(uri)
+        is_whole = parts.scheme == "http" and bool(parts.hostname) and bool(parts.port)
+    except ValueError:  # the port is no number
+        is_whole = False
+    if not is_whole:
+        raise BadInput(f'"{uri}" is no URI of a ROS master; write one such as {MASTER}')
+    return uri
 
 
 def readiness(python: Path = PYTHON) -> Readiness:
@@ -58,5 +80,9 @@ def readiness(python: Path = PYTHON) -> Readiness:
 
 
 def robot(options: Options) -> Ros1:
-    """The robot that a user means."""
+    """The robot that a user means.
+
+    Raises:
+        BadInput: the address is no URI of a master.
+    """
     return Ros1(options.address, python=options.ros_python, skills=options.skills, speed=options.speed)

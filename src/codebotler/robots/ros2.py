@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from codebotler.badinput import BadInput
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
@@ -57,5 +58,11 @@ def readiness(python: Path = PYTHON) -> Readiness:
 
 
 def robot(options: Options) -> Ros2:
-    """The robot that a user means."""
+    """The robot that a user means.
+
+    Raises:
+        BadInput: the address is no domain.
+    """
+    if options.address and not options.address.isdecimal():
+        raise BadInput(f'"{options.address}" is no ROS_DOMAIN_ID; write a number such as 0')
     return Ros2(options.address, python=options.ros_python, skills=options.skills, speed=options.speed)

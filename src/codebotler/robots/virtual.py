@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from codebotler.robots.base import Argument, CancelledError, RobotLostError, untold
 from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1 import MASTER, PYTHON
+from codebotler.robots.ros1 import PYTHON, master_uri
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.worker import Message, Worker
 from codebotler.simulator.robot import RobotError
@@ -38,7 +38,7 @@ class VirtualRobot:
         told: told what it does, in lines.
 
     Raises:
-        BadInput: the speed is out of its range.
+        BadInput: the speed is out of its range, or ROS_MASTER_URI is no URI.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class VirtualRobot:
         told: Callable[[str], None] = untold,
     ) -> None:
         self._speed, self._python, self._skills, self._told = speed, python, skills, told
-        self.address = f"http://localhost:{port}" if port else os.environ.get("ROS_MASTER_URI") or MASTER
+        self.address = master_uri(f"http://localhost:{port}" if port else "")
         self._body = self._at_start(world)
         self._goals: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
@@ -70,7 +70,7 @@ class VirtualRobot:
         """
         actions = actions_of(self._skills)
         where = urlsplit(self.address)
-        port = (where.port or 11311) if where.hostname in HERE else None
+        port = where.port if where.hostname in HERE else None
         environment = {"ROS_MASTER_URI": self.address}
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
