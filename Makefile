@@ -3,7 +3,7 @@
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
 # `make test-transformers` tests models that run on this machine, with a Python for which there is a torch (3.11);
 # it makes an environment of its own, since nothing else needs so much. `make test-faults` asks a server that fails
-# one request in ten for 4,000 completions, over two protocols. `make test-ros1` tests robots on ROS 1, for which
+# one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing).
 PYTHON ?= python3
 PACKAGE ?= .
@@ -44,7 +44,7 @@ test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py
 
 test-faults: $(VENV)/tested
-	$(BIN)/python bench/faulty_server.py
+	$(BIN)/python bench/faulty_server.py 50 completions:m
 
 fuzz: $(VENV)/tested
 	@seed=$${FUZZ_SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')}; \

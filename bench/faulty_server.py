@@ -1,6 +1,6 @@
 """What does a whole run cost where one request in ten fails, and is every completion there exactly once?
 
-    python bench/faulty_server.py [COMPLETIONS OF EACH PROMPT]
+    python bench/faulty_server.py [COMPLETIONS OF EACH PROMPT] [MODEL ...]
 
 `roboeval generate` asks for 80 prompts x 50 completions from a server of this process, over both protocols.
 Of the requests, one in ten meets an error, a refusal, a stream that breaks off, or nonsense. What is printed
@@ -40,7 +40,7 @@ def main() -> None:
         return dice.choice(FAULTS) if fails else None
 
     environment = {name: value for name, value in os.environ.items() if name != "OPENAI_API_KEY"}
-    for model in ("completions:m", "openai:m"):
+    for model in sys.argv[2:] or ("completions:m", "openai:m"):
         with tempfile.TemporaryDirectory() as folder, Server(fault=fault) as server:
             failed = 0
             words = ["generate", "--model", model, "--base-url", server.url, "--out", f"{folder}/run"]
