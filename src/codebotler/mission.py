@@ -195,7 +195,7 @@ class Mission:
         Raises:
             MissionError: it has ended.
         """
-        asked = time.monotonic()
+        had_ended, asked = self.has_ended, time.monotonic()
         with self._gate:
             self._stopped_by = self._stopped_by or by
             live, lane = self._live, self._lane
@@ -206,6 +206,8 @@ class Mission:
             lane.stop()
         self._wake.set()
         with self._book:
+            if self.state is State.STOPPED and not had_ended:
+                return  # by this very stop, whose end was written first
             if self.has_ended:
                 raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
             if self.state is State.RUNNING:
