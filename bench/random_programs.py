@@ -125,7 +125,7 @@ class Writer(ast.NodeTransformer):
         tree.body += self.definitions()
         tree.body += self.statements(self.number(2))
         tree.body += ast.parse("def task_program(): pass").body
-        tree.body[-1].body = self.function_body(lambda: self.statements(2 + self.number(6)))  # type: ignore[attr-defined]
+        tree.body[-1].body = self.function_body(lambda: self.statements(2 + self.number(6)))  # type: ignore[attr-defined]  # it ends in a function
         match self.number(12):
             case 1:
                 tree.body += ast.parse("if __name__ == '__main__':\n    task_program()").body
@@ -175,7 +175,7 @@ class Writer(ast.NodeTransformer):
         self.expressions += 1
         node = self.filled(ast.parse(self.pick(choices), mode="eval").body)
         self.expressions -= 1
-        return node  # type: ignore[no-any-return]
+        return node  # type: ignore[no-any-return]  # as `visit` is typed
 
     def statements(self, count: int) -> list[ast.stmt]:
         """Random statements."""
@@ -307,7 +307,7 @@ class Writer(ast.NodeTransformer):
 
     def visited(self, body: list[ast.stmt]) -> list[ast.stmt]:
         """Statements, with what each of them becomes."""
-        module: ast.Module = self.generic_visit(ast.Module(body, []))  # type: ignore[assignment]
+        module: ast.Module = self.generic_visit(ast.Module(body, []))  # type: ignore[assignment]  # the same
         return module.body
 
     def function(self, node: ast.FunctionDef | ast.Lambda) -> None:

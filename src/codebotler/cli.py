@@ -12,6 +12,16 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from codebotler import __version__
+from codebotler.options import (
+    BaseUrlOption,
+    MaxTokensOption,
+    ModelOption,
+    SeedOption,
+    TemperatureOption,
+    TimeoutOption,
+    TopPOption,
+    WorldOption,
+)
 
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
@@ -38,16 +48,8 @@ def codebotler(
 @app.command()
 def generate(
     instruction: Annotated[str, typer.Argument(help="What the robot is to do, in plain words.")],
-    model: Annotated[
-        str,
-        typer.Option(
-            help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
-            "completions:NAME, or hf:PATH."
-        ),
-    ] = "recorded",
-    world: Annotated[
-        Path | None, typer.Option(help="The world file that tells which rooms there are.")
-    ] = None,
+    model: ModelOption = "recorded",
+    world: WorldOption = None,
     retries: Annotated[
         int | None, typer.Option(min=0, help="Ask so many times more while there are problems.")
     ] = None,
@@ -60,26 +62,18 @@ def generate(
     show_prompt: Annotated[
         bool, typer.Option("--show-prompt", help="Print what the model would be asked, and ask nobody.")
     ] = False,
-    temperature: Annotated[float, typer.Option(help="How far the model strays from the likeliest.")] = 0.2,
-    top_p: Annotated[float, typer.Option(help="The share of likely tokens that are drawn from.")] = 0.95,
-    max_tokens: Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")] = 512,
-    seed: Annotated[
-        int | None, typer.Option(help="Fix the random numbers, where a model takes a seed.")
-    ] = None,
-    timeout: Annotated[float, typer.Option(help="Seconds that a request may take.")] = 60.0,
-    base_url: Annotated[
-        str | None, typer.Option(help="Where the model is served, such as http://localhost:8000/v1.")
-    ] = None,
+    temperature: TemperatureOption = 0.2,
+    top_p: TopPOption = 0.95,
+    max_tokens: MaxTokensOption = 512,
+    seed: SeedOption = None,
+    timeout: TimeoutOption = 60.0,
+    base_url: BaseUrlOption = None,
 ) -> None:
     """Have a model write a program, and print it; status 1 if a check finds problems in it."""
-    from contextlib import ExitStack
-
     from codebotler.badinput import BadInput
-    from codebotler.generating import generated, in_words, recorder, told_form
+    from codebotler.generating import show, write
     from codebotler.models.base import Settings
-    from codebotler.models.open import kind_of, open_model
     from codebotler.prompts import prompt_for
-    from codebotler.terminal import busy, note
     from codebotler.world import World
 
     if not instruction.strip():
@@ -87,40 +81,18 @@ def generate(
     known = None if world is None else World.read(world)
     prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
     if show_prompt:
-        form = told_form(kind_of(model), model)
-        print(in_words(prompt, model))
-        if form is not None:
-            note(form)
+        show(prompt, model)
         return
-    settings = Settings(
-        temperature=temperature,
-        top_p=top_p,
-        max_tokens=max_tokens,
-        seed=seed,
-        timeout=timeout,
-        base_url=base_url,
-    )
-    with ExitStack() as recording:
-        with busy(f"asking {model}"):
-            asked = open_model(model, settings)
-            made = generated(
-                asked,
-                prompt,
-                world=known,
-                retries=int(repair) if retries is None else retries,
-                repair=repair,
-                note_down=recording.enter_context(recorder(record, asked.name)),
-            )
-        print(made.program, end="" if made.program.endswith("\n") else "\n")
-    raise typer.Exit(1 if made.problems else 0)
+    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    tries = int(repair) if retries is None else retries
+    accepted = write(prompt, model, settings, world=known, retries=tries, repair=repair, record=record)
+    raise typer.Exit(0 if accepted else 1)
 
 
 @app.command()
 def check(
     program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
-    world: Annotated[
-        Path | None, typer.Option(help="The world file that tells which rooms there are.")
-    ] = None,
+    world: WorldOption = None,
     samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
     seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
     strict: Annotated[

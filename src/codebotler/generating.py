@@ -6,17 +6,54 @@ import asyncio
 import json
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from codebotler.check import check
 from codebotler.generation import Attempt, Generation, generate, untold
-from codebotler.models.base import Model
+from codebotler.models.base import Model, Settings
+from codebotler.models.open import kind_of, open_model
 from codebotler.models.paced import Paced
 from codebotler.prompts import Prompt
 from codebotler.simulator.engine import Lanes
-from codebotler.terminal import note, visible
+from codebotler.terminal import busy, note, print_text, visible
 from codebotler.world import World
+
+
+def write(
+    prompt: Prompt,
+    model: str,
+    settings: Settings,
+    *,
+    world: World | None,
+    retries: int,
+    repair: bool,
+    record: Path | None,
+) -> bool:
+    """Have a model write a program, and print that; whether a check finds nothing wrong with it.
+
+    Args:
+        prompt: what is asked.
+        model: the name of who is asked.
+        settings: how it is asked.
+        world: where the program is to run; without it, the rooms are those that the program goes to.
+        retries: how many times a rejected program is asked for again, at least 0.
+        repair: whether to ask again with the program and its problems.
+        record: the file that gets a line for every attempt, if one is named.
+
+    Raises:
+        BadInput: there is no such model.
+        ModelError: no whole reply came.
+        EngineError: no isolated process could be started.
+        OSError: an attempt could not be recorded; the program is printed all the same.
+    """
+    with ExitStack() as recording:
+        with busy(f"asking {model}"):
+            asked = open_model(model, settings)
+            note_down = recording.enter_context(recorder(record, asked.name))
+            made = generated(asked, prompt, world=world, retries=retries, repair=repair, note_down=note_down)
+        print_text(made.program)
+    return not made.problems
 
 
 def generated(
@@ -111,28 +148,23 @@ def _tell(attempt: Attempt, most: int) -> None:
         note(f"{which} is accepted")
 
 
-def in_words(prompt: Prompt, model: str) -> str:
-    """What a model is asked: the messages of a chat, or the one text that base models go on from.
+def show(prompt: Prompt, model: str) -> None:
+    """Print what a model is asked: the messages of a chat, or the one text that base models go on from.
 
     Args:
         prompt: what is asked.
         model: the name of the model, which tells in which way it is asked.
+
+    Raises:
+        BadInput: there is no such kind of model.
     """
-    if model.partition(":")[0] == "completions":
-        return prompt.text.removesuffix("\n")
-    return "\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages)
-
-
-def told_form(kind: str, model: str) -> str | None:
-    """What is to be said of the form in which a prompt is shown, where the model's name does not tell it.
-
-    Args:
-        kind: what stands before the colon of the model's name.
-        model: the name of the model.
-    """
-    if kind != "hf":
-        return None
-    return (
-        f"these are the messages that {model} gets if its tokenizer has a chat template; "
-        "without one it gets the text that --model completions:NAME shows"
-    )
+    kind = kind_of(model)
+    if kind == "completions":
+        print_text(prompt.text)
+    else:
+        print_text("\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages))
+    if kind == "hf":
+        note(
+            f"these are the messages that {model} gets if its tokenizer has a chat template; "
+            "without one it gets the text that --model completions:NAME shows"
+        )

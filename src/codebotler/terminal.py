@@ -63,6 +63,11 @@ def print_json(data: object) -> None:
     print(json.dumps(data, indent=2))
 
 
+def print_text(text: str) -> None:
+    """Print a text as it is, with an end to its last line."""
+    print(text, end="" if text.endswith("\n") else "\n")
+
+
 def note(sentence: str) -> None:
     """Say something beside the results."""
     print(sentence, file=sys.stderr)

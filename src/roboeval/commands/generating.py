@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Self
 import typer
 
 from codebotler.cli import STOPPED
+from codebotler.options import (
+    BaseUrlOption,
+    MaxTokensOption,
+    ModelOption,
+    SeedOption,
+    TemperatureOption,
+    TimeoutOption,
+    TopPOption,
+)
 from roboeval.commands.judging import evaluate
 from roboeval.commands.options import JsonOption, SuiteOption, TasksOption, command, load, named
 from roboeval.terminal import metered, note
@@ -18,25 +27,10 @@ from roboeval.terminal import metered, note
 if TYPE_CHECKING:
     from roboeval.generate import Progress
 
-ModelOption = Annotated[
-    str,
-    typer.Option(
-        help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, completions:NAME, "
-        "or hf:PATH."
-    ),
-]
 OutOption = Annotated[
     Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
 ]
 NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
-TemperatureOption = Annotated[float, typer.Option(help="How far the model strays from the likeliest.")]
-TopPOption = Annotated[float, typer.Option(help="The share of likely tokens that are drawn from.")]
-MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
-SeedOption = Annotated[int | None, typer.Option(help="Fix the random numbers, where a model takes a seed.")]
-TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
-BaseUrlOption = Annotated[
-    str | None, typer.Option(help="Where the model is served, such as http://localhost:8000/v1.")
-]
 ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]
 RateOption = Annotated[float | None, typer.Option(min=0.001, help="Send no more requests in a minute.")]
 BudgetOption = Annotated[
@@ -155,14 +149,7 @@ def generated(
 
     known = load(suite)
     order = Order(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    settings = Settings(
-        temperature=temperature,
-        top_p=top_p,
-        max_tokens=max_tokens,
-        seed=seed,
-        timeout=timeout,
-        base_url=base_url,
-    )
+    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
     pace = Pace(concurrency, requests_per_minute, token_budget)
     model = open_model(name, settings)
     run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", model.name).strip("-.")))

@@ -51,7 +51,7 @@ def tokenizer() -> Any:  # noqa: ANN401 - transformers is untyped here
     return transformers.PreTrainedTokenizerFast(tokenizer_object=made, pad_token="<pad>", eos_token=END)
 
 
-def saved(folder: Path, tokenizer: Any, hidden: int, change: Callable[[Any], None]) -> str:  # noqa: ANN401
+def saved(folder: Path, tokenizer: Any, hidden: int, change: Callable[[Any], None]) -> str:  # noqa: ANN401 - transformers is untyped here
     torch.manual_seed(0)
     config = transformers.LlamaConfig(
         vocab_size=len(tokenizer),
@@ -73,20 +73,20 @@ def saved(folder: Path, tokenizer: Any, hidden: int, change: Callable[[Any], Non
 
 
 @pytest.fixture(scope="module")
-def babbler(tmp_path_factory: pytest.TempPathFactory, tokenizer: Any) -> str:  # noqa: ANN401
+def babbler(tmp_path_factory: pytest.TempPathFactory, tokenizer: Any) -> str:  # noqa: ANN401 - transformers is untyped here
     """A model with random weights."""
     return saved(tmp_path_factory.mktemp("babbler"), tokenizer, 32, lambda _model: None)
 
 
 @pytest.fixture
-def by_heart(tmp_path: Path, tokenizer: Any) -> Callable[..., str]:  # noqa: ANN401
+def by_heart(tmp_path: Path, tokenizer: Any) -> Callable[..., str]:  # noqa: ANN401 - transformers is untyped here
     """Models in which each word of a list is followed by the next, and the last by itself."""
 
     def make(*words: str, template: str | None = None) -> str:
         ids = [tokenizer.convert_tokens_to_ids(word) for word in words]
         size = math.ceil(len(tokenizer) / 8) * 8
 
-        def change(model: Any) -> None:  # noqa: ANN401
+        def change(model: Any) -> None:  # noqa: ANN401 - transformers is untyped here
             with torch.no_grad():
                 for layer in model.model.layers:
                     layer.self_attn.o_proj.weight.zero_()
@@ -207,7 +207,7 @@ def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_sma
         generate = model.model.generate
         sizes: list[int] = []
 
-        def watched(**options: Any) -> object:  # noqa: ANN401
+        def watched(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
             sizes.append(len(options["input_ids"]))
             if sizes[-1] > most:
                 raise torch.cuda.OutOfMemoryError("too small")

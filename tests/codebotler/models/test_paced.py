@@ -39,7 +39,7 @@ def use(
     *,
     name: str = BASE,
     timeout: float = 30,
-    **limits: Any,  # noqa: ANN401
+    **limits: Any,  # noqa: ANN401 - of several types
 ) -> tuple[Paced, T]:
     async def used() -> tuple[Paced, T]:
         model = open_model(name, Settings(base_url=server.url, seed=0, timeout=timeout))

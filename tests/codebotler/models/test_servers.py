@@ -28,7 +28,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
         yield served
 
 
-def ask(name: str, server: Server, prompt: Prompt = PROMPT, **settings: Any) -> tuple[Reply, list[str]]:  # noqa: ANN401
+def ask(name: str, server: Server, prompt: Prompt = PROMPT, **settings: Any) -> tuple[Reply, list[str]]:  # noqa: ANN401 - of several types
     """One reply from an own server, and what was heard of it."""
     heard: list[str] = []
 

@@ -1,0 +1,25 @@
+"""Options that several commands have: which model is asked, and how."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ModelOption = Annotated[
+    str,
+    typer.Option(
+        help="recorded:careful, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, completions:NAME, "
+        "or hf:PATH."
+    ),
+]
+WorldOption = Annotated[Path | None, typer.Option(help="The world file that tells which rooms there are.")]
+TemperatureOption = Annotated[float, typer.Option(help="How far the model strays from the likeliest.")]
+TopPOption = Annotated[float, typer.Option(help="The share of likely tokens that are drawn from.")]
+MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
+SeedOption = Annotated[int | None, typer.Option(help="Fix the random numbers, where a model takes a seed.")]
+TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
+BaseUrlOption = Annotated[
+    str | None, typer.Option(help="Where the model is served, such as http://localhost:8000/v1.")
+]
