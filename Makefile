@@ -39,7 +39,7 @@ test: $(VENV)/tested
 		--ignore tests/codebotler/models/test_local.py $(TESTS)
 
 test-ros1: $(VENV)/tested
-	$(BIN)/python -m pytest --no-skips --numprocesses 2 tests/ros1
+	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py

@@ -2,25 +2,30 @@
 
 A mission has the robot drive, and is stopped in the middle of it: by `Mission.stop`, as a page does it, and
 by Ctrl-C at a tool of its own. Printed are the worst of STOPS=50 and the middle one, in milliseconds: until
-the robot was told (`cancel` is called), and until what it did had ended.
+the robot was told (`cancel` is called; on ROS until the action server had heard it), and until what it did
+had ended.
 """
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
 from codebotler.mission import Mission
 from codebotler.missionlog import EVENTS, Line, events_of
-from codebotler.robots.base import Argument, CancelledError, Feedback, Result, untold
+from codebotler.robots import ros1
+from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, untold
 from codebotler.robots.reservation import Reservation
+from codebotler.robots.ros1 import Ros1
 from codebotler.robots.simulated import Simulated
+from codebotler.robots.virtual import VirtualRobot
 from codebotler.world import Room, World
 
 STOPS = int(os.environ.get("STOPS", "50"))
@@ -59,17 +64,71 @@ def by_call(home: Path) -> Iterator[Times]:
             if line["event"] == "feedback":
                 drives.set()
 
-        with Reservation(robot, home) as reserved, Mission(home, "simulated", told=told) as mission:
-            mission.draft(PROGRAM)
-            mission.check([])
-            mission.approve()
-            running = threading.Thread(target=mission.run, args=(reserved,))
-            running.start()
-            drives.wait()
-            start = time.perf_counter()
-            mission.stop()
-            running.join()
-            yield 1000 * (robot.told - start), 1000 * (robot.ended - start)
+        start = stopped(robot, home, drives, told)
+        yield 1000 * (robot.told - start), 1000 * (robot.ended - start)
+
+
+def by_ros1(home: Path) -> Iterator[Times]:
+    """Stop missions whose robot drives on a real ROS graph."""
+    os.environ.update({"ROS_HOSTNAME": "localhost", "ROS_HOME": str(home), "ROS_LOG_DIR": str(home)})
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    server = Server(port)
+    server.start()
+    try:
+        for _ in range(STOPS):
+            server.drives.clear()
+            start = stopped(Ros1(server.address), home, server.drives)
+            yield 1000 * (server.heard - start), 1000 * (time.perf_counter() - start)
+    finally:
+        server.stop()
+
+
+class Server(VirtualRobot):
+    """Action servers that notice when the robot drives, and when a cancel is heard.
+
+    Args:
+        port: of the ROS master.
+    """
+
+    heard = 0.0
+
+    def __init__(self, port: int) -> None:
+        super().__init__(WORLD, port=port, told=self._note)
+        self.drives = threading.Event()
+
+    def _note(self, what: str) -> None:
+        if what.startswith("go_to"):
+            self.drives.set()
+
+    def _cancel(self, number: str) -> None:
+        self.heard = time.perf_counter()
+        super()._cancel(number)
+
+
+def stopped(
+    robot: Robot, home: Path, drives: threading.Event, told: Callable[[Line], None] = lambda _: None
+) -> float:
+    """When the mission was stopped, which has the robot drive; it has ended.
+
+    Args:
+        robot: not connected.
+        home: the folder of missions.
+        drives: set as soon as the robot drives.
+        told: told what happens.
+    """
+    with Reservation(robot, home) as reserved, Mission(home, robot.name, told=told) as mission:
+        mission.draft(PROGRAM)
+        mission.check([])
+        mission.approve()
+        running = threading.Thread(target=mission.run, args=(reserved,))
+        running.start()
+        drives.wait()
+        start = time.perf_counter()
+        mission.stop()
+        running.join()
+        return start
 
 
 def by_signal(home: Path) -> Iterator[Times]:
@@ -110,10 +169,15 @@ def main() -> int:
     """Print all; 1 if what is aimed at is missed."""
     print(f"from a stop to the robot, worst of {STOPS}, in ms (aim: told in less than {AIM:.0f})")
     with tempfile.TemporaryDirectory() as folder:
+        home = Path(folder)
         hold = [
-            report("simulated, Mission.stop", list(by_call(Path(folder)))),
-            report("simulated, Ctrl-C", list(by_signal(Path(folder)))),
+            report("simulated, Mission.stop", list(by_call(home))),
+            report("simulated, Ctrl-C", list(by_signal(home))),
         ]
+        if ros1.readiness().works:
+            hold.append(report("ros1, Mission.stop", list(by_ros1(home))))
+        else:
+            print("ros1: there is none here")
     print("as aimed at" if all(hold) else "NOT as aimed at")
     return 0 if all(hold) else 1
 

@@ -94,6 +94,7 @@ class Mission:
         self._book = threading.RLock()  # held while something is written and told; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
         self._stopped_by: str | None = None
+        self._asked = self._took = 0.0  # when it was to be stopped, and how long telling the robot took
         self._live: LiveRobot | None = None
         self._lane: Lane | None = None
         self._over, self._wake = threading.Event(), threading.Event()
@@ -197,22 +198,24 @@ class Mission:
         """
         had_ended, asked = self.has_ended, time.monotonic()
         with self._gate:
-            self._stopped_by = self._stopped_by or by
+            if self._stopped_by is None:
+                self._stopped_by, self._asked = by, asked
             live, lane = self._live, self._lane
-        if live is not None:
-            live.stop()
-        took = time.monotonic() - asked
-        if lane is not None:
-            lane.stop()
-        self._wake.set()
+        try:
+            if live is not None:
+                live.stop()
+        finally:
+            self._took = self._took or time.monotonic() - asked
+            if lane is not None:
+                lane.stop()
+            self._wake.set()
         with self._book:
             if self.state is State.STOPPED and not had_ended:
                 return  # by this very stop, whose end was written first
             if self.has_ended:
                 raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
             if self.state is State.RUNNING:
-                self._write("stop", by=by, seconds_to_cancel=round(took, 6))
-                self._step(State.STOPPING, "be stopped", reason=f"stopped by {by}")
+                self._be_stopping()
             elif self.state is not State.STOPPING:
                 self._step(State.STOPPED, "be stopped", reason=f"stopped by {by} before it ran")
 
@@ -258,8 +261,10 @@ class Mission:
         try:
             outcome = self._outcome(live)
         except BaseException as error:  # noqa: BLE001 - whatever it is, the robot must not go on
-            live.stop()
-            self._end(State.FAILED, _reason(error))
+            try:
+                live.stop()
+            finally:
+                self._end(State.FAILED, _reason(error))
         else:
             done = outcome.status is Status.FINISHED
             why = outcome.error or RunError("", "")
@@ -289,13 +294,19 @@ class Mission:
                 if self._stopped_by is not None and reason != UNCONFIRMED:
                     state, reason, line = State.STOPPED, f"stopped by {self._stopped_by}", None
                 if self._stopped_by is not None and self.state is State.RUNNING:
-                    self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
+                    self._be_stopping()
                 self._step(state, "end", reason=reason, line=line)
         except Exception as error:  # noqa: BLE001 - thrown where somebody hears it
             self._fault = error
         finally:
             self._over.set()
             self._wake.set()
+
+    def _be_stopping(self) -> None:
+        """Write that it was stopped: whoever comes first, the stop itself or the end that it brings about."""
+        took = self._took or time.monotonic() - self._asked
+        self._write("stop", by=self._stopped_by, seconds_to_cancel=round(took, 6))
+        self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state in {State.RUNNING, State.STOPPING}:

@@ -119,6 +119,24 @@ def bound_names(source: str) -> set[str]:
     return {s.get_name() for s in table.get_symbols() if s.is_assigned() or s.is_imported()}
 
 
+def called_skills(source: str, skills: SkillTable = SKILLS) -> dict[str, int]:
+    """The skills that a source calls, each with the first line; none if it does not parse.
+
+    Args:
+        source: of a program.
+        skills: what it may call; a name that it gives a meaning of its own is no skill.
+    """
+    tree = parsed(source)
+    if isinstance(tree, Problem):
+        return {}
+    rebound = names_bound(tree)
+    lines: dict[str, int] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and node.id in skills and node.id not in rebound:
+            lines[node.id] = min(node.lineno, lines.get(node.id, node.lineno))
+    return lines
+
+
 # --- static problems
 
 

@@ -6,7 +6,7 @@ import contextlib
 import re
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from codebotler.mission import GRACE, Mission, MissionError, State
 from codebotler.missionview import Watcher, ending, source_view
 from codebotler.models.base import Model
 from codebotler.problems import no_room
+from codebotler.program import called_skills
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation
@@ -102,7 +103,7 @@ def run(robot: Robot, request: Request, home: Path) -> int:
             mission.draft(program, model.name)
         else:
             mission.draft(program)
-        if not _is_approved(mission, program, plan, request):
+        if not _is_approved(mission, program, robot, plan, request):
             return 1
         return _watched(mission, reserved, plan)
 
@@ -113,9 +114,10 @@ def preflight(robot: Robot) -> Plan | None:
     Raises:
         NotReadyError: it does not answer.
     """
+    can = [skill for skill in robot.skills if skill not in robot.missing]
     try:
-        rooms = robot.perform("get_all_rooms", ()) if "get_all_rooms" in robot.skills else None
-        here = robot.perform("get_current_location", ()) if "get_current_location" in robot.skills else None
+        rooms = robot.perform("get_all_rooms", ()) if "get_all_rooms" in can else None
+        here = robot.perform("get_current_location", ()) if "get_current_location" in can else None
     except RobotError as error:
         note(f"the robot does not say which rooms it knows: {visible(str(error))}")
         return None
@@ -142,6 +144,21 @@ def unknown_rooms(program: str, plan: Plan) -> list[str]:
     return [no_room(name, plan) for name in named if plan.room(name) is None and not is_part(name)]
 
 
+def beyond(program: str, robot: Robot) -> list[str]:
+    """For each skill that a program calls and a connected robot lacks, a sentence.
+
+    Args:
+        program: its source.
+        robot: connected.
+    """
+    called = called_skills(program, robot.skills)
+    return [
+        f"line {line}: the robot cannot {skill}: {visible(robot.missing[skill])}"
+        for skill, line in sorted(called.items(), key=lambda item: item[1])
+        if skill in robot.missing
+    ]
+
+
 def written(model: Model, instruction: str, plan: Plan | None) -> str:
     """The program that a model writes for an instruction, with the rooms of the robot in mind."""
     if plan is None:
@@ -150,7 +167,7 @@ def written(model: Model, instruction: str, plan: Plan | None) -> str:
     return generated(model, prompt_for(instruction, rooms=plan.rooms), world=world).program
 
 
-def _is_approved(mission: Mission, program: str, plan: Plan | None, request: Request) -> bool:
+def _is_approved(mission: Mission, program: str, robot: Robot, plan: Plan | None, request: Request) -> bool:
     """Show what a check finds, and ask."""
     rooms, start = (plan.rooms, plan.start) if plan else (None, None)
     found = check(program, rooms=rooms, start=start)
@@ -158,9 +175,14 @@ def _is_approved(mission: Mission, program: str, plan: Plan | None, request: Req
     if not request.is_program:
         print_rich(source_view(program))
     print_rich(check_view(found, program, name))
-    problems = [problem.sentence for problem in found.problems]
+    lacking = beyond(program, robot)
+    problems = [*(problem.sentence for problem in found.problems), *lacking]
     mission.check(problems)
-    _tell_unknown(mission, unknown_rooms(program, plan) if plan and not problems else [])
+    unknown = unknown_rooms(program, plan) if plan and not found.problems else []
+    for sentence in (*lacking, *unknown):
+        told = f"before it moves: {sentence}"
+        mission.note(told)
+        note(shortened(told))
     if problems and not request.despite_problems:
         mission.fail(f"the check found {'a problem' if len(problems) == 1 else 'problems'}")
         note("not run, since it has problems; --despite-problems runs it all the same")
@@ -171,13 +193,6 @@ def _is_approved(mission: Mission, program: str, plan: Plan | None, request: Req
         return False
     mission.approve(despite_problems=request.despite_problems)
     return True
-
-
-def _tell_unknown(mission: Mission, sentences: Sequence[str]) -> None:
-    for sentence in sentences:
-        told = f"before it moves: {sentence}"
-        mission.note(told)
-        note(shortened(told))
 
 
 def _watched(mission: Mission, reserved: Reservation, plan: Plan | None) -> int:

@@ -391,6 +391,44 @@ def test_stop_may_come_again(home: Path) -> None:
     assert robot.cancels >= 2
 
 
+def test_stop_is_written_even_where_its_end_comes_first(home: Path) -> None:
+    class Quick(Simulated):
+        def cancel(self) -> None:
+            super().cancel()
+            if threading.current_thread() is threading.main_thread():
+                assert mission._over.wait(30)
+
+    with Reservation(Quick(WORLD), home) as reserved, ready(home, STUBBORN) as mission:
+        with running(mission, reserved, "feedback"):
+            mission.stop("the test")
+        assert kinds(mission)[-5:] == ["feedback", "cancelled", "stop", "stopping", "stopped"]
+
+
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnhandledThreadExceptionWarning"
+)  # the robot's, on its thread
+def test_robot_that_breaks_while_it_is_stopped_is_told_of(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Breaks(Answering):
+        def cancel(self) -> None:
+            raise TypeError("no such motor")
+
+        def disconnect(self) -> None:
+            may_answer.set()
+
+    def never(_skill: str, _first: str) -> Result:
+        may_answer.wait(60)
+        return None
+
+    monkeypatch.setattr(module, "GRACE", 0.3)
+    may_answer = threading.Event()
+    with Reservation(Breaks(never), home) as reserved, ready(home) as mission:
+        with running(mission, reserved, "skill"), pytest.raises(TypeError, match="no such motor"):
+            mission.stop()
+        assert mission.summary.reason == UNCONFIRMED
+
+
 def test_stop_before_it_runs_ends_it(home: Path) -> None:
     with Reservation(Answering(), home) as reserved, ready(home) as mission:
         mission.stop("the test")

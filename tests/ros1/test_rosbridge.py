@@ -5,6 +5,9 @@ What concerns ROS 2 is tested against a stand-in for the protocol only: no rosbr
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -14,6 +17,7 @@ import pytest
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros import Waits
+from codebotler.robots.ros1 import SCRIPT
 from codebotler.robots.rosbridge import Rosbridge
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS
@@ -141,6 +145,45 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
     assert ended["error"].sentence == (
         f"the connection with {double.address} was lost; its goal was cancelled over another one"
     )
+
+
+TOOL = """
+import sys
+from codebotler.robots.rosbridge import Rosbridge
+robot = Rosbridge(sys.argv[1])
+robot.connect()
+robot.perform("say", ["hello"])
+robot.perform("go_to", ["never"])
+"""
+
+
+def test_killed_tool_leaves_no_moving_robot(graph: Graph, double: Bridge) -> None:
+    server = graph.serve(GO_TO, SAY)
+    source = str(SCRIPT.parents[2])
+    tool = subprocess.Popen(
+        [sys.executable, "-c", TOOL, double.address], env={**os.environ, "PYTHONPATH": source}
+    )
+    server.expect("goal", "hello")
+    server.expect("goal", "never")
+    tool.kill()
+    killed = time.monotonic()
+    server.expect("cancel", "never")
+    took = time.monotonic() - killed
+    tool.wait()
+    assert took < 1.0, f"the goal was preempted {took:.2f} s after the tool was killed"
+
+
+def test_guard_ends_with_the_connection_and_says_nothing_without_a_goal(graph: Graph, double: Bridge) -> None:
+    server = graph.serve(SAY)
+    robot = Rosbridge(double.address, waits=WAITS)
+    robot.connect()
+    robot.perform("say", ["hello"])
+    server.expect("goal", "hello")
+    assert robot._guard is not None
+    guard = robot._guard
+    robot.disconnect()
+    assert guard.epitaph() == "status 0"
+    assert server.said.empty()
 
 
 def test_no_rosbridge_is_said_with_the_mend() -> None:

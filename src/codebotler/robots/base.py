@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeAlias
@@ -43,6 +43,10 @@ class Robot(Protocol):
     @property
     def skills(self) -> SkillTable:
         """What it can be asked to do."""
+
+    @property
+    def missing(self) -> Mapping[str, str]:
+        """Why it cannot perform some skills, by name, as far as it could tell when it was connected."""
 
     @property
     def clock(self) -> Clock:

@@ -81,7 +81,6 @@ class RosRobot:
         self.name, self.address, self.skills = ros.name, ros.address, skills
         self.clock = Clock(speed)
         self.missing: Mapping[str, str] = {}
-        """Why skills cannot be performed, by name, as seen when the robot was connected."""
         self._ros, self._waits = ros, waits or Waits()
         self._worker: Worker | None = None
         self._doubtful = False  # whether something may still go on that nobody looks after

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import queue
+import sys
 import threading
 import time
 import uuid
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from codebotler.robots.base import (
@@ -22,9 +25,11 @@ from codebotler.robots.base import (
     RobotLostError,
     untold,
 )
+from codebotler.robots.bridge_guard import CLOSES, insist
 from codebotler.robots.bridged import Dialect, Message, News, Operations, Topics
 from codebotler.robots.clock import Clock
 from codebotler.robots.ros import Waits, error_of
+from codebotler.robots.worker import Worker
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, RosAction, Skill, SkillTable
 
@@ -32,10 +37,10 @@ if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
 
 ADDRESS = "ws://localhost:9090"
+GUARD = Path(__file__).with_name("bridge_guard.py")
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell which ROS it has; one without rosapi cannot
 AGAIN = 0.5  # seconds after which what nobody has taken notice of is said again
-CLOSES = 1.0  # seconds that the other side may take to say good-bye
 TURN = 0.05  # seconds of one turn of waiting
 NOTE = "robots of ROS 2 behind it were only tested against a stand-in for the protocol"
 
@@ -51,7 +56,10 @@ class Rosbridge:
     """
 
     name = "rosbridge"
-    if_tool_dies = "nobody cancelled the robot's goal: look whether it still moves"
+    missing: Mapping[str, str] = MappingProxyType({})
+    """It is seen only when a skill is performed."""
+
+    if_tool_dies = "another process noticed it, and cancelled the robot's goal if rosbridge answered"
 
     def __init__(
         self,
@@ -64,6 +72,7 @@ class Rosbridge:
         self.address, self.skills, self.clock = address or ADDRESS, skills, Clock(speed)
         self._waits = waits or Waits()
         self._line: Line | None = None
+        self._guard: Worker | None = None
         self._going: tuple[RosAction, str] | None = None
         self._stopped = True
         self._order = threading.Lock()
@@ -77,6 +86,8 @@ class Rosbridge:
         self.disconnect()
         actions = [skill.ros for skill in self.skills.rows if skill.ros is not None]
         self._line, self._stopped = Line(self.address, actions, self._waits.patience), False
+        start = {"address": self.address, "patience": self._waits.patience}
+        self._guard = Worker(Path(sys.executable), GUARD, start, {"PYTHONSAFEPATH": "1"})
         self.clock.restart()
 
     def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
@@ -97,12 +108,14 @@ class Rosbridge:
             line, goal = self._line, str(uuid.uuid4())
             self._going = row.ros, goal
             sent = line.dialect.goal(row.ros, goal, arguments)
+            self._tell_guard(_last_words(line.dialect, row.ros, goal))
             line.send(sent)
         try:
             return self._ended(line, row, sent, _Watch(goal, row.ros.server, self._waits), told)
         finally:
             with self._order:
                 self._going = None
+                self._tell_guard([])
 
     def cancel(self) -> None:
         """Cancel the goal that goes on."""
@@ -117,8 +130,11 @@ class Rosbridge:
         self.cancel()
         with self._order:
             line, self._line = self._line, None
+            guard, self._guard = self._guard, None
         if line is not None:
             line.close()
+        if guard is not None:
+            guard.leave()
 
     def _ended(self, line: Line, skill: Skill, sent: Message, watch: _Watch, told: Feedback) -> Result:
         """Wait for the end of a goal; what nobody takes notice of is said again."""
@@ -130,7 +146,7 @@ class Rosbridge:
             if self._stopped and watch.cancelled is None:
                 watch.cancelled = now
             if news is None and line.is_lost:
-                raise RobotLostError(self._rescue(skill, watch.goal))
+                raise RobotLostError(self._rescue(line.dialect, skill, watch.goal))
             why = watch.fault(now, line)
             if why is not None:
                 assert skill.ros is not None
@@ -160,19 +176,25 @@ class Rosbridge:
                 return value
         raise RobotLostError(f"{skill.name} cannot return {value!r:.100}, as the robot's did")
 
-    def _rescue(self, skill: Skill, goal: str) -> str:
+    def _rescue(self, dialect: Dialect, skill: Skill, goal: str) -> str:
         """Cancel a goal over another connection; what became of that, in words."""
         assert skill.ros is not None
         where = self.address
         try:
-            line = Line(self.address, [skill.ros], self._waits.patience)
-        except NotReadyError:
+            insist(self.address, _last_words(dialect, skill.ros, goal), self._waits.patience)
+        except OSError:
             return f"the connection with {where} was lost, and its goal goes on: STOP THE ROBOT BY HAND"
-        for _ in range(5):  # the first may be said before the server listens
-            line.send(line.dialect.cancel(skill.ros, goal))
-            time.sleep(AGAIN / 2)
-        line.close()
         return f"the connection with {where} was lost; its goal was cancelled over another one"
+
+    def _tell_guard(self, messages: Sequence[Message]) -> None:
+        """Say what is to be said if this process is killed now."""
+        if self._guard is not None:
+            self._guard.send({"say": messages})
+
+
+def _last_words(dialect: Dialect, action: RosAction, goal: str) -> list[Message]:
+    """What is said on a new connection to cancel a goal."""
+    return [*dialect.opening(action), dialect.cancel(action, goal)]
 
 
 class _Watch:

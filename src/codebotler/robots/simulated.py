@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from codebotler.badinput import BadInput
 from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Readiness, Result, untold
@@ -38,6 +39,7 @@ class Simulated:
 
     name, address = "simulated", ""
     if_tool_dies = "the simulated robot ended with the tool"
+    missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(
         self,

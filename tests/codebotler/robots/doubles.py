@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, untold
 from codebotler.robots.clock import Clock
@@ -17,6 +18,7 @@ class Answering:
     """
 
     name, address, if_tool_dies = "answering", "", "it ended with the tool"
+    missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, answer: Callable[[str, str], Result] = lambda *_: None) -> None:
         self.answer, self.clock, self.skills = answer, Clock(None), SKILLS

@@ -1,0 +1,76 @@
+"""`codebotler run` on a real ROS graph: what it says before the robot moves, and how it is stopped."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from codebotler.robots.ros1 import SCRIPT
+from codebotler.skills import SKILLS
+from ros_graph import GO_TO, Graph
+
+FETCH = 'def task_program():\n    go_to("the hall")\n    if is_in_room("mug"):\n        pick("mug")\n'
+FAR = """def task_program():
+    while True:
+        try:
+            go_to("never")
+        except BaseException:
+            pass
+"""
+
+
+def begun(graph: Graph, folder: Path, program: str, *options: str) -> subprocess.Popen[str]:
+    (folder / "program.py").write_text(program)
+    return subprocess.Popen(
+        [sys.executable, "-m", "codebotler.cli", "run", "program.py", "--robot", "ros1", "--yes", *options],
+        cwd=folder,
+        env={
+            **os.environ,
+            "PYTHONPATH": str(SCRIPT.parents[2]),
+            "CODEBOTLER_HOME": str(folder),
+            "ROS_MASTER_URI": graph.uri,
+        },
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_skill_that_the_robot_lacks_is_said_before_it_moves(graph: Graph, tmp_path: Path) -> None:
+    server = graph.serve(*(skill for skill in SKILLS.rows if skill.name != "pick"))
+    with begun(graph, tmp_path, FETCH) as tool:
+        out, err = tool.communicate()
+    lacks = "line 4: the robot cannot pick: there is no action server at /pick_server; start it"
+    assert (tool.returncode, "running on" in out) == (1, False)
+    assert lacks in err
+    assert "--despite-problems" in err
+    assert '"the hall"' not in str(list(server.said.queue))
+
+
+def test_robot_that_does_not_say_its_rooms_can_be_used(graph: Graph, tmp_path: Path) -> None:
+    server = graph.serve(GO_TO)
+    with begun(graph, tmp_path, 'def task_program():\n    go_to("the hall")\n') as tool:
+        _, err = tool.communicate()
+    assert tool.returncode == 0, err
+    server.expect("goal", "the hall")
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_signal_cancels_the_goal_and_no_other_is_sent(
+    graph: Graph, tmp_path: Path, number: int, status: int
+) -> None:
+    server = graph.serve(*SKILLS.rows)
+    with begun(graph, tmp_path, FAR, "--despite-problems") as tool:
+        server.expect("goal", "")
+        server.expect("goal", "")
+        server.expect("goal", "never")
+        tool.send_signal(number)
+        out, err = tool.communicate()
+    server.expect("cancel", "never")
+    assert (tool.returncode, server.said.empty()) == (status, True), err
+    assert "stopped by" in out
