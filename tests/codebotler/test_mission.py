@@ -407,9 +407,7 @@ def test_stop_is_written_even_where_its_end_comes_first(home: Path) -> None:
 @pytest.mark.filterwarnings(
     "ignore::pytest.PytestUnhandledThreadExceptionWarning"
 )  # the robot's, on its thread
-def test_robot_that_breaks_while_it_is_stopped_is_told_of(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Breaks(Answering):
         def cancel(self) -> None:
             raise TypeError("no such motor")
