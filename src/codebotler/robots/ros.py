@@ -73,7 +73,7 @@ class RosRobot:
         waits: for how long what is waited for.
     """
 
-    if_tool_dies = "the worker noticed it and cancelled the robot's goal"
+    if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
 
     def __init__(
         self, ros: Ros, skills: SkillTable = SKILLS, speed: float | None = 1.0, waits: Waits | None = None
