@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -94,6 +95,7 @@ class Mission:
         self._book = threading.RLock()  # held while something is written and told; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
         self._stopped_by: str | None = None
+        self._asked, self._passed_on = 0.0, math.inf  # when it was first to stop, and when the robot knew
         self._live: LiveRobot | None = None
         self._lane: Lane | None = None
         self._over, self._wake = threading.Event(), threading.Event()
@@ -197,22 +199,22 @@ class Mission:
         """
         had_ended, asked = self.has_ended, time.monotonic()
         with self._gate:
-            self._stopped_by = self._stopped_by or by
+            if self._stopped_by is None:
+                self._stopped_by, self._asked = by, asked
             live, lane = self._live, self._lane
+        self._wake.set()  # a robot that cannot be told must not keep anybody from hearing so
         if live is not None:
             live.stop()
-        took = time.monotonic() - asked
+        self._passed_on = min(self._passed_on, time.monotonic())
         if lane is not None:
             lane.stop()
-        self._wake.set()
         with self._book:
             if self.state is State.STOPPED and not had_ended:
                 return  # by this very stop, whose end was written first
             if self.has_ended:
                 raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
             if self.state is State.RUNNING:
-                self._write("stop", by=by, seconds_to_cancel=round(took, 6))
-                self._step(State.STOPPING, "be stopped", reason=f"stopped by {by}")
+                self._be_stopping()
             elif self.state is not State.STOPPING:
                 self._step(State.STOPPED, "be stopped", reason=f"stopped by {by} before it ran")
 
@@ -289,13 +291,19 @@ class Mission:
                 if self._stopped_by is not None and reason != UNCONFIRMED:
                     state, reason, line = State.STOPPED, f"stopped by {self._stopped_by}", None
                 if self._stopped_by is not None and self.state is State.RUNNING:
-                    self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
+                    self._be_stopping()
                 self._step(state, "end", reason=reason, line=line)
         except Exception as error:  # noqa: BLE001 - thrown where somebody hears it
             self._fault = error
         finally:
             self._over.set()
             self._wake.set()
+
+    def _be_stopping(self) -> None:
+        """Write who stopped it; the robot may have ended before whoever told it so is back."""
+        passed_on = min(self._passed_on, time.monotonic())
+        self._write("stop", by=self._stopped_by, seconds_to_cancel=round(passed_on - self._asked, 6))
+        self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state in {State.RUNNING, State.STOPPING}:
