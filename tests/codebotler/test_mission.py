@@ -406,13 +406,16 @@ def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
         may_go_on.wait(60)
         return None
 
-    with Reservation(Blocked(answer), home) as reserved, ready(home) as mission:
-        with ThreadPoolExecutor(1) as threads:
-            with running(mission, reserved, "skill"):
-                stopping = threads.submit(mission.stop)
-            assert (mission.summary.state, mission.summary.reason) == ("failed", UNCONFIRMED)
-            may_go_on.set()
-            assert isinstance(stopping.exception(30), MissionError)
+    with (
+        Reservation(Blocked(answer), home) as reserved,
+        ready(home) as mission,
+        ThreadPoolExecutor(1) as threads,
+    ):
+        with running(mission, reserved, "skill"):
+            stopping = threads.submit(mission.stop)
+        assert (mission.summary.state, mission.summary.reason) == ("failed", UNCONFIRMED)
+        may_go_on.set()
+        assert isinstance(stopping.exception(30), MissionError)
 
 
 def test_skill_without_an_end_goes_on_until_the_stop(home: Path) -> None:

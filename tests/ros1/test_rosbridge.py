@@ -5,11 +5,14 @@ What concerns ROS 2 is tested against a stand-in for the protocol only: no rosbr
 
 from __future__ import annotations
 
+import json
+import re
 import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
@@ -189,6 +192,40 @@ def test_stand_in_for_ros_2_aborts_and_refuses(second: Rosbridge) -> None:
     assert error.value.kind == "GoToInvalidLocation"
     with pytest.raises(RobotLostError, match="no such action"):
         second.perform("go_to", ["unknown"])
+
+
+@pytest.mark.parametrize(
+    "said", ["{nonsense", '{"op": "action_result", "id": 1, "status": []}', '{"op": [' + "[" * 5_000]
+)
+def test_stand_in_for_ros_2_that_talks_nonsense_is_not_lost(second: Rosbridge, said: str) -> None:
+    with pytest.raises(RobotLostError, match="did not end within 2 s"):
+        second.perform("go_to", [said])
+    assert second.perform("ask", ["ann", "tea?", ("yes", "no")]) == "yes"
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"op": "publish", "topic": "/else_server/status", "msg": {"status_list": [{}]}},
+        {"op": "publish", "topic": "/say_server/result", "msg": {"status": 5, "result": {}}},
+        {"op": "status", "level": "error", "msg": "\x1b[2Jbad"},
+    ],
+)
+def test_message_that_is_none_is_survived_and_shown_without_what_a_terminal_obeys(
+    message: dict[str, Any],
+) -> None:
+    def handle(connection: ServerConnection) -> None:
+        for _ in connection:
+            connection.send(json.dumps(message))
+
+    with bridge(handle) as double:
+        robot = Rosbridge(double.address, waits=Waits(patience=1.0))
+        robot.connect()
+        with pytest.raises(RobotLostError, match="there is no action server at /say_server") as error:
+            robot.perform("say", ["hello"])
+        assert re.search(r"no message of rosbridge|\\x1b\[2Jbad", error.value.sentence)
+        assert error.value.sentence.isprintable()
+        robot.disconnect()
 
 
 def test_stand_in_for_ros_2_hears_of_a_stop_and_of_what_takes_too_long(

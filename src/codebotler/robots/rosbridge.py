@@ -27,6 +27,7 @@ from codebotler.robots.clock import Clock
 from codebotler.robots.ros import Waits, error_of
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, RosAction, Skill, SkillTable
+from codebotler.terminal import visible
 
 if TYPE_CHECKING:
     from websockets.sync.client import ClientConnection
@@ -150,7 +151,7 @@ class Rosbridge:
             raise CancelledError
         if news.state == "lost":
             raise RobotLostError(
-                f"rosbridge could not have {skill.name} done: {news.text or 'it does not say why'}"
+                f"rosbridge could not have {skill.name} done: {visible(news.text) or 'it does not say why'}"
             )
         if news.state != "succeeded":
             raise error_of(skill, news.text, news.state)
@@ -299,10 +300,18 @@ class Line:
 
         try:
             for text in self._socket:
-                self._hear(json.loads(text))
+                self._take(text)
         except ConnectionClosed:
             pass
-        self.is_lost = True
+        finally:
+            self.is_lost = True
+
+    def _take(self, text: str | bytes) -> None:
+        """Hear a message; what is none is remembered, should nothing else come."""
+        try:
+            self._hear(json.loads(text))
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            self.complaint = f"it says what is no message of rosbridge: {visible(repr(text[:100]))}"
 
     def _hear(self, message: Message) -> None:
         match message:
@@ -316,7 +325,7 @@ class Line:
             case {"op": "service_response", "id": "version"}:
                 self._version.put(1)
             case {"op": "status", "level": "error", "msg": str(complaint)}:
-                self.complaint = complaint
+                self.complaint = visible(complaint)
         for news in self.dialect.news(message):
             if news.server:
                 self._heard[news.server] = time.monotonic()
