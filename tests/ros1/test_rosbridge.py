@@ -6,9 +6,13 @@ What concerns ROS 2 is tested against a stand-in for the protocol only: no rosbr
 from __future__ import annotations
 
 import json
+import os
 import re
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,6 +24,7 @@ from codebotler.robots.ros import Waits
 from codebotler.robots.rosbridge import Rosbridge
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS
+from processes import are_gone, children_of
 from ros_graph import GO_TO, SAY, Graph, free_port, started
 
 WAITS = Waits(patience=5.0, silence=1.5, longest=20.0)
@@ -144,6 +149,47 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
     assert ended["error"].sentence == (
         f"the connection with {double.address} was lost; its goal was cancelled over another one"
     )
+
+
+TOOL = """
+import sys
+from codebotler.robots.rosbridge import Rosbridge
+robot = Rosbridge(sys.argv[1])
+robot.connect()
+robot.perform("get_all_rooms", [])
+robot.perform("go_to", ["never"])
+"""
+
+
+def test_killed_tool_leaves_no_moving_robot(graph: Graph, double: Bridge) -> None:
+    server = graph.serve(GO_TO, SKILLS["get_all_rooms"])
+    source = str(Path(__file__).parents[2] / "src")
+    process = subprocess.Popen(
+        [sys.executable, "-c", TOOL, double.address], env={**os.environ, "PYTHONPATH": source}
+    )
+    server.expect("goal", "")
+    server.expect("goal", "never")
+    guards = children_of(process.pid)
+    process.kill()
+    killed = time.monotonic()
+    server.expect("cancel", "never")
+    took = time.monotonic() - killed
+    process.wait()
+    assert took < 1.0, f"the goal was preempted {took:.2f} s after the tool was killed"
+    assert guards
+    assert are_gone(guards)
+
+
+def test_guard_of_a_tool_that_leaves_says_nothing(graph: Graph, robot: Rosbridge) -> None:
+    server = graph.serve(GO_TO)
+    robot.connect()
+    robot.perform("go_to", ["the hall"])
+    guards = children_of(os.getpid())
+    robot.disconnect()
+    server.expect("goal", "the hall")
+    assert server.said.empty()
+    assert robot._guard is None
+    assert len(children_of(os.getpid())) < len(guards)
 
 
 def test_no_rosbridge_is_said_with_the_mend() -> None:

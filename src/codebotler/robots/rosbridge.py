@@ -24,6 +24,7 @@ from codebotler.robots.base import (
 )
 from codebotler.robots.bridged import Dialect, Message, News, Operations, Topics
 from codebotler.robots.clock import Clock
+from codebotler.robots.guard import Guard
 from codebotler.robots.ros import Waits, error_of
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, RosAction, Skill, SkillTable
@@ -52,7 +53,7 @@ class Rosbridge:
     """
 
     name = "rosbridge"
-    if_tool_dies = "nobody cancelled the robot's goal: look whether it still moves"
+    if_tool_dies = "a process beside the tool then cancels the robot's goal, unless it was killed as well"
 
     def __init__(
         self,
@@ -65,6 +66,7 @@ class Rosbridge:
         self.address, self.skills, self.clock = address or ADDRESS, skills, Clock(speed)
         self._waits = waits or Waits()
         self._line: Line | None = None
+        self._guard: Guard | None = None
         self._going: tuple[RosAction, str] | None = None
         self._stopped = True
         self._order = threading.Lock()
@@ -78,6 +80,8 @@ class Rosbridge:
         self.disconnect()
         actions = [skill.ros for skill in self.skills.rows if skill.ros is not None]
         self._line, self._stopped = Line(self.address, actions, self._waits.patience), False
+        opening = [m for action in actions for m in self._line.dialect.opening(action)]
+        self._guard = Guard(self.address, [m for m in opening if m["op"] == "advertise"])
         self.clock.restart()
 
     def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
@@ -95,8 +99,10 @@ class Rosbridge:
             if self._stopped:
                 raise CancelledError
             assert self._line is not None, "the robot is not connected"
-            line, goal = self._line, str(uuid.uuid4())
+            assert self._guard is not None
+            line, guard, goal = self._line, self._guard, str(uuid.uuid4())
             self._going = row.ros, goal
+            guard.watch(line.dialect.cancel(row.ros, goal))
             sent = line.dialect.goal(row.ros, goal, arguments)
             line.send(sent)
         try:
@@ -104,6 +110,7 @@ class Rosbridge:
         finally:
             with self._order:
                 self._going = None
+            guard.watch(None)
 
     def cancel(self) -> None:
         """Cancel the goal that goes on."""
@@ -118,8 +125,11 @@ class Rosbridge:
         self.cancel()
         with self._order:
             line, self._line = self._line, None
+            guard, self._guard = self._guard, None
         if line is not None:
             line.close()
+        if guard is not None:
+            guard.leave()
 
     def _ended(self, line: Line, skill: Skill, sent: Message, watch: _Watch, told: Feedback) -> Result:
         """Wait for the end of a goal; what nobody takes notice of is said again."""
