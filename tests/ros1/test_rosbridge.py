@@ -107,6 +107,15 @@ def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: Rosbridge) -
         robot.perform("go_to", ["die"])
 
 
+def test_server_that_sends_no_result_is_noticed(graph: Graph, double: Bridge) -> None:
+    graph.serve(GO_TO)
+    robot = Rosbridge(double.address, waits=Waits(patience=2.0))
+    robot.connect()
+    with pytest.raises(RobotLostError, match="/go_to_server ended the goal, but sent no result within 2 s"):
+        robot.perform("go_to", ["no result"])
+    robot.disconnect()
+
+
 def test_missing_server_is_said(graph: Graph, robot: Rosbridge) -> None:
     graph.serve(GO_TO)
     robot.connect()

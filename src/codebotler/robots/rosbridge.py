@@ -38,6 +38,7 @@ ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_r
 VERSION = 2.0  # seconds that a rosbridge may take to tell which ROS it has; one without rosapi cannot
 AGAIN = 0.5  # seconds after which what nobody has taken notice of is said again
 CLOSES = 1.0  # seconds that the other side may take to say good-bye
+TICK = 0.005  # seconds between two looks whether a server is heard
 TURN = 0.05  # seconds of one turn of waiting
 NOTE = "robots of ROS 2 behind it were only tested against a stand-in for the protocol"
 
@@ -104,8 +105,12 @@ class Rosbridge:
             self._going = row.ros, goal
             guard.watch(line.dialect.cancel(row.ros, goal))
             sent = line.dialect.goal(row.ros, goal, arguments)
-            line.send(sent)
         try:
+            self._hold(line, row.ros.server)
+            with self._order:
+                if self._stopped:
+                    raise CancelledError
+                line.send(sent)
             return self._ended(line, row, sent, _Watch(goal, row.ros.server, self._waits), told)
         finally:
             with self._order:
@@ -131,6 +136,14 @@ class Rosbridge:
         if guard is not None:
             guard.leave()
 
+    def _hold(self, line: Line, server: str) -> None:
+        """Wait until a server is well heard; the result of a goal that is sent before may be lost."""
+        until = time.monotonic() + self._waits.patience
+        while line.dialect.is_heard and server not in line.well_heard and not (line.is_lost or self._stopped):
+            if time.monotonic() > until:
+                raise RobotLostError(line.absent(server))
+            time.sleep(TICK)
+
     def _ended(self, line: Line, skill: Skill, sent: Message, watch: _Watch, told: Feedback) -> Result:
         """Wait for the end of a goal; what nobody takes notice of is said again."""
         while (news := line.news(watch.goal)) is None or news.what != "ended":
@@ -138,6 +151,8 @@ class Rosbridge:
                 told(news.text)
             watch.is_taken = watch.is_taken or news is not None
             now = time.monotonic()
+            if news is not None and news.state and watch.ends is None:
+                watch.ends = now
             if self._stopped and watch.cancelled is None:
                 watch.cancelled = now
             if news is None and line.is_lost:
@@ -201,17 +216,13 @@ class _Watch:
         self.again = self.sent + AGAIN
         self.is_taken = False
         self.cancelled: float | None = None
+        self.ends: float | None = None  # since when only its result is waited for
 
     def fault(self, now: float, line: Line) -> str | None:
         """Why it is not to be waited for any longer."""
         waits, heard = self.waits, line.heard.get(self.server)
         late = now - waits.patience
         faults = (
-            (
-                line.dialect.is_heard and heard is None and self.sent < late,
-                f"there is no action server at {self.server}, or none that rosbridge could reach"
-                + (f" ({line.complaint})" if line.complaint else ""),
-            ),
             (
                 heard is not None and max(heard, self.sent) < now - waits.silence,
                 f"the action server at {self.server} has died: no status for {waits.silence:g} s",
@@ -223,6 +234,10 @@ class _Watch:
             (
                 line.dialect.is_heard and not self.is_taken and self.sent < late,
                 f"{self.server} did not take the goal within {waits.patience:g} s",
+            ),
+            (
+                self.ends is not None and self.ends < late,
+                f"{self.server} ended the goal, but sent no result within {waits.patience:g} s",
             ),
             (
                 self.sent < now - waits.longest,
@@ -260,6 +275,8 @@ class Line:
         self._news: queue.SimpleQueue[News] = queue.SimpleQueue()
         self._version: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._heard: dict[str, float] = {}
+        self.well_heard: set[str] = set()
+        """Servers whose status came twice: by then their results are connected as well."""
         self.is_lost, self.complaint = False, ""
         self.dialect: Dialect = Topics()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -278,6 +295,11 @@ class Line:
     def heard(self) -> Mapping[str, float]:
         """When the last status of a server came, on a clock that nobody sets."""
         return self._heard
+
+    def absent(self, server: str) -> str:
+        """What to say where a server is not heard."""
+        why = f" ({self.complaint})" if self.complaint else ""
+        return f"there is no action server at {server}, or none that rosbridge could reach{why}"
 
     def send(self, message: Message) -> None:
         """Say something; in vain where the connection is lost."""
@@ -337,7 +359,9 @@ class Line:
             case {"op": "status", "level": "error", "msg": str(complaint)}:
                 self.complaint = visible(complaint)
         for news in self.dialect.news(message):
-            if news.server:
+            if news.server and not news.goal:
+                if news.server in self._heard:
+                    self.well_heard.add(news.server)
                 self._heard[news.server] = time.monotonic()
             if news.goal:
                 self._news.put(news)
