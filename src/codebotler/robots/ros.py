@@ -126,12 +126,16 @@ class RosRobot:
 
     def cancel(self) -> None:
         """Have the worker cancel the goal; if it cannot, have another one cancel all goals."""
-        with self._order:
+        is_ours = self._order.acquire(timeout=CANCELS)  # a worker that hangs may not even take a long goal
+        try:
             self._stopped = True
             worker = self._worker
             self.clock.stop()
-            if worker is None or worker.cancel(CANCELS):
+            if worker is None or (is_ours and worker.cancel(CANCELS)):
                 return
+        finally:
+            if is_ours:
+                self._order.release()
         self._rescue(worker)
 
     def disconnect(self) -> None:
