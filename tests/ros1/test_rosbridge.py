@@ -161,11 +161,12 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
 
 
 TOOL = """
-import sys
+import sys, time
 from codebotler.robots.rosbridge import Rosbridge
 robot = Rosbridge(sys.argv[1])
 robot.connect()
 robot.perform("get_all_rooms", [])
+time.sleep(3)  # the double starts a process for the connection of the guard, which takes its time
 robot.perform("go_to", ["never"])
 """
 

@@ -15,7 +15,7 @@ from typing import Any
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
-TIMES = 5  # a cancel is said, since a connection may just be lost
+TIMES = 15  # a cancel is said, since a connection may just be lost, or not yet lead to the server
 PAUSE = 0.2  # seconds between them
 OPENS = 5.0  # seconds that a rosbridge may take to answer
 FAULTS = (OSError, ValueError, WebSocketException)
