@@ -25,7 +25,7 @@ def missions(home: Path) -> list[Summary]:
     Raises:
         BadInput: one cannot be read.
     """
-    return sorted(map(Summary.read, _folders(home)), key=lambda summary: (summary.created, summary.id))
+    return sorted(map(summary_of, _folders(home)), key=lambda summary: (summary.created, summary.id))
 
 
 def find(home: Path, name: str) -> Path:
@@ -44,6 +44,19 @@ def find(home: Path, name: str) -> Path:
     if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
         raise BadInput(f'there is no mission "{name}"; `codebotler missions` lists those there are')
     return folder
+
+
+def summary_of(folder: Path) -> Summary:
+    """The summary of a mission.
+
+    Raises:
+        BadInput: it is none.
+        OSError: it cannot be read.
+    """
+    summary = Summary.read(folder)
+    if summary.state not in tuple(State):
+        raise BadInput("this is no summary of a mission; remove its folder", file=folder / SUMMARY)
+    return summary
 
 
 def recover(home: Path) -> list[Summary]:
@@ -72,14 +85,14 @@ def _folders(home: Path) -> Iterator[Path]:
 
 def _interrupted(folder: Path) -> list[Summary]:
     """The mission, if it was, and nobody had noticed."""
-    if State(Summary.read(folder).state) not in STEPS:
+    if State(summary_of(folder).state) not in STEPS:
         return []
     try:
         log = Log(folder)
     except BlockingIOError:
         return []  # another tool is on it
     try:
-        summary = Summary.read(folder)
+        summary = summary_of(folder)
         if State(summary.state) not in STEPS:
             return []
         events = events_of(folder)
@@ -107,7 +120,7 @@ def _how(summary: Summary, events: list[Line]) -> str:
         return f"the tool died while the mission was {summary.state}; nothing had moved"
     skill = doing(events)
     if skill is None:
-        return f"the tool died while the robot did nothing; {summary.if_tool_dies}"
+        return "the tool died while the robot did nothing"
     going = in_words(skill["skill"], list(skill["arguments"].values()))
     where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
     where = f" ({where})" if where else ""

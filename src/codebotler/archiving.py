@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from pathlib import Path
 
-from codebotler.archive import find, missions, recover
-from codebotler.missionlog import Summary, events_of
+from codebotler.archive import find, missions, recover, summary_of
+from codebotler.missionlog import events_of
 from codebotler.missionmcap import Clock, export
 from codebotler.missionview import list_view, mission_view
 from codebotler.terminal import note, print_json, print_rich, visible
@@ -43,7 +43,7 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
     """
     _tell_interrupted(home)
     folder = find(home, name)
-    summary, events = Summary.read(folder), events_of(folder)
+    summary, events = summary_of(folder), events_of(folder)
     if json:
         print_json({**asdict(summary), "events": events})
     else:
@@ -65,7 +65,7 @@ def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
     """
     _tell_interrupted(home)
     folder = find(home, name)
-    summary, events = Summary.read(folder), events_of(folder)
+    summary, events = summary_of(folder), events_of(folder)
     export(path, summary, events, clock)
     note(f"wrote {len(events):,} messages of mission {summary.id} to {path}")
 

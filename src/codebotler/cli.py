@@ -259,6 +259,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     if sys.platform == "win32":
         print(f"{name}: {ON_WINDOWS}", file=sys.stderr)
         raise SystemExit(1)
+    _open_what_is_closed()
     if isinstance(sys.stdout, io.TextIOWrapper):  # what a terminal cannot show must not end a command
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -280,6 +281,13 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     if status == STOPPED:
         print(f"{name}: stopped", file=sys.stderr)
     raise SystemExit(status if isinstance(status, int) else 0)
+
+
+def _open_what_is_closed() -> None:
+    """Let standard streams that somebody closed lead nowhere, so that no file of ours takes their place."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
 def _ending(error: Exception) -> tuple[int, str] | None:

@@ -5,11 +5,20 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from codebotler.badinput import BadInput
+
 
 def home() -> Path:
-    """What CODEBOTLER_HOME names; without it, a folder among the user's state. It need not exist."""
+    """What CODEBOTLER_HOME names; without it, a folder among the user's state. It need not exist.
+
+    Raises:
+        BadInput: nothing says where it is.
+    """
     named = os.environ.get("CODEBOTLER_HOME")
     if named:
         return Path(named).absolute()
     state = os.environ.get("XDG_STATE_HOME")
-    return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
+    try:
+        return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
+    except RuntimeError:
+        raise BadInput("nobody knows where your home is; set CODEBOTLER_HOME to a folder") from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -94,7 +95,7 @@ class Mission:
         self._book = threading.RLock()  # held while something is written and told; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
         self._stopped_by: str | None = None
-        self._asked = self._took = 0.0  # when it was to be stopped, and how long telling the robot took
+        self._asked, self._passed_on = 0.0, math.inf  # when it was first to stop, and when the robot knew
         self._live: LiveRobot | None = None
         self._lane: Lane | None = None
         self._over, self._wake = threading.Event(), threading.Event()
@@ -201,14 +202,14 @@ class Mission:
             if self._stopped_by is None:
                 self._stopped_by, self._asked = by, asked
             live, lane = self._live, self._lane
+        self._wake.set()  # a robot that cannot be told must not keep anybody from hearing so
         try:
             if live is not None:
                 live.stop()
         finally:
-            self._took = self._took or time.monotonic() - asked
+            self._passed_on = min(self._passed_on, time.monotonic())
             if lane is not None:
                 lane.stop()
-            self._wake.set()
         with self._book:
             if self.state is State.STOPPED and not had_ended:
                 return  # by this very stop, whose end was written first
@@ -303,9 +304,9 @@ class Mission:
             self._wake.set()
 
     def _be_stopping(self) -> None:
-        """Write that it was stopped: whoever comes first, the stop itself or the end that it brings about."""
-        took = self._took or time.monotonic() - self._asked
-        self._write("stop", by=self._stopped_by, seconds_to_cancel=round(took, 6))
+        """Write who stopped it; the robot may have ended before whoever told it so is back."""
+        passed_on = min(self._passed_on, time.monotonic())
+        self._write("stop", by=self._stopped_by, seconds_to_cancel=round(passed_on - self._asked, 6))
         self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
 
     def _leave(self, error: BaseException | None) -> None:

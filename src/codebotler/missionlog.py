@@ -5,17 +5,33 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import json
+import math
 import os
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from codebotler.badinput import BadInput
 
 EVENTS, SUMMARY = "events.jsonl", "mission.json"
+TEXTS = ("id", "state", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
+HAS: Mapping[str, frozenset[str]] = {
+    "state": frozenset({"state"}),
+    "skill": frozenset({"number", "skill", "arguments"}),
+    "feedback": frozenset({"number", "skill", "text"}),
+    "result": frozenset({"number", "skill", "result"}),
+    "error": frozenset({"number", "skill", "kind", "message"}),
+    "cancelled": frozenset({"number", "skill"}),
+    "late": frozenset({"number", "skill"}),
+    "sleep": frozenset({"seconds"}),
+    "stop": frozenset({"by"}),
+    "log": frozenset({"text"}),
+}
+"""What belongs to each kind of event."""
 
 Line: TypeAlias = dict[str, Any]
 """An event: `time` (seconds since 1970), `clock` (the robot's, in seconds), `event` (what kind), and more."""
@@ -63,11 +79,14 @@ class Summary:
         """
         path = folder / SUMMARY
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
+            data = json.loads(path.read_bytes())
             known = {field.name: data[field.name] for field in fields(cls) if field.name in data}
-            return cls(**{**known, "problems": tuple(known.get("problems", ()))})
-        except (ValueError, TypeError, KeyError):
+            summary = cls(**{**known, "problems": tuple(known.get("problems", ()))})
+            datetime.fromtimestamp(summary.created, UTC)
+            "".join((*summary.problems, *(getattr(summary, name) for name in TEXTS)))
+        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
             raise BadInput("this is no summary of a mission; remove its folder", file=path) from None
+        return summary
 
     def write(self, folder: Path) -> None:
         """Write it whole, or leave what was there.
@@ -76,8 +95,11 @@ class Summary:
             OSError: it cannot be written.
         """
         new = folder / f"{SUMMARY}.new"
-        new.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
-        new.replace(folder / SUMMARY)
+        try:
+            new.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
+            new.replace(folder / SUMMARY)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(folder / SUMMARY)) from None
 
 
 class Log:
@@ -160,9 +182,10 @@ def events_of(folder: Path) -> list[Line]:
 def _event(text: bytes, path: Path, number: int) -> Line:
     try:
         line = json.loads(text)
-        if isinstance(line["event"], str) and line["time"] + line["clock"] >= 0:
+        has_all = HAS.get(line["event"], frozenset()) <= line.keys()
+        if has_all and isinstance(line["event"], str) and 0 <= line["time"] + line["clock"] < math.inf:
             return dict(line)
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         pass
     raise BadInput("this is no event of a mission; remove the line", file=path, line=number)
 

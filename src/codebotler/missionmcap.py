@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Mapping, Sequence
 from datetime import datetime
@@ -22,6 +23,7 @@ TEXTS: Schema = {"type": "array", "items": TEXT}
 NUMBER: Schema = {"type": "number"}
 TYPES: Mapping[str, Schema] = {"str": TEXT, "list[str]": TEXTS, "bool": {"type": "boolean"}}
 SECOND = 1_000_000_000
+LATEST = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
 STATES, NOTES = "/mission/state", "/mission/log"
 DETAILS = ("text", "message", "reason", "by")
 """Where an event that is no skill's has what it says."""
@@ -53,11 +55,11 @@ def write_mcap(
     Raises:
         OSError: it cannot be written.
     """
-    began = round(summary.created * SECOND)
+    began = round(min(summary.created * SECOND, LATEST))
 
     def time(line: Line) -> int:
         seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
-        return round(seconds * SECOND)
+        return round(min(seconds * SECOND, LATEST))
 
     writer = Writer(file)
     writer.start(profile="", library=f"codebotler {__version__}")
@@ -136,7 +138,7 @@ def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema],
 
 def _about(summary: Summary) -> dict[str, str]:
     began = datetime.fromtimestamp(summary.created).astimezone()
-    return {
+    about = {
         "id": summary.id,
         "state": summary.state,
         "reason": summary.reason,
@@ -145,13 +147,14 @@ def _about(summary: Summary) -> dict[str, str]:
         "model": summary.model,
         "began": began.isoformat(timespec="seconds"),
     }
+    return {name: text.encode(errors="backslashreplace").decode() for name, text in about.items()}
 
 
 def export(path: Path, summary: Summary, events: Sequence[Line], clock: Clock) -> None:
-    """Write a mission as an MCAP file, whole or not at all.
+    """Write a mission as an MCAP file, whole or not at all; what is no file, such as a pipe, is written into.
 
     Args:
-        path: the file.
+        path: the file, or a link to it.
         summary: of the mission.
         events: in their order.
         clock: by which the messages are timed.
@@ -159,6 +162,12 @@ def export(path: Path, summary: Summary, events: Sequence[Line], clock: Clock) -
     Raises:
         OSError: it cannot be written.
     """
+    path = path.resolve()
+    if path.exists() and not path.is_file():
+        whole = io.BytesIO()
+        write_mcap(whole, summary, events, clock=clock)
+        path.write_bytes(whole.getvalue())
+        return
     new = path.with_name(f"{path.name}.new")
     try:
         with new.open("wb") as file:

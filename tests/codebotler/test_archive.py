@@ -54,7 +54,7 @@ THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "r
         (
             State.RUNNING,
             [RUNNING, DRIVE, AT, THERE],
-            "the tool died while the robot did nothing; its worker cancelled the goal",
+            "the tool died while the robot did nothing",
         ),
     ],
 )
@@ -97,7 +97,17 @@ def test_missions_come_in_their_order(tmp_path: Path) -> None:
     assert [summary.robot for summary in missions(tmp_path)] == ["b", "a"]
 
 
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"id": 3}', "nonsense", '{"id": "x", "state": "odd"'])
+WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "[]", "{}", '{"id": 3}', "nonsense", '{"id": "x", "state": "odd"', "[" * 100_000),
+        *(json.dumps({**WHOLE, **odd}) for odd in ({"state": "odd"}, {"created": "now"}, {"created": 1e300})),
+        *(json.dumps({**WHOLE, **odd}) for odd in ({"program": 5}, {"problems": [1]}, {"reason": None})),
+    ],
+)
 def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, State.DONE)
     (folder / SUMMARY).write_text(text)
@@ -107,7 +117,11 @@ def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"event": "skill"}', "nonsense", '{"event": 1, "time": 0}']
+    "text",
+    [
+        *("", "[]", "{}", '{"event": "skill"}', "nonsense", '{"event": 1, "time": 0}', "[" * 100_000),
+        *('{"event": "skill", "time": 1, "clock": 1}', '{"event": "log", "time": NaN, "clock": 1}'),
+    ],
 )
 def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, State.DONE, RUNNING)

@@ -17,6 +17,8 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from codebotler.badinput import BadInput
+from codebotler.home import home
 from codebotler.models.recorded import recorded_model
 from processes import are_gone, children_of
 from roboeval.suite import Suite
@@ -305,6 +307,24 @@ def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
         process.stdout = None
         assert process.wait(30) == 1
     assert states(folder) == ["failed"]
+
+
+@pytest.mark.parametrize(("closed", "status"), [("0<&-", 1), ("1>&-", 0), ("2>&-", 0), ("0<&- 1>&- 2>&-", 1)])
+def test_closed_stream_leads_nowhere(folder: Path, closed: str, status: int) -> None:
+    arguments = ("run", "good.py", "--world", "world.yaml", "--speed", "0")
+    process = command(folder, *arguments, wrapper=("sh", "-c", f'exec "$0" "$@" {closed}'))
+    _, err = process.communicate("y\n", timeout=60)
+    assert process.returncode == status
+    assert "Traceback" not in err
+    assert states(folder) == [["done", "stopped"][status]]
+
+
+def test_home_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("CODEBOTLER_HOME", "XDG_STATE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os, "getuid", lambda: 2**31 - 7)
+    with pytest.raises(BadInput, match="nobody knows where your home is; set CODEBOTLER_HOME"):
+        home()
 
 
 # --- missions, robots

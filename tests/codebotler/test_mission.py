@@ -303,6 +303,41 @@ def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
     assert robot.done == []
 
 
+def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Path) -> None:
+    asked, told, has_ended = threading.Event(), threading.Event(), threading.Event()
+
+    class Slow(Answering):
+        def cancel(self) -> None:
+            super().cancel()
+            if not told.is_set():
+                told.set()
+                assert has_ended.wait(30)
+
+    def answer(_skill: str, _first: str) -> Result:
+        asked.set()
+        assert told.wait(30)
+        return None
+
+    def hear(line: Line) -> None:
+        if line.get("state") == "stopped":
+            has_ended.set()
+
+    with (
+        Reservation(Slow(answer), home) as reserved,
+        ready(home) as mission,
+        ThreadPoolExecutor(1) as threads,
+    ):
+        mission.told = hear
+        running = threads.submit(mission.run, reserved)
+        assert asked.wait(30)
+        mission.stop("the test")
+        assert running.result(30) is State.STOPPED
+    assert kinds(mission)[-4:] == ["late", "stop", "stopping", "stopped"]
+    (stop,) = [line for line in events_of(mission.folder) if line["event"] == "stop"]
+    assert stop["by"] == "the test"
+    assert 0 <= stop["seconds_to_cancel"] < 60
+
+
 @pytest.mark.parametrize("result", [None, RobotError("SayMute", "cancelled"), RobotLostError("gone")])
 def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result: Exception | None) -> None:
     asked, may_answer = threading.Event(), threading.Event()
@@ -355,6 +390,32 @@ def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: 
     assert events_of(mission.folder) == before, "what comes after the end is not written"
     assert told == [], "nor told"
     assert robot.done == ["hello"]
+
+
+def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "GRACE", 0.3)
+    may_go_on = threading.Event()
+
+    class Blocked(Answering):
+        def cancel(self) -> None:
+            may_go_on.wait(60)
+
+    def answer(_skill: str, _first: str) -> Result:
+        may_go_on.wait(60)
+        return None
+
+    with (
+        Reservation(Blocked(answer), home) as reserved,
+        ready(home) as mission,
+        ThreadPoolExecutor(1) as threads,
+    ):
+        with running(mission, reserved, "skill"):
+            stopping = threads.submit(mission.stop)
+        assert (mission.summary.state, mission.summary.reason) == ("failed", UNCONFIRMED)
+        may_go_on.set()
+        assert isinstance(stopping.exception(30), MissionError)
 
 
 def test_skill_without_an_end_goes_on_until_the_stop(home: Path) -> None:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +128,30 @@ def test_skill_that_is_not_in_the_table_is_a_note(mission: tuple[Summary, list[L
         file = io.BytesIO()
         write_mcap(file, mission[0], [line], skills=skills)
         assert [found for found, *_ in read(file.getvalue())] == [topic]
+
+
+def test_any_text_and_any_time_can_be_written(mission: tuple[Summary, list[Line]]) -> None:
+    odd = replace(mission[0], instruction="go \udcff there", reason="\ud800", program="say('\ud800')")
+    line: Line = {"time": 1.0, "clock": 1e300, "event": "log", "text": "\ud800"}
+    ((topic, _, message, time),) = read(written((odd, [line]), "robot"))
+    assert (topic, message["text"]) == ("/mission/log", "\ud800")
+    assert time < 2**63
+    (about,) = make_reader(io.BytesIO(written((odd, [line])))).iter_metadata()
+    assert about.metadata["instruction"] == "go \\udcff there"
+
+
+def test_link_and_pipe_stay_what_they_are(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
+    link, pipe = tmp_path / "link.mcap", tmp_path / "pipe"
+    link.symlink_to("mission.mcap")
+    export(link, *mission, "wall")
+    assert link.is_symlink()
+    assert len(read((tmp_path / "mission.mcap").read_bytes())) == len(mission[1])
+    os.mkfifo(pipe)
+    with ThreadPoolExecutor(1) as reader:
+        got = reader.submit(pipe.read_bytes)
+        export(pipe, *mission, "wall")
+        assert len(read(got.result(30))) == len(mission[1])
+    assert pipe.is_fifo()
 
 
 def test_file_is_written_whole_or_not_at_all(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:

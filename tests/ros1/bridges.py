@@ -126,6 +126,8 @@ def like_ros_2(heard: list[dict[str, Any]]) -> Callable[[ServerConnection], None
                     word = next(iter(args.values()), "")
                     if word == "unknown":
                         tell("action_result", id=goal, action=action, values="no such action", result=False)
+                    elif word.startswith("{"):
+                        connection.send(word)
                     elif word != "never":
                         tell("action_feedback", id=goal, action=action, values={"near": "the hall"})
                         status = 6 if word == "abort" else 4

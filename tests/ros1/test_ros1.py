@@ -272,6 +272,20 @@ def test_stop_works_where_the_worker_hangs(graph: Graph) -> None:
     assert isinstance(ended["error"], RobotLostError)
 
 
+def test_stop_works_where_the_worker_hangs_before_it_took_the_goal(graph: Graph) -> None:
+    graph.serve(*SKILLS.rows)
+    robot = graph.robot(waits=Waits(patience=LONG))
+    robot.connect()
+    assert robot._worker is not None
+    os.kill(robot._worker.pid, signal.SIGSTOP)
+    more_than_a_pipe_holds = ("x" * 10_000,) * 20
+    with started(lambda: robot.perform("ask", ["ann", "tea?", more_than_a_pipe_holds])) as ended:
+        while robot._number == 0:
+            time.sleep(0.01)
+        robot.cancel()
+    assert isinstance(ended["error"], RobotLostError)
+
+
 def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
     server = graph.serve(GO_TO)
     robot = graph.robot()

@@ -5,22 +5,26 @@ What concerns ROS 2 is tested against a stand-in for the protocol only: no rosbr
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros import Waits
-from codebotler.robots.ros1 import SCRIPT
 from codebotler.robots.rosbridge import Rosbridge
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS
+from processes import are_gone, children_of
 from ros_graph import GO_TO, SAY, Graph, free_port, started
 
 WAITS = Waits(patience=5.0, silence=1.5, longest=20.0)
@@ -103,6 +107,15 @@ def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: Rosbridge) -
         robot.perform("go_to", ["die"])
 
 
+def test_server_that_sends_no_result_is_noticed(graph: Graph, double: Bridge) -> None:
+    graph.serve(GO_TO)
+    robot = Rosbridge(double.address, waits=Waits(patience=2.0))
+    robot.connect()
+    with pytest.raises(RobotLostError, match="/go_to_server ended the goal, but sent no result within 2 s"):
+        robot.perform("go_to", ["no result"])
+    robot.disconnect()
+
+
 def test_missing_server_is_said(graph: Graph, robot: Rosbridge) -> None:
     graph.serve(GO_TO)
     robot.connect()
@@ -148,42 +161,45 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
 
 
 TOOL = """
-import sys
+import sys, time
 from codebotler.robots.rosbridge import Rosbridge
 robot = Rosbridge(sys.argv[1])
 robot.connect()
-robot.perform("say", ["hello"])
+robot.perform("get_all_rooms", [])
+time.sleep(3)  # the double starts a process for the connection of the guard, which takes its time
 robot.perform("go_to", ["never"])
 """
 
 
 def test_killed_tool_leaves_no_moving_robot(graph: Graph, double: Bridge) -> None:
-    server = graph.serve(GO_TO, SAY)
-    source = str(SCRIPT.parents[2])
-    tool = subprocess.Popen(
+    server = graph.serve(GO_TO, SKILLS["get_all_rooms"])
+    source = str(Path(__file__).parents[2] / "src")
+    process = subprocess.Popen(
         [sys.executable, "-c", TOOL, double.address], env={**os.environ, "PYTHONPATH": source}
     )
-    server.expect("goal", "hello")
+    server.expect("goal", "")
     server.expect("goal", "never")
-    tool.kill()
+    guards = children_of(process.pid)
+    process.kill()
     killed = time.monotonic()
     server.expect("cancel", "never")
     took = time.monotonic() - killed
-    tool.wait()
+    process.wait()
     assert took < 1.0, f"the goal was preempted {took:.2f} s after the tool was killed"
+    assert guards
+    assert are_gone(guards)
 
 
-def test_guard_ends_with_the_connection_and_says_nothing_without_a_goal(graph: Graph, double: Bridge) -> None:
-    server = graph.serve(SAY)
-    robot = Rosbridge(double.address, waits=WAITS)
+def test_guard_of_a_tool_that_leaves_says_nothing(graph: Graph, robot: Rosbridge) -> None:
+    server = graph.serve(GO_TO)
     robot.connect()
-    robot.perform("say", ["hello"])
-    server.expect("goal", "hello")
-    assert robot._guard is not None
-    guard = robot._guard
+    robot.perform("go_to", ["the hall"])
+    guards = children_of(os.getpid())
     robot.disconnect()
-    assert guard.epitaph() == "status 0"
+    server.expect("goal", "the hall")
     assert server.said.empty()
+    assert robot._guard is None
+    assert len(children_of(os.getpid())) < len(guards)
 
 
 def test_no_rosbridge_is_said_with_the_mend() -> None:
@@ -232,6 +248,40 @@ def test_stand_in_for_ros_2_aborts_and_refuses(second: Rosbridge) -> None:
     assert error.value.kind == "GoToInvalidLocation"
     with pytest.raises(RobotLostError, match="no such action"):
         second.perform("go_to", ["unknown"])
+
+
+@pytest.mark.parametrize(
+    "said", ["{nonsense", '{"op": "action_result", "id": 1, "status": []}', '{"op": [' + "[" * 5_000]
+)
+def test_stand_in_for_ros_2_that_talks_nonsense_is_not_lost(second: Rosbridge, said: str) -> None:
+    with pytest.raises(RobotLostError, match="did not end within 2 s"):
+        second.perform("go_to", [said])
+    assert second.perform("ask", ["ann", "tea?", ("yes", "no")]) == "yes"
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        {"op": "publish", "topic": "/else_server/status", "msg": {"status_list": [{}]}},
+        {"op": "publish", "topic": "/say_server/result", "msg": {"status": 5, "result": {}}},
+        {"op": "status", "level": "error", "msg": "\x1b[2Jbad"},
+    ],
+)
+def test_message_that_is_none_is_survived_and_shown_without_what_a_terminal_obeys(
+    message: dict[str, Any],
+) -> None:
+    def handle(connection: ServerConnection) -> None:
+        for _ in connection:
+            connection.send(json.dumps(message))
+
+    with bridge(handle) as double:
+        robot = Rosbridge(double.address, waits=Waits(patience=1.0))
+        robot.connect()
+        with pytest.raises(RobotLostError, match="there is no action server at /say_server") as error:
+            robot.perform("say", ["hello"])
+        assert re.search(r"no message of rosbridge|\\x1b\[2Jbad", error.value.sentence)
+        assert error.value.sentence.isprintable()
+        robot.disconnect()
 
 
 def test_stand_in_for_ros_2_hears_of_a_stop_and_of_what_takes_too_long(

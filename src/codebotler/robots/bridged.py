@@ -34,7 +34,7 @@ class News:
     Args:
         goal: its id; empty if this is about the server as a whole.
         what: `status` (the server is alive, and has taken the goal if there is an id), `feedback` or `ended`.
-        state: how it ended: succeeded, aborted, rejected, cancelled or lost.
+        state: how it ended: succeeded, aborted, rejected, cancelled or lost; a status may tell that before.
         text: the server's words.
         values: the fields of the result.
         server: whose news it is, where that is told.
@@ -77,9 +77,9 @@ class Topics:
         kind = f"{PACKAGE}/{action.type}Action"
         ours = {"goal": f"{kind}Goal", "cancel": "actionlib_msgs/GoalID"}
         theirs = {
-            "status": "actionlib_msgs/GoalStatusArray",
             "result": f"{kind}Result",
             "feedback": f"{kind}Feedback",
+            "status": "actionlib_msgs/GoalStatusArray",  # the last, since who hears it hears the others
         }
         for name, of in ours.items():
             yield {"op": "advertise", "topic": f"{action.server}/{name}", "type": of}
@@ -103,9 +103,10 @@ class Topics:
                 server = topic.rpartition("/")[0]
                 yield News("", "status", server=server)
                 for status in statuses:
-                    goal, is_recalled = status["goal_id"]["id"], status["status"] == RECALLING
-                    what, state = ("ended", "cancelled") if is_recalled else ("status", "")
-                    yield News(goal, what, state, server=server)
+                    goal, now = status["goal_id"]["id"], status["status"]
+                    is_over = now == RECALLING
+                    state = "cancelled" if is_over else ENDS_1.get(now, "")
+                    yield News(goal, "ended" if is_over else "status", state, server=server)
             case {"op": "publish", "msg": {"status": status, "result": dict(values)}}:
                 state = ENDS_1.get(status["status"], "lost")
                 yield News(status["goal_id"]["id"], "ended", state, status["text"], values)

@@ -73,7 +73,7 @@ class RosRobot:
         waits: for how long what is waited for.
     """
 
-    if_tool_dies = "the worker noticed it and cancelled the robot's goal"
+    if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
 
     def __init__(
         self, ros: Ros, skills: SkillTable = SKILLS, speed: float | None = 1.0, waits: Waits | None = None
@@ -125,12 +125,16 @@ class RosRobot:
 
     def cancel(self) -> None:
         """Have the worker cancel the goal; if it cannot, have another one cancel all goals."""
-        with self._order:
+        is_ours = self._order.acquire(timeout=CANCELS)  # a worker that hangs may not even take a long goal
+        try:
             self._stopped = True
             worker = self._worker
             self.clock.stop()
-            if worker is None or worker.cancel(CANCELS):
+            if worker is None or (is_ours and worker.cancel(CANCELS)):
                 return
+        finally:
+            if is_ours:
+                self._order.release()
         self._rescue(worker)
 
     def disconnect(self) -> None:

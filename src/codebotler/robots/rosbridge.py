@@ -12,7 +12,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+
+from websockets.exceptions import ConnectionClosed, WebSocketException
+from websockets.sync.client import ClientConnection, connect
 
 from codebotler.robots.base import (
     Argument,
@@ -25,22 +27,21 @@ from codebotler.robots.base import (
     RobotLostError,
     untold,
 )
-from codebotler.robots.bridge_guard import CLOSES, insist
+from codebotler.robots.bridge_guard import CLOSES, Voice
 from codebotler.robots.bridged import Dialect, Message, News, Operations, Topics
 from codebotler.robots.clock import Clock
 from codebotler.robots.ros import Waits, error_of
 from codebotler.robots.worker import Worker
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, RosAction, Skill, SkillTable
-
-if TYPE_CHECKING:
-    from websockets.sync.client import ClientConnection
+from codebotler.terminal import visible
 
 ADDRESS = "ws://localhost:9090"
 GUARD = Path(__file__).with_name("bridge_guard.py")
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell which ROS it has; one without rosapi cannot
 AGAIN = 0.5  # seconds after which what nobody has taken notice of is said again
+TICK = 0.005  # seconds between two looks whether a server is heard
 TURN = 0.05  # seconds of one turn of waiting
 NOTE = "robots of ROS 2 behind it were only tested against a stand-in for the protocol"
 
@@ -59,7 +60,7 @@ class Rosbridge:
     missing: Mapping[str, str] = MappingProxyType({})
     """It is seen only when a skill is performed."""
 
-    if_tool_dies = "another process noticed it, and cancelled the robot's goal if rosbridge answered"
+    if_tool_dies = "a process beside the tool then cancels the robot's goal, unless it was killed as well"
 
     def __init__(
         self,
@@ -86,7 +87,7 @@ class Rosbridge:
         self.disconnect()
         actions = [skill.ros for skill in self.skills.rows if skill.ros is not None]
         self._line, self._stopped = Line(self.address, actions, self._waits.patience), False
-        start = {"address": self.address, "patience": self._waits.patience}
+        start = {"address": self.address, "opening": _advertised(self._line.dialect, actions)}
         self._guard = Worker(Path(sys.executable), GUARD, start, {"PYTHONSAFEPATH": "1"})
         self.clock.restart()
 
@@ -105,17 +106,22 @@ class Rosbridge:
             if self._stopped:
                 raise CancelledError
             assert self._line is not None, "the robot is not connected"
-            line, goal = self._line, str(uuid.uuid4())
+            assert self._guard is not None
+            line, guard, goal = self._line, self._guard, str(uuid.uuid4())
             self._going = row.ros, goal
+            guard.send({"say": line.dialect.cancel(row.ros, goal)})
             sent = line.dialect.goal(row.ros, goal, arguments)
-            self._tell_guard(_last_words(line.dialect, row.ros, goal))
-            line.send(sent)
         try:
+            self._hold(line, row.ros.server)
+            with self._order:
+                if self._stopped:
+                    raise CancelledError
+                line.send(sent)
             return self._ended(line, row, sent, _Watch(goal, row.ros.server, self._waits), told)
         finally:
             with self._order:
                 self._going = None
-                self._tell_guard([])
+            guard.send({"say": None})
 
     def cancel(self) -> None:
         """Cancel the goal that goes on."""
@@ -136,6 +142,14 @@ class Rosbridge:
         if guard is not None:
             guard.leave()
 
+    def _hold(self, line: Line, server: str) -> None:
+        """Wait until a server is well heard; the result of a goal that is sent before may be lost."""
+        until = time.monotonic() + self._waits.patience
+        while line.dialect.is_heard and server not in line.well_heard and not (line.is_lost or self._stopped):
+            if time.monotonic() > until:
+                raise RobotLostError(line.absent(server))
+            time.sleep(TICK)
+
     def _ended(self, line: Line, skill: Skill, sent: Message, watch: _Watch, told: Feedback) -> Result:
         """Wait for the end of a goal; what nobody takes notice of is said again."""
         while (news := line.news(watch.goal)) is None or news.what != "ended":
@@ -143,6 +157,8 @@ class Rosbridge:
                 told(news.text)
             watch.is_taken = watch.is_taken or news is not None
             now = time.monotonic()
+            if news is not None and news.state and watch.ends is None:
+                watch.ends = now
             if self._stopped and watch.cancelled is None:
                 watch.cancelled = now
             if news is None and line.is_lost:
@@ -166,7 +182,7 @@ class Rosbridge:
             raise CancelledError
         if news.state == "lost":
             raise RobotLostError(
-                f"rosbridge could not have {skill.name} done: {news.text or 'it does not say why'}"
+                f"rosbridge could not have {skill.name} done: {visible(news.text) or 'it does not say why'}"
             )
         if news.state != "succeeded":
             raise error_of(skill, news.text, news.state)
@@ -179,22 +195,18 @@ class Rosbridge:
     def _rescue(self, dialect: Dialect, skill: Skill, goal: str) -> str:
         """Cancel a goal over another connection; what became of that, in words."""
         assert skill.ros is not None
-        where = self.address
-        try:
-            insist(self.address, _last_words(dialect, skill.ros, goal), self._waits.patience)
-        except OSError:
-            return f"the connection with {where} was lost, and its goal goes on: STOP THE ROBOT BY HAND"
-        return f"the connection with {where} was lost; its goal was cancelled over another one"
-
-    def _tell_guard(self, messages: Sequence[Message]) -> None:
-        """Say what is to be said if this process is killed now."""
-        if self._guard is not None:
-            self._guard.send({"say": messages})
+        where, voice = self.address, Voice(self.address, _advertised(dialect, [skill.ros]))
+        is_said = voice.insist(dialect.cancel(skill.ros, goal))
+        voice.close()
+        if is_said:
+            return f"the connection with {where} was lost; its goal was cancelled over another one"
+        return f"the connection with {where} was lost, and its goal goes on: STOP THE ROBOT BY HAND"
 
 
-def _last_words(dialect: Dialect, action: RosAction, goal: str) -> list[Message]:
-    """What is said on a new connection to cancel a goal."""
-    return [*dialect.opening(action), dialect.cancel(action, goal)]
+def _advertised(dialect: Dialect, actions: Sequence[RosAction]) -> list[Message]:
+    """What is said on a connection that only speaks."""
+    opening = (message for action in actions for message in dialect.opening(action))
+    return [message for message in opening if message["op"] == "advertise"]
 
 
 class _Watch:
@@ -212,17 +224,13 @@ class _Watch:
         self.again = self.sent + AGAIN
         self.is_taken = False
         self.cancelled: float | None = None
+        self.ends: float | None = None  # since when only its result is waited for
 
     def fault(self, now: float, line: Line) -> str | None:
         """Why it is not to be waited for any longer."""
         waits, heard = self.waits, line.heard.get(self.server)
         late = now - waits.patience
         faults = (
-            (
-                line.dialect.is_heard and heard is None and self.sent < late,
-                f"there is no action server at {self.server}, or none that rosbridge could reach"
-                + (f" ({line.complaint})" if line.complaint else ""),
-            ),
             (
                 heard is not None and max(heard, self.sent) < now - waits.silence,
                 f"the action server at {self.server} has died: no status for {waits.silence:g} s",
@@ -234,6 +242,10 @@ class _Watch:
             (
                 line.dialect.is_heard and not self.is_taken and self.sent < late,
                 f"{self.server} did not take the goal within {waits.patience:g} s",
+            ),
+            (
+                self.ends is not None and self.ends < late,
+                f"{self.server} ended the goal, but sent no result within {waits.patience:g} s",
             ),
             (
                 self.sent < now - waits.longest,
@@ -256,8 +268,6 @@ class Line:
     """
 
     def __init__(self, address: str, actions: Sequence[RosAction], patience: float) -> None:
-        from websockets.exceptions import WebSocketException  # noqa: PLC0415 - start-up counts
-        from websockets.sync.client import connect  # noqa: PLC0415 - the same
 
         self._opened = ExitStack()
         try:
@@ -271,6 +281,8 @@ class Line:
         self._news: queue.SimpleQueue[News] = queue.SimpleQueue()
         self._version: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._heard: dict[str, float] = {}
+        self.well_heard: set[str] = set()
+        """Servers whose status came twice: by then their results are connected as well."""
         self.is_lost, self.complaint = False, ""
         self.dialect: Dialect = Topics()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -290,10 +302,13 @@ class Line:
         """When the last status of a server came, on a clock that nobody sets."""
         return self._heard
 
+    def absent(self, server: str) -> str:
+        """What to say where a server is not heard."""
+        why = f" ({self.complaint})" if self.complaint else ""
+        return f"there is no action server at {server}, or none that rosbridge could reach{why}"
+
     def send(self, message: Message) -> None:
         """Say something; in vain where the connection is lost."""
-        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - start-up counts
-
         try:
             self._socket.send(json.dumps(message))
         except ConnectionClosed:
@@ -317,14 +332,21 @@ class Line:
         self._reader.join()
 
     def _read(self) -> None:
-        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - start-up counts
 
         try:
             for text in self._socket:
-                self._hear(json.loads(text))
+                self._take(text)
         except ConnectionClosed:
             pass
-        self.is_lost = True
+        finally:
+            self.is_lost = True
+
+    def _take(self, text: str | bytes) -> None:
+        """Hear a message; what is none is remembered, should nothing else come."""
+        try:
+            self._hear(json.loads(text))
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            self.complaint = f"it says what is no message of rosbridge: {visible(repr(text[:100]))}"
 
     def _hear(self, message: Message) -> None:
         match message:
@@ -338,9 +360,11 @@ class Line:
             case {"op": "service_response", "id": "version"}:
                 self._version.put(1)
             case {"op": "status", "level": "error", "msg": str(complaint)}:
-                self.complaint = complaint
+                self.complaint = visible(complaint)
         for news in self.dialect.news(message):
-            if news.server:
+            if news.server and not news.goal:
+                if news.server in self._heard:
+                    self.well_heard.add(news.server)
                 self._heard[news.server] = time.monotonic()
             if news.goal:
                 self._news.put(news)
