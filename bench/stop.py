@@ -1,10 +1,12 @@
 """How long does it take from a stop to the robot?
 
 A mission has the robot drive, and is stopped in the middle of it: by `Mission.stop`, as a page does it, and
-by Ctrl-C at a tool of its own. Printed are the worst of STOPS=50 and the middle one, in milliseconds: until
-the robot was told (`cancel` is called), and until what it did had ended.
+by Ctrl-C at a tool of its own; where pyrobosim is installed, a robot there, too. Printed are the worst of
+STOPS=50 and the middle one, in milliseconds: until the robot was told (`cancel` is called), and until what it
+did had ended.
 """
 
+import importlib.util
 import os
 import signal
 import subprocess
@@ -19,6 +21,7 @@ from statistics import median
 from codebotler.mission import Mission
 from codebotler.missionlog import EVENTS, Line, events_of
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, untold
+from codebotler.robots.pyrobosim import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.world import Room, World
@@ -96,6 +99,34 @@ def by_signal(home: Path) -> Iterator[Times]:
         yield 1000 * told, 1000 * (events["cancelled"]["time"] - start)
 
 
+def by_pyrobosim(home: Path) -> Iterator[Times]:
+    """Stop missions of a robot in pyrobosim, as their events tell."""
+    for _ in range(STOPS):
+        lines: list[Line] = []
+        drives = threading.Event()
+
+        def told(line: Line, lines: list[Line] = lines, drives: threading.Event = drives) -> None:
+            lines.append(line)
+            if line["event"] == "feedback":
+                drives.set()
+
+        with (
+            Reservation(Pyrobosim(WORLD), home) as reserved,
+            Mission(home, "pyrobosim", told=told) as mission,
+        ):
+            mission.draft(PROGRAM)
+            mission.check([])
+            mission.approve()
+            running = threading.Thread(target=mission.run, args=(reserved,))
+            running.start()
+            drives.wait()
+            start = time.time()
+            mission.stop()
+            running.join()
+            times = {line["event"]: line["time"] - start for line in lines}
+            yield 1000 * times["stop"], 1000 * times["cancelled"]
+
+
 def report(name: str, times: Sequence[Times]) -> bool:
     """Print the worst and the middle; whether the worst is as aimed at."""
     told, ended = [time for time, _ in times], [time for _, time in times]
@@ -114,6 +145,8 @@ def main() -> int:
             report("simulated, Mission.stop", list(by_call(Path(folder)))),
             report("simulated, Ctrl-C", list(by_signal(Path(folder)))),
         ]
+        if importlib.util.find_spec("pyrobosim"):
+            hold.append(report("pyrobosim, Mission.stop", list(by_pyrobosim(Path(folder)))))
     print("as aimed at" if all(hold) else "NOT as aimed at")
     return 0 if all(hold) else 1
 

@@ -1,4 +1,4 @@
-"""Where walls, doors and tables stand in a world, so that a robot can drive through it. Importing this is heavy."""
+"""Where walls, doors and tables stand in a world that a robot drives through. Importing this is heavy."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
@@ -14,14 +15,16 @@ from shapely.ops import nearest_points
 
 from codebotler.robots.base import NotReadyError
 from codebotler.world import HALLWAY, ROOM_DEPTH, World, laid_out
-from codebotler.world import Point as XY
+
+XY: TypeAlias = tuple[float, float]
 
 RADIUS = 0.15  # metres, of the robot
 WALL = 0.1  # metres; half of it stands on either side of the edge of a footprint
 DOORS = (0.8, 0.5)  # metres that a passage is wide; the first that fits
-INSIDE = 2 * RADIUS + 0.05  # metres that a passage reaches into a room, so that their free spaces overlap
+DEEP = 0.25  # metres from all walls, where passages begin and end
+BEYOND = 0.1  # metres that they go on there, so that the free spaces of rooms and passages overlap
 STEP = 0.2  # metres between two places where a passage could begin
-LINES = 300  # so many ways to go from one room to another are tried
+LINES = 300  # at most so many ways to go from one room to another are tried
 TABLES = ((1.2, 0.6), (0.8, 0.5), (0.4, 0.4), (0.2, 0.2), (0.1, 0.1))  # metres; the first that fits
 PLACES = 12  # in each direction, where a table could stand
 SLACK = 0.02  # metres by which what touches nothing stays away
@@ -67,9 +70,14 @@ class Table:
 
     @property
     def stands(self) -> list[tuple[float, float, float]]:
-        """Before each of its sides, where the robot can reach it: from the centre, and the angle to look at it."""
+        """Before each side, where the robot can reach it: from the centre, and the angle to look at it."""
         along, across = (side / 2 + RADIUS + SLACK for side in self.size)
-        return [(-along, 0.0, 0.0), (along, 0.0, math.pi), (0.0, -across, math.pi / 2), (0.0, across, -math.pi / 2)]
+        return [
+            (-along, 0.0, 0.0),
+            (along, 0.0, math.pi),
+            (0.0, -across, math.pi / 2),
+            (0.0, across, -math.pi / 2),
+        ]
 
     def cells(self, count: int) -> tuple[list[XY], float]:
         """The middles of at least so many cells of the table, and how wide each is at its narrowest."""
@@ -101,7 +109,8 @@ class Floorplan:
         """What the robot drives around in a room: the corners of its free space that point into it."""
         table = self.tables[number] if number < len(self.tables) else None
         space = orient(_without(_free(self.floors[number]), table))
-        return [corner for ring in (space.exterior, *space.interiors) for corner in _turning_right(ring.coords[:-1])]
+        rings = (space.exterior, *space.interiors)
+        return [corner for ring in rings for corner in _turning_right(ring.coords[:-1])]
 
 
 def planned(world: World) -> Floorplan:
@@ -124,11 +133,11 @@ def planned(world: World) -> Floorplan:
     if along:
         floors.append(_corridor(along))
         wanted.append(floors[-1].centroid)
-    stands = [nearest_points(_free(floor, SLACK), point)[0] for floor, point in zip(floors, wanted, strict=True)]
+    stands = [nearest_points(_free(f, SLACK), point)[0] for f, point in zip(floors, wanted, strict=True)]
     passages = _passages(floors, stands)
-    tables: list[Table | None] = [None] * len(rooms)
-    if any(room.objects for room in rooms):
-        tables = [_table(floors[n], [stands[n], *(p.area for p in passages if n in p.ends)]) for n in range(len(rooms))]
+    clear = [[stand, *(p.area for p in passages if n in p.ends)] for n, stand in enumerate(stands)]
+    are_wanted = any(room.objects for room in rooms)
+    tables = [_table(floors[n], clear[n]) if are_wanted else None for n in range(len(rooms))]
     for room, table in zip(rooms, tables, strict=True):
         if room.objects and table is None:
             raise NotReadyError(f'no table has room in "{room.name}", but objects lie there; make it larger')
@@ -142,11 +151,11 @@ def _floor(name: str, footprint: Sequence[XY]) -> Polygon:
     """A room within its walls."""
     outer = Polygon(footprint)
     floor = _smaller(outer, WALL / 2) if outer.is_valid else Polygon()
-    free = _smaller(floor, RADIUS + SLACK)
-    if floor.geom_type != "Polygon" or free.geom_type != "Polygon" or free.is_empty:
+    passable = _smaller(floor, DEEP)
+    if floor.geom_type != "Polygon" or passable.geom_type != "Polygon" or passable.is_empty:
         raise NotReadyError(
-            f'a robot cannot stand everywhere in "{name}"; its footprint must be more than '
-            f"{WALL + 2 * (RADIUS + SLACK):g} m wide at each place, and its edges must not cross"
+            f'the robot cannot pass everywhere in "{name}"; its footprint must be more than '
+            f"{WALL + 2 * DEEP:g} m wide at each place, and its edges must not cross"
         )
     return floor
 
@@ -184,11 +193,13 @@ def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passag
     """Join what is nearest, until all can be reached, or nothing more can be joined."""
     joined = list(range(len(floors)))
     found: list[Passage] = []
-    corridor_first = [
-        (round(floors[a].distance(floors[b]), 3), -b, a) for a, b in itertools.combinations(range(len(floors)), 2)
-    ]
-    for _, negative, a in sorted(corridor_first):
-        b = -negative
+
+    def distance(pair: tuple[int, int]) -> tuple[float, int]:
+        """Of those that are as near, the corridor comes first, which is the last of the floors."""
+        first, second = pair
+        return round(floors[first].distance(floors[second]), 3), -second
+
+    for a, b in sorted(itertools.combinations(range(len(floors)), 2), key=distance):
         passage = _passage((a, b), floors, stands, found) if joined[a] != joined[b] else None
         if passage is not None:
             found.append(passage)
@@ -199,7 +210,7 @@ def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passag
 def _passage(
     ends: tuple[int, int], floors: Sequence[Polygon], stands: Sequence[Point], others: Sequence[Passage]
 ) -> Passage | None:
-    """The shortest way between two rooms that crosses no wall of others; of those the nearest to both stands."""
+    """The shortest way between two rooms that crosses no others, and of those the nearest to both stands."""
     first, second = (floors[end] for end in ends)
     obstacles = [floor.buffer(WALL / 2) for n, floor in enumerate(floors) if n not in ends]
     obstacles += [passage.area.buffer(WALL / 2) for passage in others]
@@ -208,22 +219,23 @@ def _passage(
         _lines(first, second),
         key=lambda line: (round(line.length, 1), sum(line.distance(stands[end]) for end in ends)),
     )
-    for width, line in itertools.product(DOORS, lines[:LINES]):
+    free = shapely.union_all([_free(first), _free(second)])
+    for width, line in itertools.product(DOORS, lines):
         passage = Passage(ends, line, width)
-        space = shapely.union_all([_free(first), _free(second), _smaller(passage.area, RADIUS)])
-        if space.buffer(1e-6).covers(line) and passage.area.disjoint(in_the_way):
+        space = free.union(_smaller(passage.area, RADIUS)).buffer(1e-6)
+        if space.covers(line) and passage.area.disjoint(in_the_way):
             return passage
     return None
 
 
 def _lines(first: Polygon, second: Polygon) -> Iterator[LineString]:
     """Straight ways from within one floor to within the other."""
-    edge = first.exterior
+    edge, other = _smaller(first, DEEP).exterior, _smaller(second, DEEP)
     count = min(LINES, max(4, math.ceil(edge.length / STEP)))
     for number in range(count):
-        start, end = nearest_points(edge.interpolate((number + 0.5) * edge.length / count), second)
-        length = start.distance(end)
-        dx, dy = ((end.x - start.x) / length * INSIDE, (end.y - start.y) / length * INSIDE)
+        start, end = nearest_points(edge.interpolate((number + 0.5) * edge.length / count), other)
+        share = BEYOND / start.distance(end)
+        dx, dy = (end.x - start.x) * share, (end.y - start.y) * share
         yield LineString([(start.x - dx, start.y - dy), (end.x + dx, end.y + dy)])
 
 
@@ -233,10 +245,11 @@ def _lines(first: Polygon, second: Polygon) -> Iterator[LineString]:
 def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> Table | None:
     """The largest table that fits, as far as can be from where the robot stops and passes."""
     left, low, right, high = floor.bounds
+    width, depth = (right - left) / PLACES, (high - low) / PLACES
     clear = shapely.union_all(keep_clear)
     for size in TABLES:
         places = [
-            Table((left + (i + 0.5) * (right - left) / PLACES, low + (j + 0.5) * (high - low) / PLACES), turned)
+            Table((left + (i + 0.5) * width, low + (j + 0.5) * depth), turned)
             for turned in dict.fromkeys((size, size[::-1]))
             for i, j in itertools.product(range(PLACES), repeat=2)
         ]

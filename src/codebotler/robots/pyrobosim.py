@@ -1,4 +1,4 @@
-"""A robot in pyrobosim, a simulator that roboticists know: it plans its ways around walls and tables, and drives them.
+"""A robot in pyrobosim, a simulator that roboticists know: it plans its ways around walls, and drives them.
 
 People, and what they answer, are those of the world file, as with the simulated robot.
 """

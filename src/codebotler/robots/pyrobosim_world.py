@@ -1,4 +1,4 @@
-"""A world of ours as pyrobosim has it, with a robot that plans its way and drives it. Importing this is heavy."""
+"""A world of ours as pyrobosim has it, with a robot that plans and drives. Importing this is heavy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from shapely.geometry import LineString
 
 from codebotler.robots.base import CancelledError, Feedback, untold
 from codebotler.robots.clock import Clock
-from codebotler.robots.floorplan import RADIUS, WALL, Floorplan, Table, planned
+from codebotler.robots.floorplan import RADIUS, Floorplan, Table, planned
 from codebotler.robots.scripted import METRES_PER_SECOND, SECONDS, TELLS_EVERY
 from codebotler.simulator.robot import RobotError
 from codebotler.world import World
@@ -38,7 +38,7 @@ T = TypeVar("T")
 class Stage:
     """A world of pyrobosim with a robot in it.
 
-    What is random in pyrobosim is never used: objects lie in cells of tables, and ways are planned on a graph.
+    Nothing random of pyrobosim is used: objects lie in cells of tables, and ways are planned on a graph.
 
     Args:
         world: as it is at the start.
@@ -153,11 +153,12 @@ class Stage:
 
     def _built(self, plan: Floorplan) -> list[Room]:
         """The rooms, with passages between them."""
-        walls = WALL / 4  # around the floor; more than that stands free between floors
+        walls = 0.001  # metres around a floor, where pyrobosim takes nothing else; the plan has left more
         floors = []
         for number, floor in enumerate(plan.floors):
             corners = list(floor.exterior.coords)
-            floors.append(_made(self._world.add_room(name=f"floor{number}", footprint=corners, wall_width=walls)))
+            added = self._world.add_room(name=f"floor{number}", footprint=corners, wall_width=walls)
+            floors.append(_made(added))
         for passage in plan.passages:
             start, end = (floors[number] for number in passage.ends)
             hallway = self._world.add_hallway(
@@ -225,24 +226,28 @@ class Motor(PathExecutor):
 
     def __init__(self, clock: Clock) -> None:
         super().__init__()
-        self.clock, self.told = clock, untold
+        self.clock = clock
+        self.told: Feedback = untold
 
-    def execute(self, path: Path, realtime_factor: float = 1.0, battery_usage: float = 0.0) -> ExecutionResult:  # noqa: ARG002 - the clock has a speed, and no battery is simulated
-        """Drive along a path to its end, or until the clock is stopped."""
+    def execute(self, path: Path, *_: float, **__: float) -> ExecutionResult:
+        """Drive along a path to its end, or until the clock is stopped; the clock has the speed."""
         way = get_constant_speed_trajectory(path, METRES_PER_SECOND, RADIANS_PER_SECOND)
+        corners = [float(corner) for corner in way.t_pts]
+        moment, told, tells = -1.0, "", 0.0
         self.following_path = True
-        moment, ends, told, tells = -1.0, float(way.t_pts[-1]), "", 0.0
-        for moment in self._moments([float(time) for time in way.t_pts]):
+        for moment in self._moments(corners):
             pose = _pose_at(way, moment)
             self.robot.set_pose(pose)
             if self.robot.manipulated_object is not None:
                 self.robot.manipulated_object.set_pose(_pose_at(way, moment))
             phrase, now = f"at ({pose.x:.1f}, {pose.y:.1f})", time.monotonic()
-            if phrase != told and (moment >= ends or self.clock.speed is None or now >= tells):
+            is_due = now >= tells or moment >= corners[-1] or self.clock.speed is None
+            if is_due and phrase != told:
                 self.told(phrase)
                 told, tells = phrase, now + TELLS_EVERY
         self.following_path = False
-        return ExecutionResult(ExecutionStatus.SUCCESS if moment >= ends else ExecutionStatus.CANCELED, "")
+        arrived = moment >= corners[-1]
+        return ExecutionResult(ExecutionStatus.SUCCESS if arrived else ExecutionStatus.CANCELED)
 
     def _moments(self, corners: list[float]) -> Iterator[float]:
         """Seconds since the beginning of a drive, each when it has come, until its end or a stop.
@@ -278,7 +283,7 @@ def _pose_at(way: Trajectory, moment: float) -> Pose:
 
 
 def _made(made: T | None) -> T:
-    """What pyrobosim has added; it says None for what it does not take, and the plan has nothing of the kind."""
+    """What pyrobosim has added; None is what it does not take, of which the plan has nothing."""
     assert made is not None, "pyrobosim does not take a part of the plan"
     return made
 

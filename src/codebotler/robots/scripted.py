@@ -1,4 +1,4 @@
-"""What robots in worlds of our own have in common: how long skills take, and people who answer as is written."""
+"""What robots in worlds of ours have in common: how long skills take, and how the simulator answers."""
 
 from __future__ import annotations
 
