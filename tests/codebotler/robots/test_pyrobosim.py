@@ -191,6 +191,22 @@ def test_robot_drives_to_the_table_for_it() -> None:
     assert told[-1] == told[0]
 
 
+def test_pyrobosim_is_who_knows() -> None:
+    robot = connected()
+    robot.perform("go_to", ["lab"])
+    stage = robot._stage
+    assert stage is not None
+    stage.robot.battery_level = 0.0
+    with pytest.raises(RobotError, match="the robot cannot pick up \"laser\": Out of battery") as error:
+        robot.perform("pick", ["laser"])
+    assert error.value.kind == "PickFailed"
+    assert robot.perform("is_in_room", ["laser"]) is True, "it was not taken"
+    stage.robot.battery_level = 100.0
+    robot.perform("pick", ["laser"])
+    stage.robot.set_pose(stage._pose("study"))
+    assert robot.perform("get_current_location", []) == "study"
+
+
 def test_many_objects_find_a_place() -> None:
     footprint: tuple[Point, ...] = ((0, 0), (1.5, 0), (1.5, 1.5), (0, 1.5))
     crowd = tuple(f"thing {number}" for number in range(60))
