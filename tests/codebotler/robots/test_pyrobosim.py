@@ -197,7 +197,7 @@ def test_pyrobosim_is_who_knows() -> None:
     stage = robot._stage
     assert stage is not None
     stage.robot.battery_level = 0.0
-    with pytest.raises(RobotError, match="the robot cannot pick up \"laser\": Out of battery") as error:
+    with pytest.raises(RobotError, match='the robot cannot pick up "laser": Out of battery') as error:
         robot.perform("pick", ["laser"])
     assert error.value.kind == "PickFailed"
     assert robot.perform("is_in_room", ["laser"]) is True, "it was not taken"
