@@ -2,13 +2,15 @@
 # installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
 # `make test-transformers` tests models that run on this machine, with a Python for which there is a torch (3.11);
-# it makes an environment of its own, since nothing else needs so much. `make test-faults` asks a server that fails
+# it makes an environment of its own, since nothing else needs so much. `make test-pyrobosim` tests the robot in
+# pyrobosim, in an environment of its own, too. `make test-faults` asks a server that fails
 # one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing).
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
 TORCH_VENV ?= .venv-transformers
+PYROBOSIM_VENV ?= .venv-pyrobosim
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -19,7 +21,7 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo test test-ros1 test-transformers test-faults fuzz lint bench clean
+.PHONY: demo test test-ros1 test-transformers test-pyrobosim test-faults fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -36,13 +38,17 @@ demo: $(VENV)/installed
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --ignore tests/ros1 \
-		--ignore tests/codebotler/models/test_local.py $(TESTS)
+		--ignore tests/codebotler/models/test_local.py \
+		--ignore tests/codebotler/robots/test_pyrobosim.py $(TESTS)
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py
+
+test-pyrobosim: $(PYROBOSIM_VENV)/tested
+	$(PYROBOSIM_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py
 
 test-faults: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m
@@ -92,10 +98,18 @@ $(TORCH_VENV)/tested: $(SOURCES) constraints-transformers.txt
 		--constraint constraints-transformers.txt "$(PACKAGE)[transformers]" --group test | { $(DOTS); }
 	@touch $@
 
+$(PYROBOSIM_VENV)/tested: $(SOURCES) constraints-pyrobosim.txt
+	@echo "making an environment with pyrobosim in $(PYROBOSIM_VENV), which takes a minute"
+	@$(PYTHON) -m venv --clear $(PYROBOSIM_VENV)
+	@$(PYROBOSIM_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(PYROBOSIM_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
+		--constraint constraints-pyrobosim.txt "$(PACKAGE)[pyrobosim]" --group test | { $(DOTS); }
+	@touch $@
+
 $(VENV)/linted: $(VENV)/tested
 	@printf "installing what linters need "
 	@$(PIP) install --constraint constraints.txt --group lint | { $(DOTS); }
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(TORCH_VENV) dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

@@ -20,8 +20,9 @@ from statistics import median
 
 from codebotler.mission import Mission
 from codebotler.missionlog import EVENTS, Line, events_of
-from codebotler.robots import ros1
+from codebotler.robots import pyrobosim, ros1
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, untold
+from codebotler.robots.pyrobosim import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros1 import Ros1
 from codebotler.robots.simulated import Simulated
@@ -80,7 +81,7 @@ def by_ros1(home: Path) -> Iterator[Times]:
         for _ in range(STOPS):
             server.drives.clear()
             start = stopped(Ros1(server.address), home, server.drives)
-            yield 1000 * (server.heard - start), 1000 * (time.perf_counter() - start)
+            yield 1000 * (server.heard - start), 1000 * (server.ended - start)
     finally:
         server.stop()
 
@@ -92,7 +93,7 @@ class Server(VirtualRobot):
         port: of the ROS master.
     """
 
-    heard = 0.0
+    heard = ended = 0.0
 
     def __init__(self, port: int) -> None:
         super().__init__(WORLD, port=port, told=self._note)
@@ -101,6 +102,8 @@ class Server(VirtualRobot):
     def _note(self, what: str) -> None:
         if what.startswith("go_to"):
             self.drives.set()
+        else:
+            self.ended = time.perf_counter()
 
     def _cancel(self, number: str) -> None:
         self.heard = time.perf_counter()
@@ -155,6 +158,24 @@ def by_signal(home: Path) -> Iterator[Times]:
         yield 1000 * told, 1000 * (events["cancelled"]["time"] - start)
 
 
+def by_pyrobosim(home: Path) -> Iterator[Times]:
+    """Stop missions of a robot in pyrobosim, as their events tell."""
+    for _ in range(STOPS):
+        lines: list[Line] = []
+        drives = threading.Event()
+
+        def told(line: Line, lines: list[Line] = lines, drives: threading.Event = drives) -> None:
+            lines.append(line)
+            if line["event"] == "feedback":
+                drives.set()
+
+        stopped(Pyrobosim(WORLD), home, drives, told)
+        times = {line["event"]: line for line in lines}
+        told_after = times["stop"]["seconds_to_cancel"]
+        asked = times["stop"]["time"] - told_after
+        yield 1000 * told_after, 1000 * (times["cancelled"]["time"] - asked)
+
+
 def report(name: str, times: Sequence[Times]) -> bool:
     """Print the worst and the middle; whether the worst is as aimed at."""
     told, ended = [time for time, _ in times], [time for _, time in times]
@@ -174,10 +195,11 @@ def main() -> int:
             report("simulated, Mission.stop", list(by_call(home))),
             report("simulated, Ctrl-C", list(by_signal(home))),
         ]
-        if ros1.readiness().works:
-            hold.append(report("ros1, Mission.stop", list(by_ros1(home))))
-        else:
-            print("ros1: there is none here")
+        for name, module, rows in (("ros1", ros1, by_ros1), ("pyrobosim", pyrobosim, by_pyrobosim)):
+            if module.readiness().works:
+                hold.append(report(f"{name}, Mission.stop", list(rows(home))))
+            else:
+                print(f"{name}: there is none here")
     print("as aimed at" if all(hold) else "NOT as aimed at")
     return 0 if all(hold) else 1
 

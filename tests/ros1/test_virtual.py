@@ -17,7 +17,7 @@ from codebotler.live import LiveRobot
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros1 import Ros1
-from codebotler.robots.simulated import AS_WRITTEN
+from codebotler.robots.scripted import AS_WRITTEN
 from codebotler.robots.virtual import VirtualRobot
 from codebotler.simulator.engine import run
 from codebotler.simulator.lane import Lane

@@ -9,19 +9,10 @@ from types import MappingProxyType
 from codebotler.badinput import BadInput
 from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Readiness, Result, untold
 from codebotler.robots.clock import Clock
+from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY, performed
 from codebotler.simulator.robot import SimulatedRobot, resolve_room
-from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.skills import SKILLS, SkillTable
-from codebotler.trace import Option
 from codebotler.world import World, laid_out
-
-AS_WRITTEN = Rules(literals="as-written", limits=ENDLESS)
-METRES_PER_SECOND = 0.5
-SECONDS: Mapping[str, float] = {"is_in_room": 1.0, "say": 1.0, "ask": 3.0, "pick": 5.0, "place": 3.0}
-"""How long skills take by the robot's clock; driving takes its time by the way, what is not here none."""
-
-TELLS_EVERY = 0.25
-"""Real seconds from one feedback to the next."""
 
 
 class Simulated:
@@ -73,17 +64,12 @@ class Simulated:
             CancelledError: the robot was stopped.
         """
         assert self._robot is not None, "the robot is not connected"
-        asked = tuple(a if isinstance(a, str) else tuple(map(Option, a)) for a in arguments)
         self._wait(0.0)
         if skill == "go_to":
-            self._drive(self._robot, str(asked[0]), told)
+            self._drive(self._robot, str(arguments[0]), told)
         else:
             self._wait(SECONDS.get(skill, 0.0))
-        result = self._robot.perform(skill, asked)
-        if isinstance(result, int) and not isinstance(result, bool):
-            (options,) = (a for a in asked if not isinstance(a, str))
-            return options[result].text
-        return result
+        return performed(self._robot, skill, arguments)
 
     def cancel(self) -> None:
         """Stop at once."""

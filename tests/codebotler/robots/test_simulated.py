@@ -10,7 +10,8 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.robots.base import CancelledError, Options, Robot
 from codebotler.robots.open import all_readiness, open_robot
-from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
+from codebotler.robots.scripted import METRES_PER_SECOND
+from codebotler.robots.simulated import Simulated
 from codebotler.simulator.robot import RobotError
 from codebotler.world import Person, Room, World
 

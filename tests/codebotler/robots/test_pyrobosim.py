@@ -1,0 +1,469 @@
+"""The robot in pyrobosim drives around walls, carries objects, and ends with the simulator's traces."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from codebotler.live import LiveRobot
+from codebotler.models.recorded import recorded_model
+from codebotler.robots.base import CancelledError, NotReadyError
+from codebotler.robots.open import all_readiness
+from codebotler.robots.pyrobosim import Pyrobosim
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY
+from codebotler.simulator.engine import run
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import RobotError
+from codebotler.world import Person, Point, Room, World
+from roboeval.suite import Suite
+
+REASON = "pyrobosim is not installed; `make test-pyrobosim` has it"
+pytest.importorskip("pyrobosim", reason=REASON)
+LineString = pytest.importorskip("shapely.geometry", reason=REASON).LineString
+
+WORLD = World(
+    (
+        Room("hall"),
+        Room("kitchen", ("cup", "mug", "mug"), (Person("ann", ("yes",)),)),
+        Room("study"),
+        Room("lab", (r"laser\b",)),
+    ),
+    "hall",
+)
+L_SHAPED: tuple[Point, ...] = ((0, 0), (4, 0), (4, 2), (2, 2), (2, 4), (0, 4))
+SMALL: tuple[Point, ...] = ((5, 0), (5.7, 0), (5.7, 0.7), (5, 0.7))
+MEASURED = World(
+    (
+        Room("hall", footprint=L_SHAPED, stand_at=(3.0, 1.0)),
+        Room("kitchen", ("mug",), footprint=((2, 2), (4, 2), (4, 4), (2, 4)), stand_at=(4.0, 4.0)),
+        Room("shed", footprint=((8, 0), (10, 0), (10, 4), (8, 4))),
+    ),
+    "hall",
+)
+
+
+def connected(world: World = WORLD, speed: float | None = None) -> Pyrobosim:
+    robot = Pyrobosim(world, speed=speed)
+    robot.connect()
+    return robot
+
+
+def places(told: Sequence[str]) -> list[Point]:
+    read = (phrase.removeprefix("at (").removesuffix(")").split(", ") for phrase in told)
+    return [(float(x), float(y)) for x, y in read]
+
+
+def position(robot: Pyrobosim) -> Point:
+    assert robot._stage is not None
+    pose = robot._stage.robot.get_pose()
+    return pose.x, pose.y
+
+
+def lying(robot: Pyrobosim) -> dict[str, list[str]]:
+    """What lies where, as pyrobosim has it."""
+    assert robot._stage is not None
+    rooms = {room.name: robot._stage.lying_in(room.name) for room in robot._world.rooms}
+    return {name: [robot._things[body].label for body in bodies] for name, bodies in rooms.items() if bodies}
+
+
+@pytest.fixture(scope="module")
+def lane() -> Iterator[Lane]:
+    lane = Lane()
+    yield lane
+    lane.close()
+
+
+# --- the same as in the simulator
+
+
+def test_reference_programs_leave_the_simulators_traces(paper: Suite, lane: Lane) -> None:
+    model = recorded_model("recorded:careful")
+    tasks = [
+        (task.name, model.reply(task.prompts[0], 0).program, scenario.world)
+        for task in paper.tasks.values()
+        for scenario in task.scenarios
+        if not scenario.world.may_wait_forever
+    ]
+    pairs = [(program, world) for _, program, world in tasks]
+    expected = list(run(pairs, workers=1, rules=AS_WRITTEN))
+    manipulating = set()
+    for (name, program, world), outcome in zip(tasks, expected, strict=True):
+        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=AS_WRITTEN.clock_starts)
+        found = lane.run_live(program, robot)
+        assert (found.status, found.error) == (outcome.status, outcome.error), name
+        assert found.trace == outcome.trace, name
+        manipulating |= (
+            {name} if {"goto", "pick", "place"} <= {event.kind for event in found.trace} else set()
+        )
+    assert len({name for name, _, _ in tasks}) == 16
+    assert {"GetDrink", "MailDelivery", "StaplerDelivery"} <= manipulating
+
+
+@pytest.mark.parametrize(
+    ("room", "calls", "kind"),
+    [
+        ("hall", [("go_to", "cellar")], "GoToInvalidLocation"),
+        ("hall", [("pick", "mug")], "PickInvalidObject"),
+        ("kitchen", [("pick", "kettle")], "PickInvalidObject"),
+        ("kitchen", [("pick", "mug"), ("pick", "cup")], "PickWhileHolding"),
+        ("kitchen", [("place", "mug")], "PlaceNoObject"),
+        ("kitchen", [("pick", "the mug"), ("place", "mug")], "PlaceNoObject"),
+        ("hall", [("ask", "ann", "Tea?", ("Yes",))], "AskNoPerson"),
+        ("kitchen", [("ask", "ann", "Tea?", ())], "AskEmptyOptions"),
+        ("kitchen", [("ask", "ann", "Tea?", ("Never",))], "AskInvalidOptions"),
+    ],
+)
+def test_errors_are_those_of_the_simulator(room: str, calls: list[tuple[str, ...]], kind: str) -> None:
+    robot = connected()
+    robot.perform("go_to", [room])
+    *before, (skill, *arguments) = calls
+    for earlier, *given in before:
+        robot.perform(earlier, given)
+    at = position(robot)
+    with pytest.raises(RobotError) as error:
+        robot.perform(skill, arguments)
+    assert error.value.kind == kind
+    assert position(robot) == at
+
+
+def test_people_answer_as_the_world_file_says() -> None:
+    robot = connected()
+    assert robot.perform("get_all_rooms", []) == ["hall", "kitchen", "study", "lab"]
+    assert robot.perform("is_in_room", ["ann"]) is False
+    robot.perform("go_to", ["Kitchen"])
+    assert robot.perform("get_current_location", []) == "kitchen"
+    assert robot.perform("is_in_room", ["ann"]) is True
+    assert robot.perform("ask", ["ann", "Tea?", ("No", "Yes")]) == "Yes"
+    assert robot.perform("say", ["hello"]) is None
+
+
+# --- objects
+
+
+def test_objects_lie_where_they_were_put() -> None:
+    robot = connected()
+    assert lying(robot) == {"kitchen": ["cup", "mug", "mug"], "lab": [r"laser\b"]}
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("pick", ["the mug"])
+    assert lying(robot)["kitchen"] == ["cup", "mug"]
+    robot.perform("go_to", ["study"])
+    assert robot.perform("is_in_room", ["mug"]) is False
+    robot.perform("place", ["the mug"])
+    assert robot.perform("is_in_room", ["go and get the mug"]) is True
+    robot.perform("go_to", ["lab"])
+    robot.perform("pick", ["laser"])
+    robot.perform("place", ["laser"])
+    assert lying(robot) == {"kitchen": ["cup", "mug"], "study": ["the mug"], "lab": ["laser"]}
+    robot.perform("pick", ["laser"])
+
+
+def test_what_is_held_moves_with_the_robot() -> None:
+    robot = connected()
+    robot.perform("go_to", ["lab"])
+    robot.perform("pick", ["laser"])
+    robot.perform("go_to", ["hall"])
+    assert robot._stage is not None
+    held = robot._stage.held
+    assert held is not None
+    assert (held.pose.x, held.pose.y) == position(robot)
+
+
+def test_robot_drives_to_the_table_for_it() -> None:
+    robot, told = connected(), list[str]()
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("pick", ["mug"], told.append)
+    assert len(told) >= 2
+    assert robot.perform("get_current_location", []) == "kitchen"
+    robot.perform("go_to", ["kitchen"], told.append)
+    assert told[-1] == told[0]
+
+
+def test_pyrobosim_is_who_knows() -> None:
+    robot = connected()
+    robot.perform("go_to", ["lab"])
+    stage = robot._stage
+    assert stage is not None
+    stage.robot.battery_level = 0.0
+    with pytest.raises(RobotError, match='the robot cannot pick up "laser": Out of battery') as error:
+        robot.perform("pick", ["laser"])
+    assert error.value.kind == "PickFailed"
+    assert robot.perform("is_in_room", ["laser"]) is True, "it was not taken"
+    stage.robot.battery_level = 100.0
+    robot.perform("pick", ["laser"])
+    stage.robot.set_pose(stage._pose("study"))
+    assert robot.perform("get_current_location", []) == "study"
+
+
+def test_many_objects_find_a_place() -> None:
+    footprint: tuple[Point, ...] = ((0, 0), (1.5, 0), (1.5, 1.5), (0, 1.5))
+    crowd = tuple(f"thing {number}" for number in range(60))
+    robot = connected(World((Room("store", crowd, (), footprint), Room("hall")), "store"))
+    for thing in crowd:
+        robot.perform("pick", [thing])
+        robot.perform("go_to", ["hall"])
+        robot.perform("place", [thing])
+        robot.perform("go_to", ["store"])
+    assert lying(robot) == {"hall": list(crowd)}
+
+
+# --- ways
+
+
+def goes_through_no_wall(robot: Pyrobosim, way: Sequence[Point]) -> bool:
+    assert robot._stage is not None
+    return bool(robot._stage._world.total_internal_polygon.buffer(0.1).covers(LineString(way)))
+
+
+def test_it_drives_around_walls_and_takes_its_time() -> None:
+    robot, told = connected(), list[str]()
+    start = position(robot)
+    robot.perform("go_to", ["study"], told.append)
+    way = [start, *places(told)]
+    assert way[-1] == pytest.approx(position(robot), abs=0.05)
+    assert goes_through_no_wall(robot, way)
+    assert not goes_through_no_wall(robot, [way[0], way[-1]])
+    length = sum(math.dist(a, b) for a, b in itertools.pairwise(way))
+    assert length / METRES_PER_SECOND - 1 < robot.clock.now < 2 * length / METRES_PER_SECOND
+    now = robot.clock.now
+    robot.perform("say", ["hello"])
+    assert robot.clock.now == now + SECONDS["say"]
+
+
+def test_feedback_tells_places_on_the_way() -> None:
+    robot, told = connected(speed=10), list[str]()
+    began = time.monotonic()
+    robot.perform("go_to", ["study"], told.append)
+    assert len(told) <= 2 + (time.monotonic() - began) / TELLS_EVERY
+    assert len(places(told)) >= 3
+    assert robot.clock.now == pytest.approx(10 * (time.monotonic() - began), rel=0.5)
+
+
+def test_measured_rooms_are_where_they_are_and_all_can_be_reached() -> None:
+    robot, told = connected(MEASURED), list[str]()
+    assert position(robot) == pytest.approx((3.0, 1.0))
+    for room, corner in (("kitchen", (4.0, 4.0)), ("shed", (9.0, 2.0)), ("hall", (3.0, 1.0))):
+        robot.perform("go_to", [room], told.append)
+        assert robot.perform("get_current_location", []) == room
+        assert math.dist(position(robot), corner) < 0.5, "not in the wall, but near"
+    assert goes_through_no_wall(robot, [(3.0, 1.0), *places(told)])
+
+
+def test_closed_door_is_an_error_and_nothing_has_moved() -> None:
+    robot = connected()
+    at, stage = position(robot), robot._stage
+    assert stage is not None
+    for hallway in stage._world.hallways:
+        stage._world.close_location(hallway)
+    stage.robot.reset_path_planner()
+    with pytest.raises(RobotError) as error:
+        robot.perform("go_to", ["kitchen"])
+    assert error.value.kind == "GoToInvalidLocation"
+    assert str(error.value) == 'the robot cannot drive to "kitchen": Failed to plan a path.'
+    assert (position(robot), robot.perform("get_current_location", [])) == (at, "hall")
+
+
+@pytest.mark.parametrize(
+    ("room", "sentence"),
+    [
+        (Room("b", footprint=((1, 1), (5, 1), (5, 5), (1, 5))), 'the rooms "a" and "b" overlap'),
+        (Room("b", footprint=((5, 0), (9, 0), (9, 0.5), (5, 0.5))), 'cannot pass everywhere in "b"'),
+        (Room("b", footprint=((5, 0), (9, 4), (9, 0), (5, 4))), "its edges must not cross"),
+        (Room("b", ("mug",), footprint=SMALL), 'no table has room in "b"'),
+    ],
+)
+def test_rooms_that_cannot_be_are_said(room: Room, sentence: str) -> None:
+    first = Room("a", footprint=((0, 0), (4, 0), (4, 4), (0, 4)))
+    robot = Pyrobosim(World((first, room), "a"))
+    with pytest.raises(NotReadyError, match=sentence):
+        robot.connect()
+    robot.disconnect()
+
+
+def test_nothing_can_be_put_down_where_no_table_has_room() -> None:
+    first = Room("a", ("mug",), footprint=((0, 0), (4, 0), (4, 4), (0, 4)))
+    robot = connected(World((first, Room("b", footprint=SMALL)), "a"))
+    robot.perform("pick", ["mug"])
+    robot.perform("go_to", ["b"])
+    with pytest.raises(RobotError, match='no table has room in "b"') as error:
+        robot.perform("place", ["mug"])
+    assert error.value.kind == "PlaceFailed"
+    robot.perform("go_to", ["a"])
+    robot.perform("place", ["mug"])
+
+
+PLAN = """
+import json, sys, threading
+seen = []
+watched = ("socket.", "subprocess.", "os.posix_spawn", "webbrowser.")
+sys.addaudithook(lambda event, _: event.startswith(watched) and seen.append(event))
+import numpy
+before = numpy.random.get_state()[1].tolist()
+from codebotler.robots.pyrobosim import Pyrobosim
+from codebotler.world import World
+from pathlib import Path
+robot = Pyrobosim(World.read(Path(sys.argv[1])), speed=None)
+robot.connect()
+ways = []
+for skill, argument in (("go_to", "kitchen"), ("pick", "mug"), ("go_to", "study"), ("place", "mug")):
+    robot.perform(skill, [argument], ways.append)
+print(json.dumps({
+    "ways": [ways, robot.clock.now],
+    "quiet": [seen, threading.active_count(), [name for name in ("dash", "flask") if name in sys.modules]],
+    "dice": before == numpy.random.get_state()[1].tolist(),
+}))
+"""
+
+
+def test_same_world_has_the_same_ways_and_nothing_else_goes_on(tmp_path: Path) -> None:
+    world = tmp_path / "world.yaml"
+    world.write_text(WORLD.to_yaml())
+    found = []
+    for seed in ("1", "2"):
+        command = [sys.executable, "-W", "error", "-c", PLAN, str(world)]
+        environment = {**os.environ, "PYTHONHASHSEED": seed}
+        done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+        assert not done.stderr, "pyrobosim logs to the terminal unless told otherwise"
+        found.append(json.loads(done.stdout))
+    assert found[0] == found[1]
+    assert found[0]["quiet"] == [[], 1, []]
+    assert found[0]["dice"], "whatever is random would differ between runs"
+
+
+# --- stop
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after(*, held: bool) -> None:
+    robot = connected(speed=1)
+    if held:
+        robot.clock.speed = None
+        robot.perform("go_to", ["lab"])
+        robot.perform("pick", ["laser"])
+        robot.clock.speed = 1
+    on_the_way = threading.Event()
+    with ThreadPoolExecutor(1) as thread:
+        driving = thread.submit(robot.perform, "go_to", ["kitchen"], lambda _: on_the_way.set())
+        assert on_the_way.wait(30)
+        assert not driving.done()
+        began = time.monotonic()
+        robot.cancel()
+        with pytest.raises(CancelledError):
+            driving.result(5)
+        assert time.monotonic() - began < 2
+    stands = position(robot)
+    for skill, argument in (("say", "hello"), ("go_to", "kitchen"), ("go_to", "cellar"), ("pick", "mug")):
+        with pytest.raises(CancelledError):
+            robot.perform(skill, [argument])
+    with pytest.raises(CancelledError):
+        robot.perform("get_current_location", [])
+    time.sleep(0.3)
+    assert position(robot) == stands
+    robot.connect()
+    assert robot.perform("get_current_location", []) == "hall"
+    assert lying(robot) == {"kitchen": ["cup", "mug", "mug"], "lab": [r"laser\b"]}
+    robot.clock.speed = None
+    robot.perform("go_to", ["kitchen"])
+    robot.disconnect()
+    robot.disconnect()
+
+
+def test_cancel_while_it_plans_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, told = connected(), list[str]()
+    at, stage = position(robot), robot._stage
+    assert stage is not None
+    plan = stage.robot.plan_path
+
+    def cancelled_meanwhile(*arguments: object) -> object:
+        robot.cancel()
+        return plan(*arguments)
+
+    monkeypatch.setattr(stage.robot, "plan_path", cancelled_meanwhile)
+    with pytest.raises(CancelledError):
+        robot.perform("go_to", ["kitchen"], told.append)
+    assert (position(robot), told) == (at, [])
+
+
+def test_cancel_before_the_hand_has_closed_leaves_the_object(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = connected()
+    robot.perform("go_to", ["kitchen"])
+    wait = robot.clock.wait
+
+    def cancelled_meanwhile(seconds: float) -> bool:
+        if seconds == SECONDS["pick"]:
+            robot.cancel()
+        return wait(seconds)
+
+    monkeypatch.setattr(robot.clock, "wait", cancelled_meanwhile)
+    with pytest.raises(CancelledError):
+        robot.perform("pick", ["mug"])
+    assert lying(robot)["kitchen"] == ["cup", "mug", "mug"]
+    assert robot._stage is not None
+    assert robot._stage.held is None
+
+
+def test_cancel_before_anything_goes_on_is_not_forgotten() -> None:
+    robot = connected()
+    robot.cancel()
+    with pytest.raises(CancelledError):
+        robot.perform("say", ["hello"])
+
+
+def test_second_tool_is_refused(tmp_path: Path) -> None:
+    with (
+        Reservation(Pyrobosim(WORLD), tmp_path),
+        pytest.raises(NotReadyError, match="uses the robot pyrobosim"),
+        Reservation(Pyrobosim(WORLD), tmp_path),
+    ):
+        pass
+
+
+# --- the command
+
+
+PROGRAM = """def task_program():
+    go_to("kitchen")
+    pick("cup")
+    go_to("study")
+    place("cup")
+"""
+
+
+def test_command_runs_a_program_and_ctrl_c_stops_it(tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text(WORLD.to_yaml())
+    (tmp_path / "program.py").write_text(PROGRAM)
+    command = [sys.executable, "-m", "codebotler.cli", "run", "program.py", "--robot", "pyrobosim", "--yes"]
+    command += ["--world", "world.yaml", "--speed"]
+    environment = {**os.environ, "CODEBOTLER_HOME": str(tmp_path / "home"), "NO_COLOR": "1"}
+    done = subprocess.run(
+        [*command, "0"], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "running on the robot pyrobosim" in done.stdout
+    assert 'puts down "cup"' in done.stdout
+    with subprocess.Popen(
+        [*command, "1"], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True
+    ) as running:
+        assert running.stdout is not None
+        assert any("at (" in line for line in running.stdout)
+        running.send_signal(signal.SIGINT)
+        rest, _ = running.communicate(timeout=30)
+    assert running.returncode == 130
+    assert "stopped" in rest
+
+
+def test_it_is_listed() -> None:
+    (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
+    assert kind.works

@@ -1,0 +1,57 @@
+"""What is said of robots in pyrobosim, where that is installed and where it is not."""
+
+import importlib.util
+import subprocess
+import sys
+from importlib import metadata
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.robots.base import NotReadyError, Options, Robot
+from codebotler.robots.open import all_readiness, open_robot
+from codebotler.robots.pyrobosim import Pyrobosim, readiness
+from codebotler.world import Room, World
+
+WORLD = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
+MEND = 'pip install "codebotler[pyrobosim]"'
+
+
+def test_what_is_missing_is_said_with_the_mend(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
+    (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
+    assert (kind.works, kind.missing, kind.mend) == (False, "pyrobosim is not installed", MEND)
+    robot = Pyrobosim(WORLD)
+    with pytest.raises(NotReadyError) as error:
+        robot.connect()
+    assert error.value.sentence == f"pyrobosim is not installed; install it with: {MEND}"
+    robot.cancel()
+    robot.disconnect()
+
+
+def test_old_version_is_missing_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: object())
+    for version, works in (("4.1.2", False), ("5.0.1", True), ("10.0", True)):
+        monkeypatch.setattr(metadata, "version", lambda _name, version=version: version)
+        assert readiness().works == works
+        assert works or readiness().missing == "pyrobosim 4.1.2 is too old, it must be 5 or later"
+
+
+def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
+    robot: Robot = open_robot("pyrobosim", Options(world=WORLD, speed=3))
+    assert (robot.name, robot.address, robot.clock.speed) == ("pyrobosim", "", 3)
+    with pytest.raises(BadInput, match="--world FILE"):
+        open_robot("pyrobosim")
+    with pytest.raises(BadInput, match="must be above 0"):
+        open_robot("pyrobosim", Options(world=WORLD, speed=-1))
+
+
+def test_nothing_heavy_is_imported_before_it_is_connected() -> None:
+    program = (
+        "import sys\n"
+        "from codebotler.robots.open import all_readiness\n"
+        "all_readiness()\n"
+        "print(sorted({'numpy', 'pyrobosim', 'scipy', 'shapely'} & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+    assert done.stdout == "[]\n"
