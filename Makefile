@@ -1,7 +1,7 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
 # installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
-# `make test-transformers` tests models that run on this machine, with a Python for which there is a torch (3.11);
+# `make test-transformers` tests models and detectors that run on this machine, with a Python for which there is a torch (3.11);
 # it makes an environment of its own, since nothing else needs so much. `make test-faults` asks a server that fails
 # one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing).
@@ -36,13 +36,14 @@ demo: $(VENV)/installed
 
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --ignore tests/ros1 \
-		--ignore tests/codebotler/models/test_local.py $(TESTS)
+		--ignore tests/codebotler/models/test_local.py --ignore tests/codebotler/perception/test_zeroshot.py $(TESTS)
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 2 tests/ros1
 
 test-transformers: $(TORCH_VENV)/tested
-	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py
+	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py \
+		tests/codebotler/perception/test_zeroshot.py
 
 test-faults: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m

@@ -70,14 +70,15 @@ class Server:
         """Listen until the worker dies."""
         threading.Thread(target=self.work, daemon=True).start()
         while True:
-            match self.worker.receive(HEARS):
+            message = self.worker.receive(HEARS) or {}
+            match message:
+                case {"is": "image"}:
+                    self.images.put(message)
                 case {"is": "goal", "id": str(goal), "arguments": [str(label)]}:
                     self.open.add(goal)
                     self.goals.put((goal, label))
                 case {"is": "cancel", "id": str(goal)}:  # looking moves nothing, so that it has ended at once
                     self.end(goal, do="cancelled")
-                case {"is": "image", **image}:
-                    self.images.put(image)
                 case {"is": "ended"}:
                     sys.exit(f"the worker has died ({self.worker.epitaph()})")
 
@@ -139,7 +140,7 @@ def main() -> None:
             detector, file=said.file, topic=said.topic, oldest=said.oldest, python=said.ros_python
         )
     except (BadInput, NotReadyError) as error:
-        sys.exit(f"is_in_room_server: {error}")
+        parser.error(str(error))
     try:
         server.serve()
     except KeyboardInterrupt:
