@@ -26,7 +26,7 @@ from codebotler.robots.ros import Waits
 from codebotler.robots.ros1 import PYTHON, SCRIPT
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS
-from ros_graph import LONG, Graph, Process, started
+from ros_graph import LONG, Graph, Process, free_port, started
 from server import Fault, Request, Server
 
 ROOT = Path(__file__).parents[2]
@@ -281,6 +281,24 @@ def test_look_that_is_cancelled_ends_at_once(graph: Graph, model: Server) -> Non
         assert time.monotonic() - began < 1.5
         model.pause = 0.0
         assert asked(graph, "mug")[0]
+
+
+@pytest.mark.parametrize(
+    ("model", "sentence"),
+    [
+        ("recorded", "error: recorded sees no pictures; name a chat model that does, or hf:PATH"),
+        ("openai-chat:eyes", "error: no ROS master answers at http://localhost:"),
+    ],
+)
+def test_what_keeps_it_from_serving_is_said(model: str, sentence: str) -> None:
+    command = [sys.executable, str(EXAMPLE), "--model", model, "--base-url", "http://localhost:1/v1"]
+    master = f"http://localhost:{free_port()}"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "ROS_MASTER_URI": master}
+    done = subprocess.run(
+        [*command, "--topic", TOPIC], env=environment, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr.count("Traceback")) == (2, 0)
+    assert sentence in done.stderr
 
 
 # --- what a robot shows
