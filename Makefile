@@ -1,9 +1,9 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
 # installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
-# `make test-transformers` tests models that run on this machine, with a Python for which there is a torch (3.11);
-# it makes an environment of its own, since nothing else needs so much. `make test-pyrobosim` tests the robot in
-# pyrobosim, in an environment of its own, too. `make test-faults` asks a server that fails
+# `make test-transformers` tests models and detectors that run on this machine, with a Python for which there is a
+# torch (3.11); it makes an environment of its own, since nothing else needs so much. `make test-pyrobosim` tests the
+# robot in pyrobosim, in an environment of its own, too. `make test-faults` asks a server that fails
 # one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing).
 PYTHON ?= python3
@@ -39,13 +39,15 @@ demo: $(VENV)/installed
 test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --ignore tests/ros1 \
 		--ignore tests/codebotler/models/test_local.py \
+		--ignore tests/codebotler/perception/test_zeroshot.py \
 		--ignore tests/codebotler/robots/test_pyrobosim.py $(TESTS)
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
 
 test-transformers: $(TORCH_VENV)/tested
-	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py
+	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py \
+		tests/codebotler/perception/test_zeroshot.py
 
 test-pyrobosim: $(PYROBOSIM_VENV)/tested
 	$(PYROBOSIM_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py

@@ -8,6 +8,7 @@ from pathlib import Path
 from codebotler.archive import find, missions, recover, summary_of
 from codebotler.missionlog import events_of
 from codebotler.missionmcap import Clock, export
+from codebotler.missionpictures import FOLDER, picture_of
 from codebotler.missionview import list_view, mission_view
 from codebotler.terminal import note, print_json, print_rich, visible
 
@@ -48,6 +49,8 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
         print_json({**asdict(summary), "events": events})
     else:
         print_rich(mission_view(summary, events))
+        if any(picture_of(folder, line) for line in events):
+            note(f"its pictures lie in {folder / FOLDER}")
 
 
 def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
@@ -66,8 +69,8 @@ def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
     _tell_interrupted(home)
     folder = find(home, name)
     summary, events = summary_of(folder), events_of(folder)
-    export(path, summary, events, clock)
-    note(f"wrote {len(events):,} messages of mission {summary.id} to {path}")
+    export(path, summary, events, clock, folder)
+    note(f"wrote {len(events):,} events of mission {summary.id} to {path}")
 
 
 def _tell_interrupted(home: Path) -> None:

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from typing import Any, Protocol
 
 from codebotler.robots import base
-from codebotler.robots.base import CancelledError, RobotLostError
+from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, Rules
 from codebotler.skills import Skill
@@ -25,7 +25,7 @@ class Note(Protocol):
     """Takes down what happens; called from any thread."""
 
     def __call__(self, event: str, /, **data: object) -> None:
-        """Take down one event.
+        """Take down one event; the `picture` of one is bytes.
 
         Raises:
             OSError: it cannot be written.
@@ -150,9 +150,12 @@ class LiveRobot:
     def _done(self, skill: Skill, given: list[base.Argument]) -> base.Result:
         which = {"number": self._number, "skill": skill.name}
 
-        def told(phrase: str) -> None:
+        def told(what: str | Picture) -> None:
             try:
-                self._note("feedback", **which, text=phrase)
+                if isinstance(what, Picture):
+                    self._note("picture", **which, picture=what.data)
+                else:
+                    self._note("feedback", **which, text=what)
             except OSError as error:  # on a thread of the robot's, where nobody would see it
                 self._fault = error
                 self.stop()

@@ -15,6 +15,7 @@ from typing import Self, TypeAlias
 
 from codebotler.live import LiveRobot, StoppedError
 from codebotler.missionlog import Line, Log, Summary
+from codebotler.missionpictures import Pictures
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.lane import EngineError, Lane
@@ -90,7 +91,7 @@ class Mission:
 
     def __init__(self, home: Path, robot: str, instruction: str = "", told: Told = untold) -> None:
         self.folder = _new_folder(home / "missions")
-        self._log = Log(self.folder)
+        self._log, self._pictures = Log(self.folder), Pictures(self.folder)
         self.told = told
         self._book = threading.RLock()  # held while something is written and told; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
@@ -337,6 +338,8 @@ class Mission:
         with self._book:
             if not self._log.is_open:
                 return
+            if isinstance(picture := data.pop("picture", None), bytes):
+                data |= self._pictures.keep(picture)
             line = self._log.add(event, clock=clock, **data)
             if event == "state":
                 self.summary.write(self.folder)

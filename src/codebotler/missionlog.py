@@ -26,6 +26,7 @@ HAS: Mapping[str, frozenset[str]] = {
     "result": frozenset({"number", "skill", "result"}),
     "error": frozenset({"number", "skill", "kind", "message"}),
     "cancelled": frozenset({"number", "skill"}),
+    "picture": frozenset({"number", "skill"}),
     "late": frozenset({"number", "skill"}),
     "sleep": frozenset({"seconds"}),
     "stop": frozenset({"by"}),

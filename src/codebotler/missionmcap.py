@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ from mcap.writer import Writer
 
 from codebotler import __version__
 from codebotler.missionlog import Line, Summary
+from codebotler.missionpictures import picture_of
 from codebotler.skills import SKILLS, Skill, SkillTable
 
 Clock: TypeAlias = Literal["wall", "robot"]
@@ -25,8 +27,19 @@ TYPES: Mapping[str, Schema] = {"str": TEXT, "list[str]": TEXTS, "bool": {"type":
 SECOND = 1_000_000_000
 LATEST = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
 STATES, NOTES = "/mission/state", "/mission/log"
-DETAILS = ("text", "message", "reason", "by")
+DETAILS = ("text", "message", "reason", "by", "file")
 """Where an event that is no skill's has what it says."""
+IMAGE = "foxglove.CompressedImage"
+"""By this name of their schema Foxglove knows messages that are pictures, wherever they come from."""
+WHOLE: Schema = {"type": "integer"}
+TIME: Schema = {"type": "object", "title": "time", "properties": {"sec": WHOLE, "nsec": WHOLE}}
+IMAGE_SCHEMA: Mapping[str, Schema] = {
+    "timestamp": TIME,
+    "frame_id": TEXT,
+    "data": {**TEXT, "contentEncoding": "base64"},
+    "format": TEXT,
+}
+FORMATS = {"jpg": "jpeg", "png": "png"}
 GOES_ON: Mapping[str, Schema] = {
     "number": {"type": "integer"},
     "event": TEXT,
@@ -40,15 +53,19 @@ def write_mcap(
     summary: Summary,
     events: Sequence[Line],
     *,
+    folder: Path | None = None,
     clock: Clock = "wall",
     skills: SkillTable = SKILLS,
 ) -> None:
-    """Write a mission: a channel for each skill, one for states and one for the rest, the program attached.
+    """Write a mission: a channel for each skill, one for its pictures, one for states and one for the rest.
+
+    The program is attached.
 
     Args:
         file: open for writing.
         summary: of the mission.
         events: in their order.
+        folder: of the mission, for its pictures; None to leave them out.
         clock: by which the messages are timed: the wall's, or the robot's, put to start with the mission.
         skills: what the robot could be asked to do.
 
@@ -69,6 +86,9 @@ def write_mcap(
         channel = channels.channel(topic, properties)
         at = time(line)
         writer.add_message(channel, at, json.dumps(message).encode(), at, sequence=number)
+        if folder is not None and (picture := picture_of(folder, line)) is not None:
+            channel = channels.channel(f"{topic}/picture", IMAGE_SCHEMA, IMAGE)
+            writer.add_message(channel, at, json.dumps(_image(*picture, at)).encode(), at, sequence=number)
     last = time(events[-1]) if events else began
     name = "program.py"
     writer.add_attachment(began, last, name, "text/x-python", summary.program.encode(errors="surrogatepass"))
@@ -87,15 +107,16 @@ class Channels:
         self._writer = writer
         self._numbers: dict[str, int] = {}
 
-    def channel(self, topic: str, properties: Mapping[str, Schema]) -> int:
+    def channel(self, topic: str, properties: Mapping[str, Schema], name: str = "") -> int:
         """The channel of a topic.
 
         Args:
             topic: such as `/skill/go_to`.
             properties: of its messages, with their types.
+            name: of the schema, where others know it by one.
         """
         if topic not in self._numbers:
-            name = "codebotler." + topic.strip("/").replace("/", ".")
+            name = name or "codebotler." + topic.strip("/").replace("/", ".")
             schema = {"type": "object", "properties": properties}
             number = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
             self._numbers[topic] = self._writer.register_channel(topic, "json", number)
@@ -136,6 +157,16 @@ def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema],
     )
 
 
+def _image(kind: str, data: bytes, at: int) -> dict[str, object]:
+    """A picture as Foxglove has it."""
+    return {
+        "timestamp": {"sec": at // SECOND, "nsec": at % SECOND},
+        "frame_id": "",
+        "data": base64.b64encode(data).decode(),
+        "format": FORMATS[kind],
+    }
+
+
 def _about(summary: Summary) -> dict[str, str]:
     began = datetime.fromtimestamp(summary.created).astimezone()
     about = {
@@ -150,7 +181,9 @@ def _about(summary: Summary) -> dict[str, str]:
     return {name: text.encode(errors="backslashreplace").decode() for name, text in about.items()}
 
 
-def export(path: Path, summary: Summary, events: Sequence[Line], clock: Clock) -> None:
+def export(
+    path: Path, summary: Summary, events: Sequence[Line], clock: Clock, folder: Path | None = None
+) -> None:
     """Write a mission as an MCAP file, whole or not at all; what is no file, such as a pipe, is written into.
 
     Args:
@@ -158,6 +191,7 @@ def export(path: Path, summary: Summary, events: Sequence[Line], clock: Clock) -
         summary: of the mission.
         events: in their order.
         clock: by which the messages are timed.
+        folder: of the mission, for its pictures; None to leave them out.
 
     Raises:
         OSError: it cannot be written.
@@ -165,13 +199,13 @@ def export(path: Path, summary: Summary, events: Sequence[Line], clock: Clock) -
     path = path.resolve()
     if path.exists() and not path.is_file():
         whole = io.BytesIO()
-        write_mcap(whole, summary, events, clock=clock)
+        write_mcap(whole, summary, events, folder=folder, clock=clock)
         path.write_bytes(whole.getvalue())
         return
     new = path.with_name(f"{path.name}.new")
     try:
         with new.open("wb") as file:
-            write_mcap(file, summary, events, clock=clock)
+            write_mcap(file, summary, events, folder=folder, clock=clock)
         new.replace(path)
     finally:
         new.unlink(missing_ok=True)

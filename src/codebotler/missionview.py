@@ -112,6 +112,7 @@ WORDS: Mapping[str, Callable[[Line], Text | None]] = {
     "result": _result,
     "state": _state,
     "feedback": lambda line: Text(shortened(line["text"]), "dim"),
+    "picture": lambda line: Text(shortened(line.get("text") or f"picture: {line.get('file')}"), "dim"),
     "error": lambda line: Text(f"{visible(line['kind'])}: {shortened(line['message'])}", "red"),
     "sleep": lambda line: Text(f"waits for {line['seconds']:g} s"),
     "stop": lambda line: Text(f"told to stop by {visible(line['by'])}", "yellow"),

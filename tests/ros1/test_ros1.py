@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.badinput import BadInput
-from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import Waits
 from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
@@ -432,7 +432,7 @@ def test_installed_messages_are_preferred_and_their_feedback_is_told(
     graph.serve(GO_TO, SAY)
     robot = graph.robot()
     robot.connect()
-    told: list[str] = []
+    told: list[str | Picture] = []
     robot.perform("go_to", ["feedback"], told.append)
     assert told == ["near: the hall"]
     robot.perform("say", ["hello"])

@@ -19,7 +19,7 @@ import pytest
 from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
-from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
 from codebotler.robots.ros import Waits
 from codebotler.robots.rosbridge import Rosbridge
 from codebotler.simulator.robot import RobotError
@@ -228,7 +228,7 @@ def second(heard: list[dict[str, Any]]) -> Iterator[Rosbridge]:
 
 
 def test_stand_in_for_ros_2_executes_goals(second: Rosbridge, heard: list[dict[str, Any]]) -> None:
-    told: list[str] = []
+    told: list[str | Picture] = []
     assert second.perform("ask", ["ann", "tea?", ("yes", "no")], told.append) == "yes"
     assert told == ["near: the hall"]
     sent = heard[-1]

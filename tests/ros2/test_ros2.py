@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.badinput import BadInput
-from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import Waits
 from codebotler.robots.ros2 import NOTE, SCRIPT, Ros2, readiness
@@ -68,7 +68,7 @@ def stopped(robot: Ros2, notes: Path, goal: str) -> BaseException | None:
 
 
 def test_goal_is_executed_and_the_result_comes_back(robot: Ros2, notes: Path) -> None:
-    told: list[str] = []
+    told: list[str | Picture] = []
     assert robot.missing == {}
     assert robot.perform("go_to", ["feedback"], told.append) is None
     assert told == ["near: the hall"]

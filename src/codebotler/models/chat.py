@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pydantic_ai import exceptions
 from pydantic_ai.direct import model_request_stream
 from pydantic_ai.messages import (
+    BinaryContent,
     ModelMessage,
     ModelRequest,
     ModelResponse,
@@ -19,6 +20,7 @@ from pydantic_ai.messages import (
     SystemPromptPart,
     TextPart,
     TextPartDelta,
+    UserContent,
     UserPromptPart,
 )
 from pydantic_ai.models import Model as Spoken
@@ -32,7 +34,7 @@ from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, pr
 from codebotler.models.faults import brief, broken_off, fault, late, refused, retry_after
 from codebotler.models.keys import blank_is_unset, key_in
 from codebotler.models.redaction import guard_logs, without_keys
-from codebotler.prompts import Message, Prompt
+from codebotler.prompts import Message, Prompt, Shown
 
 OWN_SERVER = "openai-chat"  # what servers of one's own speak
 VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")
@@ -152,12 +154,19 @@ def messages_of(messages: tuple[Message, ...]) -> list[ModelMessage]:
         if message.role == "assistant":
             spoken.append(ModelResponse(parts=[TextPart(message.text)]))
             continue
-        part = SystemPromptPart(message.text) if message.role == "system" else UserPromptPart(message.text)
+        is_system = message.role == "system"
+        part = SystemPromptPart(message.text) if is_system else UserPromptPart(_content(message))
         if spoken and isinstance(spoken[-1], ModelRequest):
             spoken[-1] = ModelRequest(parts=[*spoken[-1].parts, part])
         else:
             spoken.append(ModelRequest(parts=[part]))
     return spoken
+
+
+def _content(message: Message) -> str | list[UserContent]:
+    if isinstance(message, Shown):
+        return [message.text, BinaryContent(message.jpeg, media_type="image/jpeg")]
+    return message.text
 
 
 def _usage(response: ModelResponse) -> Usage:

@@ -39,6 +39,17 @@ class Message:
 
 
 @dataclass(frozen=True)
+class Shown(Message):
+    """A turn that shows a chat model a picture, too.
+
+    Args:
+        jpeg: the picture, as a JPEG file.
+    """
+
+    jpeg: bytes
+
+
+@dataclass(frozen=True)
 class Example:
     """An instruction and a program that does it, which show a model what is wanted."""
 

@@ -17,11 +17,23 @@ Argument: TypeAlias = str | tuple[str, ...]
 Result: TypeAlias = str | list[str] | bool | None
 """What a skill gives back; for a question the text of the chosen option."""
 
-Feedback: TypeAlias = Callable[[str], None]
-"""Told how a skill goes on, in a short phrase such as `at (3.1, 2.0)`; from any thread."""
+
+@dataclass(frozen=True)
+class Picture:
+    """What a robot saw.
+
+    Args:
+        data: a JPEG or PNG file, if the robot keeps to that; nobody has looked into it.
+    """
+
+    data: bytes
 
 
-def untold(_phrase: str) -> None:
+Feedback: TypeAlias = Callable[[str | Picture], None]
+"""Told how a skill goes on, in a short phrase such as `at (3.1, 2.0)`, and what is seen; from any thread."""
+
+
+def untold(_what: str | Picture) -> None:
     """Tell nobody."""
 
 
@@ -65,7 +77,7 @@ class Robot(Protocol):
         Args:
             skill: its name in the table.
             arguments: in the order of its parameters.
-            told: how it goes on.
+            told: how it goes on, and what is seen.
 
         Raises:
             RobotError: (of `codebotler.simulator.robot`) the robot cannot do it; the program sees this.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 import threading
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ from codebotler.robots.base import (
     CancelledError,
     Feedback,
     NotReadyError,
+    Picture,
     Result,
     RobotLostError,
     untold,
@@ -173,6 +175,8 @@ class RosRobot:
                 raise self._lost(worker, message)
             if message.get("id") == number and message["is"] == "feedback":
                 told(message["text"])
+            elif message.get("id") == number and message["is"] == "picture":
+                told(Picture(base64.b64decode(message["data"])))
             elif message.get("id") == number:
                 return self._end(skill, message)
 

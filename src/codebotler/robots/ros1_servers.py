@@ -1,4 +1,4 @@
-"""The worker of the virtual robot: real action servers on a ROS 1 graph, run by a Python that has rospy.
+"""The worker of a robot that offers skills: real action servers on a ROS 1 graph, by a Python that has rospy.
 
 What a skill does is decided on the other side of the channel: each goal and each cancel is told there, and
 how a goal ends is heard from there. Where no master answers, it starts one that ends with this process.
@@ -10,6 +10,7 @@ import socket
 import threading
 from typing import Any
 
+from ros1_pictures import Camera, Show
 from ros1_worker import Channel, Graph, Message, NotReadyError, main, message_types, no_master
 
 
@@ -19,7 +20,8 @@ class Servers:
     Args:
         channel: to the robot.
         start: the first line: the `node`, the `actions` by skill, and the `port` on which a master may be
-            started, or null.
+            started, or null; perhaps the topic of a `camera`, whose last picture can then be asked for, and
+            whether the servers `show` what they see.
     """
 
     def __init__(self, channel: Channel, start: Message) -> None:
@@ -30,6 +32,8 @@ class Servers:
         self.master = None if self.graph.is_online() else started_master(start["port"], self.graph.uri)
         self.graph.enter()
         self.handles: dict[str, Any] = {}
+        self.shows: dict[str, Show] = {}
+        self.camera = Camera(start["camera"]) if start.get("camera") else None
         self.lock = threading.Lock()
         specs = message_types(list(start["actions"].values()))
         self.servers: list[Any] = []
@@ -40,12 +44,20 @@ class Servers:
             )
             server.start()
             self.servers.append(server)
+            if start.get("show"):
+                self.shows[skill] = Show(action["server"])
         channel.tell("ready", address=self.graph.uri, has_master=self.master is not None)
 
     def obey(self, line: Message) -> None:
-        """End a goal as the line says."""
+        """End a goal as the line says, or look."""
+        if line["do"] == "look":
+            assert self.camera is not None, "there is no camera"
+            self.channel.tell("image", **self.camera.look(line["oldest"]))
+            return
         with self.lock:
             handle = self.handles.pop(line["id"])
+        if "picture" in line:
+            self.shows[line["skill"]].show(line["picture"])
         result = handle.get_default_result()
         if line["do"] == "succeed":
             if result.__slots__:

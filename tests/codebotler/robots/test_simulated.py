@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from codebotler.badinput import BadInput
-from codebotler.robots.base import CancelledError, Options, Robot
+from codebotler.robots.base import CancelledError, Options, Picture, Robot
 from codebotler.robots.open import all_readiness, open_robot
 from codebotler.robots.scripted import METRES_PER_SECOND
 from codebotler.robots.simulated import Simulated
@@ -46,11 +46,12 @@ def test_driving_may_take_no_time() -> None:
 
 
 def test_feedback_tells_places_on_the_way() -> None:
-    told: list[str] = []
+    told: list[str | Picture] = []
     connected(speed=10).perform("go_to", ["kitchen"], told.append)
     assert told[-1] == "at (4.0, 5.0)"
     assert 2 <= len(told) <= 8
-    places = [tuple(map(float, text.removeprefix("at (").removesuffix(")").split(", "))) for text in told]
+    texts = [str(text).removeprefix("at (").removesuffix(")") for text in told]
+    places = [tuple(map(float, text.split(", "))) for text in texts]
     assert places == sorted(places)
     assert all(abs((x - 1) * 4 / 3 - (y - 1)) < 0.2 for x, y in places)
 

@@ -1,0 +1,77 @@
+"""The pictures of a mission, each in a file of its own; what a robot calls a picture may be anything."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+FOLDER = "pictures"
+MOST_BYTES = 2_000_000  # of one picture
+MOST_IN_ALL = 200_000_000  # bytes of all pictures of a mission
+KINDS: Mapping[str, bytes] = {"jpg": b"\xff\xd8\xff", "png": b"\x89PNG\r\n\x1a\n"}
+"""What files of each kind begin with, by the end of their names."""
+NAME = re.compile(rf"{FOLDER}/\d+\.(?:{'|'.join(KINDS)})")
+
+
+class Pictures:
+    """Keeps the pictures of a mission, as they came; nothing but their first bytes is looked at.
+
+    Args:
+        folder: of the mission.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._count = self._bytes = 0
+
+    def keep(self, data: bytes) -> dict[str, str]:
+        """Write a picture.
+
+        Returns:
+            what an event tells of it: the `file` as seen from the mission's folder, or a `text` that says why
+            it was not kept.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        kind = next((kind for kind, start in KINDS.items() if data.startswith(start)), None)
+        if kind is None:
+            return _left_out(f"its {len(data):,} bytes are neither JPEG nor PNG")
+        if len(data) > MOST_BYTES:
+            return _left_out(f"it has {len(data):,} bytes, and {MOST_BYTES:,} are the most")
+        if self._bytes + len(data) > MOST_IN_ALL:
+            return _left_out(f"a mission keeps {MOST_IN_ALL:,} bytes of them at most")
+        name = f"{FOLDER}/{self._count + 1}.{kind}"
+        path = self._folder / name
+        path.parent.mkdir(exist_ok=True)
+        new = path.with_name(f"{path.name}.new")
+        try:
+            new.write_bytes(data)
+            new.replace(path)
+        finally:
+            new.unlink(missing_ok=True)
+        self._count += 1
+        self._bytes += len(data)
+        return {"file": name}
+
+
+def _left_out(why: str) -> dict[str, str]:
+    return {"text": f"a picture was not kept: {why}"}
+
+
+def picture_of(folder: Path, line: Mapping[str, Any]) -> tuple[str, bytes] | None:
+    """The kind and the bytes of the picture that an event names; None if it names none that is there.
+
+    Args:
+        folder: of the mission.
+        line: the event.
+    """
+    name = line.get("file")
+    if line["event"] != "picture" or not isinstance(name, str) or not NAME.fullmatch(name):
+        return None
+    try:
+        return name.rpartition(".")[2], (folder / name).read_bytes()
+    except OSError:
+        return None

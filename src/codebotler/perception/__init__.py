@@ -1,0 +1,17 @@
+"""Looking for something in a picture: an image and a label become found or not, where, and how surely."""
+
+from codebotler.perception.base import Detector, PerceptionError, Sighting
+from codebotler.perception.image import boxed, image_from_ros, image_of, jpeg_of, read_image
+from codebotler.perception.open import open_detector
+
+__all__ = [
+    "Detector",
+    "PerceptionError",
+    "Sighting",
+    "boxed",
+    "image_from_ros",
+    "image_of",
+    "jpeg_of",
+    "open_detector",
+    "read_image",
+]

@@ -1,0 +1,203 @@
+"""Pictures, good and bad ones: each becomes plain colour or one clear sentence."""
+
+from __future__ import annotations
+
+import base64
+import io
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+from codebotler.badinput import BadInput
+from codebotler.perception import Sighting, boxed, image_from_ros, image_of, jpeg_of, read_image
+from codebotler.perception.image import MAX_BYTES
+
+RED, BLUE = (255, 0, 0), (0, 0, 255)
+
+
+def halves(mode: str = "RGB", left: Any = RED, right: Any = BLUE) -> Image.Image:  # noqa: ANN401 - as Pillow has it
+    """A picture 40 pixels wide and 20 high, whose halves differ."""
+    image = Image.new(mode, (40, 20), left)
+    image.paste(right, (20, 0, 40, 20))
+    return image
+
+
+def file_of(image: Image.Image, kind: str = "PNG", **options: Any) -> bytes:  # noqa: ANN401 - as Pillow has it
+    file = io.BytesIO()
+    image.save(file, kind, **options)
+    return file.getvalue()
+
+
+def png_of_size(width: int, height: int) -> bytes:
+    """A PNG that says it is huge, in a few bytes."""
+    parts = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0), b"IDAT" + zlib.compress(b"")
+    chunks = (struct.pack(">I", len(part) - 4) + part + struct.pack(">I", zlib.crc32(part)) for part in parts)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def near(image: Image.Image, at: tuple[int, int], colour: tuple[int, int, int]) -> bool:
+    found = image.getpixel(at)
+    assert isinstance(found, tuple)
+    return all(abs(a - b) < 12 for a, b in zip(found, colour, strict=True))
+
+
+@pytest.mark.parametrize("kind", ["JPEG", "PNG", "WEBP"])
+def test_files_become_pictures(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "picture"
+    path.write_bytes(file_of(halves(), kind))
+    image = read_image(path)
+    assert (image.mode, image.size) == ("RGB", (40, 20))
+    assert near(image, (5, 10), RED)
+    assert near(image, (35, 10), BLUE)
+
+
+def test_picture_of_a_turned_camera_is_upright() -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6  # a quarter turn
+    image = image_of(file_of(halves(), "JPEG", exif=exif))
+    assert image.size == (20, 40)
+    assert near(image, (10, 5), RED)
+    assert near(image, (10, 35), BLUE)
+    assert not Image.open(io.BytesIO(jpeg_of(image))).getexif()
+
+
+def test_what_shines_through_is_white() -> None:
+    image = image_of(file_of(halves("RGBA", (255, 0, 0, 255), (0, 0, 0, 0))))
+    assert (image.mode, image.getpixel((5, 5)), image.getpixel((35, 5))) == ("RGB", RED, (255, 255, 255))
+    grey = image_of(file_of(halves("LA", (0, 255), (0, 0))))
+    assert (grey.getpixel((5, 5)), grey.getpixel((35, 5))) == ((0, 0, 0), (255, 255, 255))
+
+
+def test_sixteen_bits_of_grey_become_eight() -> None:
+    row = struct.pack("<40H", *[2_000] * 20, *[4_000] * 20)
+    image = image_of(file_of(Image.frombytes("I;16", (40, 20), row * 20)))
+    assert (image.mode, image.getpixel((5, 5)), image.getpixel((35, 5))) == ("RGB", (128,) * 3, (255,) * 3)
+    dark = image_of(file_of(Image.new("I;16", (40, 20), 0)))
+    assert dark.getpixel((5, 5)) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "P", "CMYK"])
+def test_other_modes_become_colour(mode: str) -> None:
+    kind = "JPEG" if mode == "CMYK" else "PNG"
+    assert image_of(file_of(Image.new(mode, (40, 20)), kind)).mode == "RGB"
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        (b"", "the picture is empty"),
+        (b"no picture at all", "the picture is no JPEG, PNG or WebP file"),
+        (file_of(halves(), "GIF"), "the picture is no JPEG, PNG or WebP file"),
+        (file_of(halves(), "JPEG")[:300], "broken or cut off"),
+        (file_of(Image.effect_noise((200, 200), 50), "PNG")[:5_000], "broken or cut off"),
+        (file_of(Image.new("RGB", (1, 1))), "has 1 x 1 pixels, too few to see anything"),
+        (png_of_size(10_000, 5_000), "has 10,000 x 5,000 pixels, more than 40,000,000 in all"),
+        (png_of_size(11_000, 11_000), "has 11,000 x 11,000 pixels, more than 40,000,000 in all"),
+        (png_of_size(60_000, 60_000), "has more than 40,000,000 pixels; take a smaller one"),
+        (b"\xff" * (MAX_BYTES + 1), "larger than 50,000,000 bytes"),
+    ],
+)
+def test_bad_picture_is_said_in_a_sentence(data: bytes, sentence: str) -> None:
+    with pytest.raises(BadInput) as error:
+        image_of(data)
+    assert sentence in str(error.value)
+
+
+def test_every_cut_of_a_picture_is_refused_or_read() -> None:
+    whole = file_of(halves(), "PNG")
+    for end in range(0, len(whole), 3):
+        try:
+            image_of(whole[:end])
+        except BadInput:
+            continue
+        assert end > len(whole) - 20  # only what ends the file is missing
+
+
+def test_missing_file_and_folder_are_said(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="there is no such file"):
+        read_image(tmp_path / "none.jpg")
+    with pytest.raises(BadInput, match="cannot be read"):
+        read_image(tmp_path)
+
+
+# --- from a camera
+
+
+def message(encoding: str, pixel: bytes, *, padding: int = 0, **changes: object) -> dict[str, object]:
+    row = pixel * 40 + b"\x07" * padding
+    data = base64.b64encode(row * 20).decode()
+    return {"encoding": encoding, "width": 40, "height": 20, "step": len(row), "data": data,
+            "is_bigendian": 0, **changes}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("encoding", "pixel", "colour"),
+    [
+        ("rgb8", b"\xff\x80\x00", (255, 128, 0)),
+        ("bgr8", b"\x00\x80\xff", (255, 128, 0)),
+        ("rgba8", b"\xff\x80\x00\xff", (255, 128, 0)),
+        ("bgra8", b"\x00\x80\xff\xff", (255, 128, 0)),
+        ("mono8", b"\x80", (128, 128, 128)),
+        ("mono16", b"\x00\x10", (255, 255, 255)),
+    ],
+)
+def test_encodings_of_cameras(encoding: str, pixel: bytes, colour: tuple[int, int, int]) -> None:
+    for padding in (0, 6):
+        image = image_from_ros(message(encoding, pixel, padding=padding))
+        assert (image.mode, image.size, image.getpixel((39, 19))) == ("RGB", (40, 20), colour)
+
+
+def test_order_of_the_bytes_of_a_grey() -> None:
+    pixels = b"\x00\x10" * 20 + b"\x00\x08" * 20
+    swapped = b"\x10\x00" * 20 + b"\x08\x00" * 20
+    for row, is_big in ((pixels, 0), (swapped, 1)):
+        data = base64.b64encode(row * 20).decode()
+        image = image_from_ros(message("mono16", b"", step=80, data=data, is_bigendian=is_big))
+        assert (image.getpixel((5, 5)), image.getpixel((35, 5))) == ((255,) * 3, (128,) * 3)
+
+
+def test_compressed_picture_of_a_camera() -> None:
+    data = base64.b64encode(file_of(halves(), "JPEG")).decode()
+    assert image_from_ros({"format": "jpeg", "data": data}).size == (40, 20)
+
+
+@pytest.mark.parametrize(
+    ("said", "sentence"),
+    [
+        (message("16UC1", b"\0\0"), 'the encoding "16UC1", not one of rgb8, bgr8,'),
+        (message("rgb8", b"\0\0\0", height=21), "is cut off: 2,400 bytes are too few for 40 x 21 pixels"),
+        (message("rgb8", b"\0\0\0", step=60), "is cut off"),
+        (message("rgb8", b"\0\0\0", width=100_000, height=100_000), "more than 40,000,000 in all"),
+        (message("rgb8", b"\0\0\0", width=0), "too few to see anything"),
+        (message("rgb8", b"\0\0\0", step=2**31), "is cut off"),
+        ({"format": "jpeg", "data": ""}, "is empty"),
+        ({"format": "jpeg", "data": "AAAA"}, "is no JPEG, PNG or WebP file"),
+        ({"ranges": []}, "is no message with a picture"),
+    ],
+)
+def test_bad_message_is_said_in_a_sentence(said: dict[str, object], sentence: str) -> None:
+    with pytest.raises(BadInput) as error:
+        image_from_ros(said, "the picture on /camera")
+    assert str(error.value).startswith("the picture on /camera")
+    assert sentence in str(error.value)
+
+
+# --- what is sent and kept
+
+
+def test_large_picture_is_sent_small() -> None:
+    small = image_of(jpeg_of(Image.new("RGB", (3_000, 1_500), RED)))
+    assert small.size == (1024, 512)
+    assert image_of(jpeg_of(Image.new("RGBA", (40, 20), (255, 0, 0, 255)))).size == (40, 20)
+
+
+def test_box_is_drawn_where_it_was_found() -> None:
+    image = Image.new("RGB", (200, 100), RED)
+    drawn = boxed(image, Sighting(found=True, box=(0.5, 0.5, 1.0, 1.0), score=0.9))
+    assert drawn.getpixel((100, 70)) == (255, 255, 0)
+    assert drawn.getpixel((150, 75)) == RED == drawn.getpixel((50, 25)) == image.getpixel((100, 70))
+    assert boxed(image, Sighting(found=False, box=None, score=0.1)).getcolors() == [(20_000, RED)]

@@ -1,0 +1,59 @@
+"""The page on perception says what is so."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+from PIL import Image
+
+from codebotler import missionpictures
+from codebotler.perception import Sighting, read_image
+from codebotler.perception.base import LONGEST_LABEL
+from codebotler.perception.image import ENCODINGS, LONGEST_SIDE, MAX_BYTES, MAX_PIXELS, MIN_SIDE
+from codebotler.perception.open import LEAST_SCORE, LOOKING
+from server import Server
+
+PAGE = (Path(__file__).parents[3] / "docs" / "perception.md").read_text()
+TEXT = " ".join(PAGE.split())
+
+
+def test_what_comes_out_is_told() -> None:
+    assert re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE) == [field.name for field in fields(Sighting)]
+
+
+def test_code_looks_into_a_picture(tmp_path: Path) -> None:
+    Image.new("RGB", (64, 40)).save(tmp_path / "kitchen.jpg")
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    with Server(answer=lambda _: '{"found": true, "score": 0.9, "box": [0, 0, 0.5, 1]}') as server:
+        code = code.replace("http://localhost:8000/v1", server.url)
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+    assert done.stdout == "Sighting(found=True, box=(0.0, 0.0, 0.5, 1.0), score=0.9)\n"
+    assert read_image(tmp_path / "seen.jpg").size == (64, 40)
+
+
+def test_limits_are_those_of_the_code() -> None:
+    for told in (
+        f"at most {MAX_BYTES // 10**6} MB and {MAX_PIXELS // 10**6} million pixels",
+        f"at least {MIN_SIDE} pixels a side",
+        f"at most {LONGEST_SIDE:,} pixels a side",
+        f"at most {LONGEST_LABEL} characters",
+        f"from a score of {LEAST_SCORE} on",
+        f"max_tokens={LOOKING.max_tokens}, timeout={LOOKING.timeout:g}",
+        f"more than {missionpictures.MOST_BYTES // 10**6} MB is left out",
+        f"beyond {missionpictures.MOST_IN_ALL // 10**6} MB in one mission",
+    ):
+        assert told in TEXT, told
+    listed = re.search(r"with the encoding (.*?)\. They", TEXT)
+    assert listed is not None
+    assert re.findall("`(.*?)`", listed[1]) == list(ENCODINGS)
+
+
+def test_what_was_not_seen_is_said() -> None:
+    assert "The detector was tested only with random weights" in TEXT
+    assert "How well any real model sees was not tested" in TEXT

@@ -1,0 +1,30 @@
+"""A real camera's node: it publishes one picture, again and again, until its input ends."""
+
+import json
+import os
+import sys
+import time
+
+sys.path.insert(0, sys.argv[1])
+
+import rospy
+from ros1_pictures import picture_types
+
+topic, kind, fields, seconds = sys.argv[2], sys.argv[3], json.loads(sys.argv[4]), float(sys.argv[5])
+rospy.init_node("camera", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
+if kind in picture_types():
+    fields["data"] = bytes.fromhex(fields["data"])
+    message = picture_types()[kind](**fields)
+else:
+    import std_msgs.msg
+
+    message = std_msgs.msg.String("no picture")
+publisher = rospy.Publisher(topic, type(message), queue_size=1, latch=True)
+publisher.publish(message)
+print('["ready"]', flush=True)
+until = time.monotonic() + seconds
+while time.monotonic() < until:
+    time.sleep(0.05)
+    publisher.publish(message)
+sys.stdin.read()
+os._exit(0)
