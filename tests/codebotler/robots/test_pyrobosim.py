@@ -19,7 +19,7 @@ import pytest
 
 from codebotler.live import LiveRobot
 from codebotler.models.recorded import recorded_model
-from codebotler.robots.base import CancelledError, NotReadyError
+from codebotler.robots.base import CancelledError, NotReadyError, Picture
 from codebotler.robots.open import all_readiness
 from codebotler.robots.pyrobosim import Pyrobosim
 from codebotler.robots.reservation import Reservation
@@ -61,8 +61,8 @@ def connected(world: World = WORLD, speed: float | None = None) -> Pyrobosim:
     return robot
 
 
-def places(told: Sequence[str]) -> list[Point]:
-    read = (phrase.removeprefix("at (").removesuffix(")").split(", ") for phrase in told)
+def places(told: Sequence[str | Picture]) -> list[Point]:
+    read = (str(phrase).removeprefix("at (").removesuffix(")").split(", ") for phrase in told)
     return [(float(x), float(y)) for x, y in read]
 
 
@@ -182,7 +182,7 @@ def test_what_is_held_moves_with_the_robot() -> None:
 
 
 def test_robot_drives_to_the_table_for_it() -> None:
-    robot, told = connected(), list[str]()
+    robot, told = connected(), list[str | Picture]()
     robot.perform("go_to", ["kitchen"])
     robot.perform("pick", ["mug"], told.append)
     assert len(told) >= 2
@@ -228,7 +228,7 @@ def goes_through_no_wall(robot: Pyrobosim, way: Sequence[Point]) -> bool:
 
 
 def test_it_drives_around_walls_and_takes_its_time() -> None:
-    robot, told = connected(), list[str]()
+    robot, told = connected(), list[str | Picture]()
     start = position(robot)
     robot.perform("go_to", ["study"], told.append)
     way = [start, *places(told)]
@@ -243,7 +243,7 @@ def test_it_drives_around_walls_and_takes_its_time() -> None:
 
 
 def test_feedback_tells_places_on_the_way() -> None:
-    robot, told = connected(speed=10), list[str]()
+    robot, told = connected(speed=10), list[str | Picture]()
     began = time.monotonic()
     robot.perform("go_to", ["study"], told.append)
     assert len(told) <= 2 + (time.monotonic() - began) / TELLS_EVERY
@@ -252,7 +252,7 @@ def test_feedback_tells_places_on_the_way() -> None:
 
 
 def test_measured_rooms_are_where_they_are_and_all_can_be_reached() -> None:
-    robot, told = connected(MEASURED), list[str]()
+    robot, told = connected(MEASURED), list[str | Picture]()
     assert position(robot) == pytest.approx((3.0, 1.0))
     for room, corner in (("kitchen", (4.0, 4.0)), ("shed", (9.0, 2.0)), ("hall", (3.0, 1.0))):
         robot.perform("go_to", [room], told.append)
@@ -381,7 +381,7 @@ def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after(*, held: bool) 
 
 
 def test_cancel_while_it_plans_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, told = connected(), list[str]()
+    robot, told = connected(), list[str | Picture]()
     at, stage = position(robot), robot._stage
     assert stage is not None
     plan = stage.robot.plan_path
