@@ -8,7 +8,7 @@ import time
 sys.path.insert(0, sys.argv[1])
 
 import rospy
-from ros1_pictures import picture_types
+from ros1_worker import picture_types
 
 topic, kind, fields, seconds = sys.argv[2], sys.argv[3], json.loads(sys.argv[4]), float(sys.argv[5])
 rospy.init_node("camera", anonymous=True, disable_signals=True, log_level=rospy.FATAL)

@@ -1,53 +1,14 @@
-"""Pictures on a ROS 1 graph, for the workers of the robot's own Python (3.8 or later)."""
+"""Pictures on a ROS 1 graph, for action servers in the robot's own Python (3.8 or later)."""
 
 from __future__ import annotations
 
 import base64
 import time
-import types
-from functools import lru_cache
 from typing import Any
 
+from ros1_worker import BUFFER, COMPRESSED, in_text, picture_types
+
 MOST = 64_000_000  # bytes of a picture that is passed on
-BUFFER = 1 << 24  # bytes; with less, rospy lags behind a camera
-DEFINITIONS = {
-    "sensor_msgs/Image": "Header header\nuint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\n"
-    "uint32 step\nuint8[] data\n",
-    "sensor_msgs/CompressedImage": "Header header\nstring format\nuint8[] data\n",
-}
-COMPRESSED = "sensor_msgs/CompressedImage"
-
-
-@lru_cache(maxsize=None)
-def picture_types() -> dict[str, Any]:
-    """The types of messages with pictures, by name; they are made here where sensor_msgs is not installed."""
-    try:
-        import sensor_msgs.msg
-    except ImportError:
-        return made_types()
-    return {name: getattr(sensor_msgs.msg, name.partition("/")[2]) for name in DEFINITIONS}
-
-
-def made_types() -> dict[str, Any]:
-    """The types as the code generator of ROS makes them from their definitions."""
-    import genmsg.msg_loader
-    import genpy.generator
-    import std_msgs.msg
-
-    context = genmsg.msg_loader.MsgContext.create_default()
-    header = std_msgs.msg.Header._full_text.partition("=" * 80)[0]
-    genmsg.msg_loader.load_msg_from_string(context, header, "std_msgs/Header")
-    module = types.ModuleType("sensor_msgs.msg")
-    for name, text in DEFINITIONS.items():
-        spec = genmsg.msg_loader.load_msg_from_string(context, text, name)
-        code = "\n".join(genpy.generator.msg_generator(context, spec, {}))
-        exec(compile(code, f"<{name}>", "exec"), module.__dict__)  # noqa: S102 - genpy's own code
-    return {name: getattr(module, name.partition("/")[2]) for name in DEFINITIONS}
-
-
-def in_text(data: Any) -> str:
-    """The bytes of a message's field, as a line of JSON can hold them."""
-    return base64.b64encode(bytes(data)).decode()
 
 
 class Camera:
