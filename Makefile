@@ -37,7 +37,7 @@ demo: $(VENV)/installed
 	@echo "To see why a program fails, keep the verdicts: $(BIN)/roboeval evaluate recorded:hasty --out runs/hasty"
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile --ignore tests/ros1 \
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --ignore tests/ros1 \
 		--ignore tests/codebotler/models/test_local.py \
 		--ignore tests/codebotler/perception/test_zeroshot.py \
 		--ignore tests/codebotler/robots/test_pyrobosim.py $(TESTS)
