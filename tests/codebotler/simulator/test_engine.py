@@ -658,22 +658,23 @@ def task_program():
     say(str(object()) + str(id([])) + str(signal.getsignal(2)))
     try: f(0)
     except RecursionError as error: say(str(error))
-    sum(range(10**12))
+    {end}
 '''
 print(run(program, World((Room("a"),), "a")))
 """
 
 
 def test_what_a_shell_has_set_changes_no_outcome() -> None:
-    settings = ["true", "trap '' XCPU INT", "ulimit -s 1000000", "ulimit -s unlimited"]
-    told = {
-        subprocess.run(
-            ["bash", "-c", f'{setting}; exec "$0" -c "$1"', sys.executable, FROM_A_SHELL],
+    def told(setting: str, end: str) -> str:
+        ended = subprocess.run(
+            ["bash", "-c", f'{setting}; exec "$0" -c "$1"', sys.executable, FROM_A_SHELL.format(end=end)],
             capture_output=True,
             text=True,
             check=True,
-        ).stdout
-        for setting in settings
-    }
-    assert len(told) == 1
-    assert "5 seconds of processor time" in told.pop()
+        )
+        return ended.stdout
+
+    plain = told("true", "pass")
+    assert "maximum recursion depth exceeded" in plain
+    assert {told(f"ulimit -s {size}", "pass") for size in ("1000000", "unlimited")} == {plain}
+    assert "5 seconds of processor time" in told("trap '' XCPU INT", "sum(range(10**12))")
