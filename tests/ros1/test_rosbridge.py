@@ -20,6 +20,7 @@ from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
+from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import Waits
 from codebotler.robots.rosbridge import Rosbridge
 from codebotler.simulator.robot import RobotError
@@ -211,6 +212,19 @@ def test_no_rosbridge_is_said_with_the_mend() -> None:
 
 
 # --- ROS 2, against a stand-in
+
+
+@pytest.mark.parametrize("other", ["ws://127.0.0.1:{}/", "WS://LocalHost:{}", "ws://[::1]:{}"])
+def test_two_tools_are_kept_from_one_robot_whatever_their_homes_and_words(tmp_path: Path, other: str) -> None:
+    with bridge(like_ros_2([])) as double:
+        port = double.address.rpartition(":")[2]
+        with (
+            Reservation(Rosbridge(double.address), tmp_path / "one"),
+            pytest.raises(NotReadyError, match=f"another tool .process {os.getpid()}, since"),
+        ):
+            Reservation(Rosbridge(other.format(port)), tmp_path / "two").__enter__()
+        with Reservation(Rosbridge(f"ws://localhost:{port}/"), tmp_path / "two"):
+            pass
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from codebotler.badinput import BadInput
+from codebotler.robots.address import endpoint
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
@@ -45,8 +46,8 @@ class Ros1(RosRobot):
         speed: float | None = 1.0,
         waits: Waits | None = None,
     ) -> None:
-        address = master_uri(master)
-        ros = Ros("ros1", SCRIPT, python, {"ROS_MASTER_URI": address}, address)
+        uri = master_uri(master)
+        ros = Ros("ros1", SCRIPT, python, {"ROS_MASTER_URI": uri}, endpoint(uri))
         super().__init__(ros, skills, speed, waits)
 
 
