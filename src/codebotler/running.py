@@ -16,13 +16,14 @@ from codebotler.check import check
 from codebotler.checking import check_view, read_program
 from codebotler.drives import named_rooms
 from codebotler.generating import generated
+from codebotler.live import answered
 from codebotler.mission import GRACE, Mission, MissionError, State
 from codebotler.missionview import Watcher, ending, source_view
 from codebotler.models.base import Model
 from codebotler.problems import no_room
 from codebotler.program import called_skills
 from codebotler.prompts import prompt_for
-from codebotler.robots.base import NotReadyError, Robot, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.robot import RobotError, is_found_by_itself
@@ -112,17 +113,22 @@ def preflight(robot: Robot) -> Plan | None:
     """What a connected robot says of its rooms, as a check takes it; None if it says nothing.
 
     Raises:
-        NotReadyError: it does not answer.
+        NotReadyError: it does not answer, or says what is no answer.
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
+
+    def told(skill: str) -> Result:
+        return answered(robot.skills[skill], robot.perform(skill, ())) if skill in can else None
+
     try:
-        rooms = robot.perform("get_all_rooms", ()) if "get_all_rooms" in can else None
-        here = robot.perform("get_current_location", ()) if "get_current_location" in can else None
+        rooms, here = told("get_all_rooms"), told("get_current_location")
     except RobotError as error:
         note(f"the robot does not say which rooms it knows: {visible(str(error))}")
         return None
     except RobotLostError as error:
         raise NotReadyError(f"the robot does not say which rooms it knows: {error.sentence}") from None
+    except CancelledError:
+        raise NotReadyError("the robot does not say which rooms it knows: somebody stopped it") from None
     if not isinstance(rooms, list) or not rooms:
         return None
     names = {room: room if is_found_by_itself(room) else re.escape(room) for room in rooms}
