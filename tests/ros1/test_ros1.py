@@ -17,7 +17,7 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros import Waits
+from codebotler.robots.ros import Ros, RosRobot, Waits
 from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, Parameter, RosAction, Skill
@@ -367,6 +367,40 @@ def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> Non
             assert other.stdin is not None
             other.stdin.close()
     assert isinstance(ended["error"], CancelledError)
+
+
+LATE = f"""
+import subprocess, sys, time
+import ros1_worker
+class Late(ros1_worker.Worker):
+    def _servers(self, actions):
+        servers = super()._servers(actions)
+        other = "import rospy; rospy.init_node('codebotler', disable_signals=True); rospy.sleep({LONG})"
+        self.other = subprocess.Popen([sys.executable, "-c", other])
+        while not self.graph.is_left():
+            time.sleep(0.01)
+        return servers
+    def _missing(self):
+        missing = super()._missing()
+        assert not self.graph.is_forgotten()
+        said = set(missing.values())
+        assert all("another node called /codebotler has taken over" in why for why in said), said
+        self.other.kill()
+        return missing
+ros1_worker.main(Late)
+"""
+
+
+def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_path: Path) -> None:
+    graph.serve(GO_TO)
+    script = tmp_path / "late.py"
+    script.write_text(LATE)
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(SCRIPT.parent)}
+    robot = RosRobot(Ros("ros1", script, PYTHON, environment, graph.uri), waits=Waits(patience=LONG))
+    began = time.monotonic()
+    with pytest.raises(NotReadyError, match=r"^another node called /codebotler has"):
+        robot.connect()
+    assert time.monotonic() - began < LONG / 2, "no server is waited for any more"
 
 
 def test_text_that_no_message_can_hold_is_said(graph: Graph) -> None:
