@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from codebotler.archive import recover
+from codebotler.archiving import tell_interrupted
 from codebotler.badinput import BadInput
 from codebotler.check import check
 from codebotler.checking import check_view, read_program
@@ -97,8 +97,7 @@ def run(robot: Robot, request: Request, home: Path) -> int:
         ModelError: no whole reply came.
     """
     program = read_program(request.what) if request.is_program else None
-    for summary in recover(home):
-        note(f"mission {summary.id} was interrupted: {visible(summary.reason)}")
+    tell_interrupted(home)
     instruction = "" if request.is_program else request.what
     with Reservation(robot, home) as reserved, Mission(home, robot.name, instruction) as mission:
         plan, place = preflight(robot)

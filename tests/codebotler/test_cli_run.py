@@ -286,6 +286,35 @@ def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path)
     assert "interrupted" in out
 
 
+def test_mission_that_cannot_be_closed_keeps_nobody_from_anything(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        process.kill()
+        process.wait(30)
+    (left,) = (folder / "home" / "missions").iterdir()
+    (left / "mission.json.new").mkdir()  # as if nothing could be written there, also for root
+    status, out, err = ended(folder, "missions")
+    assert (status, err.count("\n")) == (0, 1)
+    assert err.startswith(f"mission {left.name} may have been interrupted, but cannot be closed: {left}")
+    assert left.name in out
+    assert ended(folder, "missions", "last", "--json")[0] == 0
+    assert run(folder, "good.py", "--yes")[0] == 0
+
+
+@pytest.mark.parametrize("what", ["home", "home/missions"])
+def test_home_that_is_no_folder_is_said(folder: Path, what: str) -> None:
+    (folder / what).parent.mkdir(exist_ok=True)
+    (folder / what).touch()
+    for arguments in (
+        ["missions"],
+        ["missions", "last"],
+        ["run", "good.py", "--yes", "--world", "world.yaml"],
+    ):
+        status, out, err = ended(folder, *arguments)
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        assert "home/missions: this cannot be a folder of missions; name another by CODEBOTLER_HOME" in err
+
+
 def test_two_tools_on_one_robot(folder: Path) -> None:
     process = driving(folder)
     with stopping(process):
