@@ -376,6 +376,19 @@ def test_missions_are_listed_and_shown(folder: Path) -> None:
     assert (data["id"], data["events"][-1]["state"]) == (name, "done")
 
 
+@pytest.mark.parametrize("seconds", ["1e300", "999_999.94", "1_000_000", "5"])
+def test_times_take_little_room_however_long_a_program_sleeps(folder: Path, seconds: str) -> None:
+    (folder / "long.py").write_text(f"def task_program():\n    time.sleep({seconds})\n    say('late')\n")
+    status, out, _ = run(folder, "long.py", "--yes", "--despite-problems")
+    assert status == 0
+    (line,) = (line for line in out.splitlines() if line.endswith('says "late"'))
+    time = f"{float(seconds):.1f}" if float(seconds) < 1e6 else f"{float(seconds):.1e}"
+    assert line == f'{time:>8} s  says "late"'
+    _, out, _ = ended(folder, "missions", "last")
+    assert max(map(len, out.splitlines())) < 100
+    assert f"{time} s" in out
+
+
 def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
     line = f"    say({'long ' * 40!r})"
     (folder / "long.py").write_text(f"def task_program():\n{line}\n")
