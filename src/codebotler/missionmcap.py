@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any, Literal, TypeAlias
+from uuid import uuid4
 
 from mcap.writer import Writer
 
@@ -168,9 +169,9 @@ def export(path: Path, summary: Summary, events: Sequence[Line], clock: Clock) -
         write_mcap(whole, summary, events, clock=clock)
         path.write_bytes(whole.getvalue())
         return
-    new = path.with_name(f"{path.name}.new")
+    new = path.with_name(f".{uuid4().hex}.mcap")  # nobody's own file, and not too long where the name is
     try:
-        with new.open("wb") as file:
+        with new.open("xb") as file:
             write_mcap(file, summary, events, clock=clock)
         new.replace(path)
     finally:
