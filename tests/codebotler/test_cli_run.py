@@ -433,3 +433,11 @@ def test_robots_are_listed_with_what_is_missing(folder: Path) -> None:
     kinds = json.loads(out)
     assert [kind["name"] for kind in kinds] == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert all(kind["works"] or kind["missing"] for kind in kinds)
+
+
+def test_robots_are_judged_by_the_python_that_is_named(folder: Path) -> None:
+    status, out, err = ended(folder, "robots", "--json", "--ros-python", sys.executable)
+    assert (status, err) == (0, "")
+    missing = {kind["name"]: kind["missing"] for kind in json.loads(out)}
+    assert missing["ros1"].startswith(f"{sys.executable} lacks rospy")
+    assert missing["ros2"].startswith(f"{sys.executable} lacks rclpy")

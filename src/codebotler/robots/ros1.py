@@ -22,6 +22,8 @@ MEND = (
     "python3-genmsg python3-genpy python3-netifaces python3-rosmaster"
 )
 
+OTHER_PYTHON = f"codebotler robots --ros-python {PYTHON}"
+
 
 class Ros1(RosRobot):
     """A robot on ROS 1.
@@ -72,11 +74,10 @@ def readiness(python: Path = PYTHON) -> Readiness:
     """Whether the interpreter has rospy and what belongs to it."""
     missing = lacks(python, NEEDS)
     if missing is None:
-        return Readiness(
-            "ros1", works=False, missing=f"{python} cannot be run", mend="name another: --ros-python"
-        )
+        return Readiness("ros1", works=False, missing=f"{python} cannot be run", mend=OTHER_PYTHON)
     if missing:
-        return Readiness("ros1", works=False, missing=f"{python} lacks {', '.join(missing)}", mend=MEND)
+        mend = MEND if python == PYTHON else OTHER_PYTHON
+        return Readiness("ros1", works=False, missing=f"{python} lacks {', '.join(missing)}", mend=mend)
     return Readiness("ros1", works=True, note=f"by {python}; needs a master, see ROS_MASTER_URI")
 
 
