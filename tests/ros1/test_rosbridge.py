@@ -10,6 +10,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -295,6 +296,42 @@ def test_message_that_is_none_is_survived_and_shown_without_what_a_terminal_obey
             robot.perform("say", ["hello"])
         assert re.search(r"no message of rosbridge|\\x1b\[2Jbad", error.value.sentence)
         assert error.value.sentence.isprintable()
+        robot.disconnect()
+
+
+@pytest.mark.parametrize(
+    ("end", "error"),
+    [
+        ({"status": 4, "values": {}}, CancelledError),
+        ({"status": 6, "values": {}}, CancelledError),
+        ({"status": 5, "values": {}}, CancelledError),
+        ({"values": "no such goal", "result": False}, RobotLostError),
+    ],
+)
+def test_stand_in_for_ros_2_may_end_a_stopped_goal_in_any_way(
+    end: dict[str, Any], error: type[Exception]
+) -> None:
+    sent = threading.Event()
+
+    def handle(connection: ServerConnection) -> None:
+        for text in connection:
+            message = json.loads(text)
+            if message["op"] == "call_service":
+                values = {"version": 2}
+                answer = {"op": "service_response", "id": message["id"], "result": True, "values": values}
+                connection.send(json.dumps(answer))
+            elif message["op"] == "send_action_goal":
+                sent.set()
+            else:
+                connection.send(json.dumps({"op": "action_result", "id": message["id"], **end}))
+
+    with bridge(handle) as double:
+        robot = Rosbridge(double.address)
+        robot.connect()
+        with started(lambda: robot.perform("go_to", ["the hall"])) as ended:
+            assert sent.wait(30)
+            robot.cancel()
+        assert type(ended["error"]) is error
         robot.disconnect()
 
 
