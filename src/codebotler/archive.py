@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 import time
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable
 from pathlib import Path
 
 from codebotler.badinput import BadInput
@@ -23,7 +23,8 @@ def missions(home: Path) -> list[Summary]:
         home: the folder of missions.
 
     Raises:
-        BadInput: one cannot be read.
+        BadInput: one cannot be read, or the folder is none.
+        OSError: the folder cannot be read.
     """
     return sorted(map(summary_of, _folders(home)), key=lambda summary: (summary.created, summary.id))
 
@@ -59,28 +60,48 @@ def summary_of(folder: Path) -> Summary:
     return summary
 
 
-def recover(home: Path) -> list[Summary]:
+def untold(_mission: str, _error: OSError) -> None:
+    """Tell nobody."""
+
+
+def recover(home: Path, unclosed: Callable[[str, OSError], None] = untold) -> list[Summary]:
     """Close the missions that a tool left behind when it died: they were interrupted.
 
     Args:
         home: the folder of missions.
+        unclosed: told each mission that cannot be closed, such as one on a disk that is full, and why.
 
     Returns:
         those that were not known to be before; what cannot be read is left to `missions` to complain about,
         so that it keeps no robot from working.
 
     Raises:
-        OSError: one cannot be written.
+        BadInput: the folder is none.
+        OSError: the folder cannot be read.
     """
     found = []
     for folder in _folders(home):
-        with suppress(BadInput):
+        try:
             found += _interrupted(folder)
+        except BadInput:
+            continue
+        except OSError as error:
+            unclosed(folder.name, error)
     return found
 
 
-def _folders(home: Path) -> Iterator[Path]:
-    return (path.parent for path in sorted((home / "missions").glob(f"*/{SUMMARY}")))
+def _folders(home: Path) -> list[Path]:
+    """The folders of missions; none where there has been no mission yet."""
+    folder = home / "missions"
+    try:
+        found = sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except NotADirectoryError:
+        raise BadInput(
+            "this cannot be a folder of missions; name another by CODEBOTLER_HOME", file=folder
+        ) from None
+    return [path for path in found if os.path.exists(path / SUMMARY)]  # noqa: PTH110 - raises nothing
 
 
 def _interrupted(folder: Path) -> list[Summary]:

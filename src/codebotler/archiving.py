@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict
 from pathlib import Path
 
@@ -23,7 +24,7 @@ def show_missions(home: Path, *, json: bool) -> None:
     Raises:
         BadInput: one cannot be read.
     """
-    _tell_interrupted(home)
+    tell_interrupted(home)
     known = missions(home)
     if json:
         print_json([asdict(summary) for summary in known])
@@ -42,7 +43,7 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
     Raises:
         BadInput: there is none of that name, or it cannot be read.
     """
-    _tell_interrupted(home)
+    tell_interrupted(home)
     folder = find(home, name)
     summary, events = summary_of(folder), events_of(folder)
     if json:
@@ -66,13 +67,24 @@ def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
         BadInput: there is none of that name, or it cannot be read.
         OSError: the file cannot be written.
     """
-    _tell_interrupted(home)
+    tell_interrupted(home)
     folder = find(home, name)
     summary, events = summary_of(folder), events_of(folder)
     export(path, summary, events, clock, folder)
     note(f"wrote {len(events):,} events of mission {summary.id} to {path}")
 
 
-def _tell_interrupted(home: Path) -> None:
-    for summary in recover(home):
+def tell_interrupted(home: Path) -> None:
+    """Close the missions that a tool left behind when it died, and say so.
+
+    Raises:
+        BadInput: the folder of missions is none.
+        OSError: that folder cannot be read.
+    """
+
+    def unclosed(mission: str, error: OSError) -> None:
+        where = f"{visible(os.fsdecode(error.filename))}: " if error.filename else ""
+        note(f"mission {mission} may have been interrupted, but cannot be closed: {where}{error.strerror}")
+
+    for summary in recover(home, unclosed):
         note(f"mission {summary.id} was interrupted: {visible(summary.reason)}")

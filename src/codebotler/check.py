@@ -83,6 +83,7 @@ def check(
     behaviours: Mapping[str, Behaviour] | None = None,
     workers: int | None = None,
     lanes: Lanes | None = None,
+    plan: Plan | None = None,
 ) -> Check:
     """Say what is wrong with a program, as far as its text and some imagined worlds tell.
 
@@ -99,13 +100,14 @@ def check(
         workers: how many runs go on at the same time; one by default, which is enough for one program.
         lanes: what runs programs, for who checks many; without it, it is started and ended. What runs on a
             lane itself calls `check_on`.
+        plan: the rooms and the start, in the place of those two, for who knows more of them.
 
     Raises:
         BadInput: the name of a room is no regular expression.
         EngineError: no isolated process could be started.
     """
     settings = Settings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
-    plan = _plan(program, rooms, start, skills)
+    plan = plan or _plan(program, rooms, start, skills)
     with nullcontext(lanes) if lanes else Lanes(workers or 1) as open_lanes:
 
         def run(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:

@@ -13,9 +13,11 @@ import typer
 
 from codebotler import __version__
 from codebotler.options import (
+    ROS_PYTHON,
     BaseUrlOption,
     MaxTokensOption,
     ModelOption,
+    RosPythonOption,
     SeedOption,
     TemperatureOption,
     TimeoutOption,
@@ -144,9 +146,7 @@ def run(
         float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
     ] = 1.0,
     address: Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")] = "",
-    ros_python: Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")] = Path(
-        "/usr/bin/python3"
-    ),
+    ros_python: RosPythonOption = ROS_PYTHON,
 ) -> None:
     """Check a program, ask, and run it on a robot; Ctrl-C stops the robot, with status 130."""
     from codebotler.home import home
@@ -197,7 +197,10 @@ def missions(
 
 
 @app.command()
-def robots(json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False) -> None:
+def robots(
+    ros_python: RosPythonOption = ROS_PYTHON,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
     """List the kinds of robots: which work here, what is missing for the others, and the mend."""
     from dataclasses import asdict
 
@@ -205,7 +208,7 @@ def robots(json: Annotated[bool, typer.Option("--json", help="Print JSON for mac
     from codebotler.robots.open import all_readiness
     from codebotler.terminal import print_json, print_rich
 
-    found = all_readiness()
+    found = all_readiness(ros_python)
     if json:
         print_json([asdict(kind) for kind in found])
     else:
@@ -224,7 +227,7 @@ def virtual_robot(
     speed: Annotated[float, typer.Option(help="How many of the robot's seconds pass in a real one.")] = 1.0,
     ros_python: Annotated[
         Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
-    ] = Path("/usr/bin/python3"),
+    ] = ROS_PYTHON,
 ) -> None:
     """Offer a simulated robot's skills on ROS 1, until Ctrl-C; starts a ROS master if none answers."""
     from contextlib import suppress

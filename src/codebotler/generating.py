@@ -16,6 +16,7 @@ from codebotler.models.open import kind_of, open_model
 from codebotler.models.paced import Paced
 from codebotler.prompts import Prompt
 from codebotler.simulator.engine import Lanes
+from codebotler.simulator.imagined import Plan
 from codebotler.terminal import busy, note, print_text, visible
 from codebotler.world import World
 
@@ -51,7 +52,8 @@ def write(
         with busy(f"asking {model}"):
             asked = open_model(model, settings)
             note_down = recording.enter_context(recorder(record, asked.name))
-            made = generated(asked, prompt, world=world, retries=retries, repair=repair, note_down=note_down)
+            plan = None if world is None else Plan.of(world)
+            made = generated(asked, prompt, plan=plan, retries=retries, repair=repair, note_down=note_down)
         print_text(made.program)
     return not made.problems
 
@@ -60,7 +62,7 @@ def generated(
     model: Model,
     prompt: Prompt,
     *,
-    world: World | None = None,
+    plan: Plan | None = None,
     retries: int = 0,
     repair: bool = False,
     note_down: Callable[[Attempt], None] = untold,
@@ -70,7 +72,7 @@ def generated(
     Args:
         model: who is asked; it is closed at the end.
         prompt: what is asked.
-        world: where the program is to run; without it, the rooms are those that the program goes to.
+        plan: the rooms; without it, they are those that the program goes to.
         retries: how many times a rejected program is asked for again, at least 0.
         repair: whether to ask again with the program and its problems.
         note_down: told each attempt as it ends.
@@ -79,12 +81,10 @@ def generated(
         ModelError: no whole reply came.
         EngineError: no isolated process could be started.
     """
-    rooms = None if world is None else [room.name for room in world.rooms]
-    start = None if world is None else world.robot
     with Lanes(1) as lanes:
 
         def problems(program: str) -> list[str]:
-            found = check(program, rooms=rooms, start=start, lanes=lanes)
+            found = check(program, lanes=lanes, plan=plan)
             return [problem.sentence for problem in found.problems]
 
         def tried(attempt: Attempt) -> None:

@@ -162,10 +162,7 @@ class LiveRobot:
 
         if skill.recording and skill.recording.options and () in given:
             raise RobotError("AskEmptyOptions", f'the question "{given[-2]}" offers no options')
-        result = self.robot.perform(skill.name, given, told)
-        if not isinstance(result, RETURNS.get(skill.returns, object)):
-            raise RobotLostError(f"the robot answers {skill.name} with {result!r:.100}, no {skill.returns}")
-        return result
+        return answered(skill, self.robot.perform(skill.name, given, told))
 
     def _go_on(self) -> None:
         """Let the program go on, unless it is to end."""
@@ -175,6 +172,18 @@ class LiveRobot:
             raise self._fault
         if self._stopped.is_set():
             raise StoppedError
+
+
+def answered(skill: Skill, result: base.Result) -> base.Result:
+    """What a robot answers to a skill, if it can be an answer to it.
+
+    Raises:
+        RobotLostError: it cannot.
+    """
+    is_one = isinstance(result, RETURNS.get(skill.returns, object))
+    if not is_one or (isinstance(result, list) and not all(isinstance(text, str) for text in result)):
+        raise RobotLostError(f"the robot answers {skill.name} with {result!r:.100}, no {skill.returns}")
+    return result
 
 
 def in_words(skill: str, given: Sequence[str | Sequence[str]]) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any, Literal, TypeAlias
+from uuid import uuid4
 
 from mcap.writer import Writer
 
@@ -202,9 +203,9 @@ def export(
         write_mcap(whole, summary, events, folder=folder, clock=clock)
         path.write_bytes(whole.getvalue())
         return
-    new = path.with_name(f"{path.name}.new")
+    new = path.with_name(f".{uuid4().hex}.mcap")  # nobody's own file, and not too long where the name is
     try:
-        with new.open("wb") as file:
+        with new.open("xb") as file:
             write_mcap(file, summary, events, folder=folder, clock=clock)
         new.replace(path)
     finally:

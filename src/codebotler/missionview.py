@@ -34,6 +34,7 @@ STYLES: Mapping[State, str] = {
     State.INTERRUPTED: "bold red",
 }
 FOUND = {True: "found", False: "not found"}
+LATEST = 999_999.95  # seconds that are written out, in ten characters with their unit
 CLEAR = "\r\x1b[2K"
 
 
@@ -65,7 +66,7 @@ class Watcher:
             return
         passing = line["event"] == "feedback" and self._console.is_terminal
         self._end_line()
-        time = Text(f"{line['clock']:8.1f} s  " if line["event"] in {"skill", "sleep"} else " " * 12, "dim")
+        time = Text(f"{_at(line):>10}  " if line["event"] in {"skill", "sleep"} else " " * 12, "dim")
         self._console.print(time + text, end="" if passing else "\n", soft_wrap=True)
         self._console.file.flush()
         self._is_half = passing
@@ -74,6 +75,12 @@ class Watcher:
         if self._is_half:
             self._console.file.write(CLEAR)
             self._is_half = False
+
+
+def _at(line: Line) -> str:
+    """When it was, by the robot's clock."""
+    clock = float(line["clock"])
+    return f"{clock:.1f} s" if clock < LATEST else f"{clock:.1e} s"
 
 
 def told(line: Line) -> Text | None:
@@ -166,7 +173,7 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
         text = told(line)
         if text is not None:
             at = datetime.fromtimestamp(line["time"]).astimezone()
-            table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(f"{line['clock']:.1f} s", "dim"), text)
+            table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_at(line), "dim"), text)
     state = State(summary.state)
     problems = [Text(f"problem: {shortened(problem)}", "red") for problem in summary.problems]
     program = Group(Text(), source_view(summary.program))

@@ -1,4 +1,4 @@
-"""Options that several commands have: which model is asked, and how."""
+"""Options that several commands have: which model is asked and how, and which Python has ROS."""
 
 from __future__ import annotations
 
@@ -23,3 +23,5 @@ TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may t
 BaseUrlOption = Annotated[
     str | None, typer.Option(help="Where the model is served, such as http://localhost:8000/v1.")
 ]
+RosPythonOption = Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")]
+ROS_PYTHON = Path("/usr/bin/python3")

@@ -3,37 +3,42 @@
 from __future__ import annotations
 
 import contextlib
-import re
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from codebotler.archive import recover
+from codebotler.archiving import tell_interrupted
 from codebotler.badinput import BadInput
 from codebotler.check import check
 from codebotler.checking import check_view, read_program
 from codebotler.drives import named_rooms
 from codebotler.generating import generated
+from codebotler.live import answered
 from codebotler.mission import GRACE, Mission, MissionError, State
 from codebotler.missionview import Watcher, ending, source_view
 from codebotler.models.base import Model
 from codebotler.problems import no_room
 from codebotler.program import called_skills
 from codebotler.prompts import prompt_for
-from codebotler.robots.base import NotReadyError, Robot, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.imagined import Plan
-from codebotler.simulator.robot import RobotError, is_found_by_itself
+from codebotler.simulator.robot import RobotError
 from codebotler.terminal import note, print_rich, says_yes, shortened, visible
-from codebotler.world import Room, World
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",
     signal.SIGTERM: "a signal to end",
     signal.SIGHUP: "the end of the terminal",
 }
+MOST_ROOMS = 1_000
+"""Of a robot, for a check: each drive is compared with all of them."""
+
+WITH_PATTERNS = frozenset({"simulated"})
+"""Robots whose rooms have regexes for names, as in the world files they come from."""
+
 OF_SIGNALS = 128  # what shells add to the number of a signal, for the status of a process that it ended
 
 
@@ -92,11 +97,10 @@ def run(robot: Robot, request: Request, home: Path) -> int:
         ModelError: no whole reply came.
     """
     program = read_program(request.what) if request.is_program else None
-    for summary in recover(home):
-        note(f"mission {summary.id} was interrupted: {visible(summary.reason)}")
+    tell_interrupted(home)
     instruction = "" if request.is_program else request.what
     with Reservation(robot, home) as reserved, Mission(home, robot.name, instruction) as mission:
-        plan = preflight(robot)
+        plan, place = preflight(robot)
         if program is None:
             model = request.model()
             program = written(model, request.what, plan)
@@ -105,28 +109,46 @@ def run(robot: Robot, request: Request, home: Path) -> int:
             mission.draft(program)
         if not _is_approved(mission, program, robot, plan, request):
             return 1
-        return _watched(mission, reserved, plan)
+        return _watched(mission, reserved, place)
 
 
-def preflight(robot: Robot) -> Plan | None:
-    """What a connected robot says of its rooms, as a check takes it; None if it says nothing.
+def preflight(robot: Robot) -> tuple[Plan | None, str]:
+    """What a connected robot says of its rooms, in its own words.
+
+    Returns:
+        the rooms as a check takes them, None if it says nothing that a check could take; and the one that it
+        is in, empty if it says nothing of that.
 
     Raises:
-        NotReadyError: it does not answer.
+        NotReadyError: it does not answer, or says what is no answer.
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
+
+    def told(skill: str) -> Result:
+        return answered(robot.skills[skill], robot.perform(skill, ())) if skill in can else None
+
     try:
-        rooms = robot.perform("get_all_rooms", ()) if "get_all_rooms" in can else None
-        here = robot.perform("get_current_location", ()) if "get_current_location" in can else None
+        rooms, here = told("get_all_rooms"), told("get_current_location")
     except RobotError as error:
         note(f"the robot does not say which rooms it knows: {visible(str(error))}")
-        return None
+        return None, ""
     except RobotLostError as error:
         raise NotReadyError(f"the robot does not say which rooms it knows: {error.sentence}") from None
+    except CancelledError:
+        raise NotReadyError("the robot does not say which rooms it knows: somebody stopped it") from None
+    place = here if isinstance(here, str) else ""
     if not isinstance(rooms, list) or not rooms:
-        return None
-    names = {room: room if is_found_by_itself(room) else re.escape(room) for room in rooms}
-    return Plan(tuple(names.values()), names.get(str(here), names[rooms[0]]))
+        return None, place
+    if len(rooms) > MOST_ROOMS:
+        note(
+            f"the robot knows {len(rooms):,} rooms, and a check takes {MOST_ROOMS:,} at most: the check uses "
+            "those that the program names instead"
+        )
+        return None, place
+    if place and place not in rooms:
+        note(shortened(f'the robot says it is in "{place}", which is none of the rooms that it knows'))
+    names = dict.fromkeys([*rooms, place] if place else rooms)
+    return Plan(tuple(names), place or rooms[0], plain=robot.name not in WITH_PATTERNS), place
 
 
 def unknown_rooms(program: str, plan: Plan) -> list[str]:
@@ -163,14 +185,12 @@ def written(model: Model, instruction: str, plan: Plan | None) -> str:
     """The program that a model writes for an instruction, with the rooms of the robot in mind."""
     if plan is None:
         return generated(model, prompt_for(instruction)).program
-    world = World(tuple(Room(name) for name in plan.rooms), plan.start)
-    return generated(model, prompt_for(instruction, rooms=plan.rooms), world=world).program
+    return generated(model, prompt_for(instruction, rooms=plan.rooms), plan=plan).program
 
 
 def _is_approved(mission: Mission, program: str, robot: Robot, plan: Plan | None, request: Request) -> bool:
     """Show what a check finds, and ask."""
-    rooms, start = (plan.rooms, plan.start) if plan else (None, None)
-    found = check(program, rooms=rooms, start=start)
+    found = check(program, plan=plan)
     name = request.what if request.is_program and request.what != "-" else "the program"
     if not request.is_program:
         print_rich(source_view(program))
@@ -195,12 +215,12 @@ def _is_approved(mission: Mission, program: str, robot: Robot, plan: Plan | None
     return True
 
 
-def _watched(mission: Mission, reserved: Reservation, plan: Plan | None) -> int:
+def _watched(mission: Mission, reserved: Reservation, place: str) -> int:
     """Run it before a user's eyes."""
     with _stopped_by_signals(mission) as got, Watcher(mission.summary) as watcher:
         mission.told = watcher
         with contextlib.suppress(MissionError):  # it was stopped before it could run
-            mission.run(reserved, plan.start if plan else "")
+            mission.run(reserved, place)
     print_rich(ending(mission.summary))
     if mission.state is State.STOPPED and got:
         return OF_SIGNALS + got[0]

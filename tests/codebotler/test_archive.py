@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import time
 from pathlib import Path
 
@@ -87,6 +89,26 @@ def test_mission_of_a_living_tool_is_left_alone(tmp_path: Path) -> None:
         with pytest.raises(BlockingIOError):
             Log(mission.folder)
     assert recover(tmp_path) == []
+
+
+@pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOSPC])
+def test_mission_that_cannot_be_closed_is_told_and_others_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    for name in ("20260101-000001", "20260101-000002"):
+        left(tmp_path, State.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
+
+    def open_log(folder: Path) -> Log:
+        if folder.name.endswith("1"):
+            raise OSError(number, os.strerror(number), str(folder / EVENTS))
+        return Log(folder)
+
+    monkeypatch.setattr("codebotler.archive.Log", open_log)
+    told: list[tuple[str, int | None]] = []
+    (summary,) = recover(tmp_path, lambda mission, error: told.append((mission, error.errno)))
+    assert summary.state == "interrupted"
+    assert told == [("20260101-000001", number)]
+    assert [summary.state for summary in missions(tmp_path)] == ["running", "interrupted"]
 
 
 def test_missions_come_in_their_order(tmp_path: Path) -> None:

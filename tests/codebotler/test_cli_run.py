@@ -286,6 +286,35 @@ def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path)
     assert "interrupted" in out
 
 
+def test_mission_that_cannot_be_closed_keeps_nobody_from_anything(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        process.kill()
+        process.wait(30)
+    (left,) = (folder / "home" / "missions").iterdir()
+    (left / "mission.json.new").mkdir()  # as if nothing could be written there, also for root
+    status, out, err = ended(folder, "missions")
+    assert (status, err.count("\n")) == (0, 1)
+    assert err.startswith(f"mission {left.name} may have been interrupted, but cannot be closed: {left}")
+    assert left.name in out
+    assert ended(folder, "missions", "last", "--json")[0] == 0
+    assert run(folder, "good.py", "--yes")[0] == 0
+
+
+@pytest.mark.parametrize("what", ["home", "home/missions"])
+def test_home_that_is_no_folder_is_said(folder: Path, what: str) -> None:
+    (folder / what).parent.mkdir(exist_ok=True)
+    (folder / what).touch()
+    for arguments in (
+        ["missions"],
+        ["missions", "last"],
+        ["run", "good.py", "--yes", "--world", "world.yaml"],
+    ):
+        status, out, err = ended(folder, *arguments)
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        assert "home/missions: this cannot be a folder of missions; name another by CODEBOTLER_HOME" in err
+
+
 def test_two_tools_on_one_robot(folder: Path) -> None:
     process = driving(folder)
     with stopping(process):
@@ -347,6 +376,19 @@ def test_missions_are_listed_and_shown(folder: Path) -> None:
     assert (data["id"], data["events"][-1]["state"]) == (name, "done")
 
 
+@pytest.mark.parametrize("seconds", ["1e300", "999_999.94", "1_000_000", "5"])
+def test_times_take_little_room_however_long_a_program_sleeps(folder: Path, seconds: str) -> None:
+    (folder / "long.py").write_text(f"def task_program():\n    time.sleep({seconds})\n    say('late')\n")
+    status, out, _ = run(folder, "long.py", "--yes", "--despite-problems")
+    assert status == 0
+    (line,) = (line for line in out.splitlines() if line.endswith('says "late"'))
+    time = f"{float(seconds):.1f}" if float(seconds) < 1e6 else f"{float(seconds):.1e}"
+    assert line == f'{time:>8} s  says "late"'
+    _, out, _ = ended(folder, "missions", "last")
+    assert max(map(len, out.splitlines())) < 100
+    assert f"{time} s" in out
+
+
 def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
     line = f"    say({'long ' * 40!r})"
     (folder / "long.py").write_text(f"def task_program():\n{line}\n")
@@ -391,3 +433,11 @@ def test_robots_are_listed_with_what_is_missing(folder: Path) -> None:
     kinds = json.loads(out)
     assert [kind["name"] for kind in kinds] == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert all(kind["works"] or kind["missing"] for kind in kinds)
+
+
+def test_robots_are_judged_by_the_python_that_is_named(folder: Path) -> None:
+    status, out, err = ended(folder, "robots", "--json", "--ros-python", sys.executable)
+    assert (status, err) == (0, "")
+    missing = {kind["name"]: kind["missing"] for kind in json.loads(out)}
+    assert missing["ros1"].startswith(f"{sys.executable} lacks rospy")
+    assert missing["ros2"].startswith(f"{sys.executable} lacks rclpy")

@@ -172,7 +172,14 @@ def test_robots_own_words_are_kept() -> None:
 
 @pytest.mark.parametrize(
     ("skill", "arguments", "answer"),
-    [("is_in_room", ["mug"], "yes"), ("get_current_location", [], None), ("say", ["hello"], "hello")],
+    [
+        ("is_in_room", ["mug"], "yes"),
+        ("get_current_location", [], None),
+        ("say", ["hello"], "hello"),
+        ("get_all_rooms", [], "hall"),
+        ("get_all_rooms", [], [1, None, {}]),
+        ("get_all_rooms", [], ["hall", ["lab"]]),
+    ],
 )
 def test_answer_that_the_skill_does_not_have_loses_the_robot(
     skill: str, arguments: list[str], answer: Result

@@ -21,7 +21,10 @@ from codebotler.missionlog import EVENTS, SUMMARY, Line, Summary, events_of
 from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
+from codebotler.simulator import conversation
+from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
+from codebotler.trace import Outcome
 from codebotler.world import Room, World
 from doubles import Answering, giving, raising
 from processes import are_gone, children_of
@@ -496,6 +499,27 @@ def test_stop_before_it_runs_ends_it(home: Path) -> None:
     assert mission.summary.reason == "stopped by the test before it ran"
 
 
+def test_stop_just_before_the_program_begins_lets_it_not_begin(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[str] = []
+
+    class Slow(Lane):
+        def __init__(self) -> None:
+            mission.stop("the test")
+            super().__init__()
+
+        def run_live(self, source: str, robot: conversation.Robot) -> Outcome:
+            begun.append(source)
+            return super().run_live(source, robot)
+
+    monkeypatch.setattr(module, "Lane", Slow)
+    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+        assert mission.run(reserved) is State.STOPPED
+    assert begun == []
+    assert mission.summary.reason == "stopped by the test"
+
+
 def test_stop_at_any_moment_ends_as_stopped(home: Path) -> None:
     for number in range(8):
         with Reservation(Answering(), home) as reserved, ready(home, STUBBORN) as mission:
@@ -614,7 +638,7 @@ def test_robots_at_other_addresses_do_not_exclude_each_other(home: Path) -> None
     one, two = Answering(), Answering()
     one.address, two.address = "http://here:11311/", "http://there:11311/"
     with Reservation(one, home), Reservation(two, home):
-        assert len(list((home / "robots").iterdir())) == 2
+        assert not (home / "robots").exists()
 
 
 def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
@@ -622,8 +646,17 @@ def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
         def connect(self) -> None:
             raise NotReadyError("no master")
 
+    class Half(Answering):
+        def connect(self) -> None:
+            super().connect()
+            raise NotReadyError("no master")
+
     with pytest.raises(NotReadyError, match="no master"):
         Reservation(Missing(), home).__enter__()
+    half = Half()
+    with pytest.raises(NotReadyError, match="no master"):
+        Reservation(half, home).__enter__()
+    assert half.connections == 0, "what it has opened is closed"
     with Reservation(Answering(), home):
         pass
 

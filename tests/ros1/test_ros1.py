@@ -17,7 +17,7 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros import Waits
+from codebotler.robots.ros import Ros, RosRobot, Waits
 from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, Parameter, RosAction, Skill
@@ -341,6 +341,56 @@ def test_goals_of_a_worker_that_was_killed_with_its_tool_are_cancelled_by_the_ne
         server.expect("cancel", "never")
 
 
+def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: Graph) -> None:
+    server = graph.serve(GO_TO, SAY)
+    robot = graph.robot()
+    robot.connect()
+    with pytest.raises(RobotLostError, match="sent no result"):
+        robot.perform("go_to", ["no result"])
+    server.expect("goal", "no result")
+    robot.disconnect()
+    environment = {"ROS_MASTER_URI": graph.uri}
+    other = RosRobot(Ros("ros1", SCRIPT, PYTHON, environment, graph.uri, node="somebody_else"))
+    other.connect()
+    with started(lambda: other.perform("say", ["never"])) as ended:  # stands for what nobody looks after
+        server.expect("goal", "never")
+        robot.connect()
+        server.expect("cancel", "never")
+    assert isinstance(ended["error"], CancelledError)
+    with started(lambda: other.perform("say", ["never"])):
+        server.expect("goal", "never")
+        robot.connect()
+        robot.perform("go_to", ["the hall"])
+        server.expect("goal", "the hall")  # nothing is in doubt any more
+        other.disconnect()
+
+
+CANCELLED = """
+import ros1_worker
+class Cancelled(ros1_worker.Worker):
+    def _send(self, goal, arguments):
+        goal.cancel()
+        super()._send(goal, arguments)
+ros1_worker.main(Cancelled)
+"""
+
+
+def test_goal_that_is_cancelled_before_it_is_sent_never_is(graph: Graph, tmp_path: Path) -> None:
+    server = graph.serve(SAY)
+    script = tmp_path / "cancelled.py"
+    script.write_text(CANCELLED)
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(SCRIPT.parent)}
+    robot = RosRobot(Ros("ros1", script, PYTHON, environment, graph.uri))
+    robot.connect()
+    with pytest.raises(CancelledError):
+        robot.perform("say", ["hello"])
+    robot.disconnect()
+    after = graph.robot()
+    after.connect()
+    after.perform("say", ["after that"])
+    server.expect("goal", "after that")
+
+
 def test_second_tool_is_refused_and_the_first_goes_on(graph: Graph) -> None:
     graph.serve(GO_TO)
     first, second = graph.robot(), graph.robot()
@@ -367,6 +417,40 @@ def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> Non
             assert other.stdin is not None
             other.stdin.close()
     assert isinstance(ended["error"], CancelledError)
+
+
+LATE = f"""
+import subprocess, sys, time
+import ros1_worker
+class Late(ros1_worker.Worker):
+    def _servers(self, actions):
+        servers = super()._servers(actions)
+        other = "import rospy; rospy.init_node('codebotler', disable_signals=True); rospy.sleep({LONG})"
+        self.other = subprocess.Popen([sys.executable, "-c", other])
+        while not self.graph.is_left():
+            time.sleep(0.01)
+        return servers
+    def _missing(self):
+        missing = super()._missing()
+        assert not self.graph.is_forgotten()
+        said = set(missing.values())
+        assert all("another node called /codebotler has taken over" in why for why in said), said
+        self.other.kill()
+        return missing
+ros1_worker.main(Late)
+"""
+
+
+def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_path: Path) -> None:
+    graph.serve(GO_TO)
+    script = tmp_path / "late.py"
+    script.write_text(LATE)
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(SCRIPT.parent)}
+    robot = RosRobot(Ros("ros1", script, PYTHON, environment, graph.uri), waits=Waits(patience=LONG))
+    began = time.monotonic()
+    with pytest.raises(NotReadyError, match=r"^another node called /codebotler has"):
+        robot.connect()
+    assert time.monotonic() - began < LONG / 2, "no server is waited for any more"
 
 
 def test_text_that_no_message_can_hold_is_said(graph: Graph) -> None:

@@ -10,6 +10,7 @@ import os
 import re
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,7 @@ from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
+from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import Waits
 from codebotler.robots.rosbridge import Rosbridge
 from codebotler.simulator.robot import RobotError
@@ -213,6 +215,19 @@ def test_no_rosbridge_is_said_with_the_mend() -> None:
 # --- ROS 2, against a stand-in
 
 
+@pytest.mark.parametrize("other", ["ws://127.0.0.1:{}/", "WS://LocalHost:{}", "ws://[::1]:{}"])
+def test_two_tools_are_kept_from_one_robot_whatever_their_homes_and_words(tmp_path: Path, other: str) -> None:
+    with bridge(like_ros_2([])) as double:
+        port = double.address.rpartition(":")[2]
+        with (
+            Reservation(Rosbridge(double.address), tmp_path / "one"),
+            pytest.raises(NotReadyError, match=f"another tool .process {os.getpid()}, since"),
+        ):
+            Reservation(Rosbridge(other.format(port)), tmp_path / "two").__enter__()
+        with Reservation(Rosbridge(f"ws://localhost:{port}/"), tmp_path / "two"):
+            pass
+
+
 @pytest.fixture
 def heard() -> list[dict[str, Any]]:
     return []
@@ -281,6 +296,42 @@ def test_message_that_is_none_is_survived_and_shown_without_what_a_terminal_obey
             robot.perform("say", ["hello"])
         assert re.search(r"no message of rosbridge|\\x1b\[2Jbad", error.value.sentence)
         assert error.value.sentence.isprintable()
+        robot.disconnect()
+
+
+@pytest.mark.parametrize(
+    ("end", "error"),
+    [
+        ({"status": 4, "values": {}}, CancelledError),
+        ({"status": 6, "values": {}}, CancelledError),
+        ({"status": 5, "values": {}}, CancelledError),
+        ({"values": "no such goal", "result": False}, RobotLostError),
+    ],
+)
+def test_stand_in_for_ros_2_may_end_a_stopped_goal_in_any_way(
+    end: dict[str, Any], error: type[Exception]
+) -> None:
+    sent = threading.Event()
+
+    def handle(connection: ServerConnection) -> None:
+        for text in connection:
+            message = json.loads(text)
+            if message["op"] == "call_service":
+                values = {"version": 2}
+                answer = {"op": "service_response", "id": message["id"], "result": True, "values": values}
+                connection.send(json.dumps(answer))
+            elif message["op"] == "send_action_goal":
+                sent.set()
+            else:
+                connection.send(json.dumps({"op": "action_result", "id": message["id"], **end}))
+
+    with bridge(handle) as double:
+        robot = Rosbridge(double.address)
+        robot.connect()
+        with started(lambda: robot.perform("go_to", ["the hall"])) as ended:
+            assert sent.wait(30)
+            robot.cancel()
+        assert type(ended["error"]) is error
         robot.disconnect()
 
 

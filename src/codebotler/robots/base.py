@@ -46,7 +46,10 @@ class Robot(Protocol):
 
     @property
     def address(self) -> str:
-        """What tells it from others of its kind, such as the URI of a ROS master; empty if it is alone."""
+        """What tells it from others of its kind, such as the URI of a ROS master; empty if it is ours alone.
+
+        Two that lead to the same robot are equal, see `codebotler.robots.address`.
+        """
 
     @property
     def if_tool_dies(self) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from pathlib import Path
 from typing import Protocol, cast
 
 from codebotler.badinput import BadInput
@@ -16,6 +17,9 @@ KINDS = {
     "ros2": "ros2",
 }
 """Kinds of robots as a user names them, with the module of each."""
+
+OF_A_PYTHON = frozenset({"ros1", "ros2"})
+"""Kinds that need an interpreter to which ROS belongs."""
 
 ABSENT = "it is not part of this version"
 
@@ -32,6 +36,13 @@ class Kind(Protocol):
         Raises:
             BadInput: what the user says of it is missing or wrong.
         """
+
+
+class RosKind(Protocol):
+    """A module about one kind of robot that has a worker."""
+
+    def readiness(self, python: Path) -> Readiness:
+        """Whether such robots can be used with an interpreter; takes less than a second."""
 
 
 def open_robot(name: str, options: Options | None = None) -> Robot:
@@ -52,13 +63,20 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
     return kind.robot(options or Options())
 
 
-def all_readiness() -> list[Readiness]:
-    """Of each kind of robot, whether it can be used here, and if not, what is missing."""
-    kinds = {name: _kind(name) for name in KINDS}
-    return [
-        kind.readiness() if kind else Readiness(name, works=False, missing=ABSENT)
-        for name, kind in kinds.items()
-    ]
+def all_readiness(ros_python: Path = Options.ros_python) -> list[Readiness]:
+    """Of each kind of robot, whether it can be used here, and if not, what is missing.
+
+    Args:
+        ros_python: the interpreter that the robot's ROS belongs to.
+    """
+    return [_readiness(name, ros_python) for name in KINDS]
+
+
+def _readiness(name: str, ros_python: Path) -> Readiness:
+    kind = _kind(name)
+    if kind is None:
+        return Readiness(name, works=False, missing=ABSENT)
+    return cast("RosKind", kind).readiness(ros_python) if name in OF_A_PYTHON else kind.readiness()
 
 
 def _kind(name: str) -> Kind | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from codebotler.badinput import BadInput
+from codebotler.robots.address import endpoint
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
@@ -20,6 +21,8 @@ MEND = (
     "apt-get install -y --no-install-recommends python3-rospy python3-actionlib python3-actionlib-msgs "
     "python3-genmsg python3-genpy python3-netifaces python3-rosmaster"
 )
+
+OTHER_PYTHON = f"codebotler robots --ros-python {PYTHON}"
 
 
 class Ros1(RosRobot):
@@ -45,8 +48,8 @@ class Ros1(RosRobot):
         speed: float | None = 1.0,
         waits: Waits | None = None,
     ) -> None:
-        address = master_uri(master)
-        ros = Ros("ros1", SCRIPT, python, {"ROS_MASTER_URI": address}, address)
+        uri = master_uri(master)
+        ros = Ros("ros1", SCRIPT, python, {"ROS_MASTER_URI": uri}, endpoint(uri))
         super().__init__(ros, skills, speed, waits)
 
 
@@ -71,11 +74,10 @@ def readiness(python: Path = PYTHON) -> Readiness:
     """Whether the interpreter has rospy and what belongs to it."""
     missing = lacks(python, NEEDS)
     if missing is None:
-        return Readiness(
-            "ros1", works=False, missing=f"{python} cannot be run", mend="name another: --ros-python"
-        )
+        return Readiness("ros1", works=False, missing=f"{python} cannot be run", mend=OTHER_PYTHON)
     if missing:
-        return Readiness("ros1", works=False, missing=f"{python} lacks {', '.join(missing)}", mend=MEND)
+        mend = MEND if python == PYTHON else OTHER_PYTHON
+        return Readiness("ros1", works=False, missing=f"{python} lacks {', '.join(missing)}", mend=mend)
     return Readiness("ros1", works=True, note=f"by {python}; needs a master, see ROS_MASTER_URI")
 
 

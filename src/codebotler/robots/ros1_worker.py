@@ -222,7 +222,7 @@ class Graph:
         rospy.signal_shutdown("the end")
 
     def is_left(self) -> bool:
-        """Whether this is a node no more, since another one has taken its name."""
+        """Whether this is a node no more; the master ends one when another of its name comes."""
         import rospy
 
         return bool(rospy.is_shutdown())
@@ -243,11 +243,22 @@ class Graph:
         except self._rosgraph.MasterException:
             return None
 
-    def knows_us(self) -> bool:
-        """Whether the master still knows this node; one that was started anew does not."""
+    def is_taken(self) -> bool:
+        """Whether another node has our name."""
         import rospy
 
-        return self.is_online() and self.address_of(self.node) == rospy.get_node_uri()
+        if self.is_left() or not self.is_online():
+            return self.is_left()
+        address = self.address_of(self.node)
+        return address not in (None, rospy.get_node_uri()) and is_alive(str(address))
+
+    def is_forgotten(self) -> bool:
+        """Whether the master answers, but knows nobody of our name; one that was started anew does not."""
+        import rospy
+
+        if self.is_taken() or not self.is_online():
+            return False
+        return bool(self.address_of(self.node) != rospy.get_node_uri())
 
     def nodes_of(self, server: str) -> list[str]:
         """The nodes that say they take the goals of an action server; they may have died."""
@@ -258,7 +269,9 @@ class Graph:
         """Why there is no connection with an action server."""
         if not self.is_online():
             return f"{server} is gone, and so is the ROS master at {self.uri}; start it again"
-        if not self.knows_us():
+        if self.is_taken():
+            return taken_over(self.node)
+        if self.is_forgotten():
             return f"the ROS master at {self.uri} was started anew; connect again"
         nodes = self.nodes_of(server)
         if not nodes:
@@ -272,6 +285,11 @@ class Graph:
             f"definition of {action} differs (another md5; compare with `rosmsg md5 {action}Goal`), or its "
             "machine cannot be reached (see ROS_IP and ROS_HOSTNAME)"
         )
+
+
+def taken_over(node: str) -> str:
+    """What to say where another node has our name."""
+    return f"another node called {node} has taken over; let that one end, and connect again"
 
 
 def no_master(uri: str) -> str:
@@ -405,6 +423,8 @@ class Worker:
         self.graph, left_behind = self._entered(start["node"])
         self.servers: dict[str, Any] = self._servers(start["actions"])
         missing = self._missing()
+        if missing and self.graph.is_taken():
+            raise NotReadyError(taken_over(self.graph.node))
         if left_behind or start["cancel_all"]:
             self._cancel_all()
         threading.Thread(target=self._watch, daemon=True).start()
@@ -451,6 +471,8 @@ class Worker:
         until = time.monotonic() + self.patience
         awaited = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
         while not all(s.is_connected(self.silence) for s in awaited) and time.monotonic() < until:
+            if self.graph.is_left():
+                break
             time.sleep(0.005)
         return {
             skill: self.graph.why_missing(server.name, server.type)
@@ -473,7 +495,7 @@ class Worker:
 
     def _wait_and_send(self, goal: Goal, arguments: list[Any]) -> None:
         until = time.monotonic() + self.patience
-        while time.monotonic() < until and goal.cancelled is None:
+        while time.monotonic() < until and goal.cancelled is None and not self.graph.is_left():
             if goal.server.is_connected(self.silence):
                 self._send(goal, arguments)
                 return
@@ -482,7 +504,7 @@ class Worker:
             self._end(goal, "cancelled")
             return
         why = self.graph.why_missing(goal.server.name, goal.server.type)
-        self._end(goal, "unsent", text=why, anew=self.graph.is_online() and not self.graph.knows_us())
+        self._end(goal, "unsent", text=why, anew=self.graph.is_forgotten())
 
     def _send(self, goal: Goal, arguments: list[Any]) -> None:
         import genpy
@@ -586,7 +608,7 @@ class Worker:
                 self.channel.tell("alive")
                 told = now
             if self.graph.is_left():
-                self.channel.tell("gone", text=f"another node called {self.graph.node} has taken over")
+                self.channel.tell("gone", text=taken_over(self.graph.node))
                 return
             goal = self.goal
             if goal is not None and not goal.is_over:

@@ -6,17 +6,20 @@ It was tested against a stand-in for rclpy only, never on a ROS 2 graph: none wa
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from codebotler.badinput import BadInput
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import Ros, RosRobot, Waits
+from codebotler.robots.ros1 import OTHER_PYTHON, PYTHON
 from codebotler.robots.worker import lacks
 from codebotler.skills import SKILLS, SkillTable
 
 SCRIPT = Path(__file__).with_name("ros2_worker.py")
-PYTHON = Path("/usr/bin/python3")
 NEEDS = ("rclpy", "action_msgs", "robot_actions_pkg")
+INSTALL = "apt-get install -y ros-jazzy-ros-base && source /opt/ros/jazzy/setup.bash"
+BUILD = "cd ~/ros2_ws && colcon build --packages-select robot_actions_pkg && source install/setup.bash"
 NOTE = "tested against a stand-in for rclpy only, never on a ROS 2 graph"
 
 
@@ -48,13 +51,25 @@ class Ros2(RosRobot):
 def readiness(python: Path = PYTHON) -> Readiness:
     """Whether the interpreter has rclpy and the robot's actions."""
     missing = lacks(python, NEEDS)
-    mend = "source the setup.bash of ROS 2 and of the workspace with robot_actions_pkg"
     if missing is None:
-        return Readiness("ros2", works=False, missing=f"{python} cannot be run", mend=mend, note=NOTE)
+        return Readiness("ros2", works=False, missing=f"{python} cannot be run", mend=OTHER_PYTHON, note=NOTE)
     if missing:
         lacking = f"{python} lacks {', '.join(missing)}"
-        return Readiness("ros2", works=False, missing=lacking, mend=mend, note=NOTE)
+        return Readiness("ros2", works=False, missing=lacking, mend=mend_of(missing), note=NOTE)
     return Readiness("ros2", works=True, note=NOTE)
+
+
+def mend_of(missing: Sequence[str], installed: Path = Path("/opt/ros")) -> str:
+    """The command that gives an interpreter the modules of ROS 2 that it lacks.
+
+    Args:
+        missing: their names.
+        installed: where the versions of ROS lie.
+    """
+    if set(missing) == {"robot_actions_pkg"}:
+        return BUILD
+    setups = sorted(path for path in installed.glob("*/setup.bash") if (path.parent / "share/rclpy").is_dir())
+    return f"source {setups[-1]}" if setups else INSTALL
 
 
 def robot(options: Options) -> Ros2:

@@ -59,13 +59,13 @@ class Graph2:
         """Whether this is a node no more."""
         return not self._rclpy.ok()
 
-    def is_online(self) -> bool:
-        """There is nobody who could be away."""
-        return True
+    def is_taken(self) -> bool:
+        """Another node of our name ends nothing here."""
+        return False
 
-    def knows_us(self) -> bool:
+    def is_forgotten(self) -> bool:
         """There is nobody who could forget us."""
-        return True
+        return False
 
     def nodes_of(self, _server: str) -> list[str]:
         """Any node may yet be discovered."""

@@ -16,6 +16,7 @@ from types import MappingProxyType
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
+from codebotler.robots.address import endpoint
 from codebotler.robots.base import (
     Argument,
     CancelledError,
@@ -70,7 +71,8 @@ class Rosbridge:
         speed: float | None = 1.0,
         waits: Waits | None = None,
     ) -> None:
-        self.address, self.skills, self.clock = address or ADDRESS, skills, Clock(speed)
+        self._where = address or ADDRESS
+        self.address, self.skills, self.clock = endpoint(self._where), skills, Clock(speed)
         self._waits = waits or Waits()
         self._line: Line | None = None
         self._guard: Worker | None = None
@@ -86,8 +88,8 @@ class Rosbridge:
         """
         self.disconnect()
         actions = [skill.ros for skill in self.skills.rows if skill.ros is not None]
-        self._line, self._stopped = Line(self.address, actions, self._waits.patience), False
-        start = {"address": self.address, "opening": _advertised(self._line.dialect, actions)}
+        self._line, self._stopped = Line(self._where, actions, self._waits.patience), False
+        start = {"address": self._where, "opening": _advertised(self._line.dialect, actions)}
         self._guard = Worker(Path(sys.executable), GUARD, start, {"PYTHONSAFEPATH": "1"})
         self.clock.restart()
 
@@ -195,7 +197,7 @@ class Rosbridge:
     def _rescue(self, dialect: Dialect, skill: Skill, goal: str) -> str:
         """Cancel a goal over another connection; what became of that, in words."""
         assert skill.ros is not None
-        where, voice = self.address, Voice(self.address, _advertised(dialect, [skill.ros]))
+        where, voice = self._where, Voice(self._where, _advertised(dialect, [skill.ros]))
         is_said = voice.insist(dialect.cancel(skill.ros, goal))
         voice.close()
         if is_said:

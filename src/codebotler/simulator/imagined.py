@@ -48,13 +48,15 @@ class Plan:
     Args:
         rooms: their names, in the order in which the robot knows them.
         start: the one in which the robot starts.
-        guessed: whether nobody said which rooms there are. Names are then plain texts, and no regexes; and
-            driving to a place that is not among them finds it.
+        guessed: whether nobody said which rooms there are. Names are then plain, and driving to a place that
+            is not among them finds it.
+        plain: whether names are plain texts, as robots have them, and no regexes, as world files do.
     """
 
     rooms: tuple[str, ...]
     start: str
     guessed: bool = False
+    plain: bool = False
 
     @classmethod
     def of(cls, world: World) -> Plan:
@@ -63,12 +65,18 @@ class Plan:
 
     def room(self, request: str) -> str | None:
         """The room that a request finds; None if there is no such room."""
-        if not self.guessed:
+        if not (self.guessed or self.plain):
             return next((room for room in self.rooms if found_in(room, request)), None)
         wanted = request.strip()
-        same = [room for room in self.rooms if room.casefold() == wanted.casefold()]
+        same = [room for room in self.rooms if room.strip().casefold() == wanted.casefold()]
         within = (room for room in self.rooms if room.casefold() in wanted.casefold())
-        return same[0] if same else next(within, wanted or None)
+        return same[0] if same else next(within, (wanted or None) if self.guessed else None)
+
+    @property
+    def sure(self) -> tuple[str, ...]:
+        """The rooms that their own names find."""
+        is_plain = self.guessed or self.plain
+        return tuple(room for room in self.rooms if is_plain or is_found_by_itself(room))
 
 
 @dataclass(frozen=True)
@@ -151,8 +159,7 @@ class ImaginedRobot(SimulatedRobot):
         self.plan, self.lot = plan, lot
         self.only_looks |= {name for name, behaviour in does.items() if behaviour is look}
         if does.get("go_to") is drive:
-            sure = (room for room in plan.rooms if plan.guessed or is_found_by_itself(room))
-            self.surely = tuple(("go_to", room) for room in sure)
+            self.surely = tuple(("go_to", room) for room in plan.sure)
         self.things = defaultdict(list)
         self.answers = defaultdict(list)  # of nobody whom a world file would name
         self.scenes: defaultdict[str, Scene] = defaultdict(Scene)

@@ -1,15 +1,20 @@
 """The simulated robot drives at walking pace, tells where it is, and stops in the middle of everything."""
 
 import math
+import subprocess
+import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import pytest
 
 from codebotler.badinput import BadInput
+from codebotler.robots import ros1
 from codebotler.robots.base import CancelledError, Options, Picture, Robot
 from codebotler.robots.open import all_readiness, open_robot
+from codebotler.robots.ros2 import mend_of
 from codebotler.robots.scripted import METRES_PER_SECOND
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.robot import RobotError
@@ -134,3 +139,26 @@ def test_every_kind_of_robot_is_listed_with_what_is_missing() -> None:
     assert list(kinds) == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
     assert kinds["sim"].works
     assert all(kind.works or kind.missing for kind in kinds.values())
+
+
+@pytest.mark.parametrize("python", [Path(sys.executable), Path("/no/such/python")])
+def test_robots_on_ros_are_judged_by_the_python_that_is_named(python: Path) -> None:
+    kinds = {kind.name: kind for kind in all_readiness(python)}
+    for name in ("ros1", "ros2"):
+        assert not kinds[name].works
+        assert kinds[name].missing.startswith(str(python))
+
+
+def test_each_mend_is_a_command(tmp_path: Path) -> None:
+    mends = [
+        kind.mend for path in (sys.executable, "/no", "/bin/false") for kind in all_readiness(Path(path))
+    ]
+    mends += [ros1.MEND, mend_of(["robot_actions_pkg"]), mend_of(["rclpy", "robot_actions_pkg"], tmp_path)]
+    for version in ("humble", "noetic"):
+        (tmp_path / version / "share").mkdir(parents=True)
+        (tmp_path / version / "setup.bash").touch()
+    (tmp_path / "humble" / "share" / "rclpy").mkdir()
+    assert mend_of(["rclpy"], tmp_path) == f"source {tmp_path}/humble/setup.bash"
+    for mend in filter(None, mends):
+        assert mend.split()[0] in {"apt-get", "cd", "codebotler", "pip", "python3", "source"}
+        subprocess.run(["bash", "-n", "-c", mend], check=True)

@@ -1,0 +1,124 @@
+"""One robot is kept for one tool, however its address is written, and where nobody else can meddle."""
+
+from __future__ import annotations
+
+import os
+import socket
+from pathlib import Path
+
+import pytest
+
+from codebotler.robots.address import endpoint
+from codebotler.robots.base import NotReadyError
+from codebotler.robots.reservation import Reservation, machine_wide
+from codebotler.robots.ros1 import Ros1
+from codebotler.robots.rosbridge import Rosbridge
+from doubles import Answering
+
+
+def addressed(address: str) -> Answering:
+    robot = Answering()
+    robot.address = address
+    return robot
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        *("ws://robot:9090", "WS://Robot:9090/", "ws://robot:9090//", "ws://robot.:9090", " ws://robot:9090"),
+        "ws://ann:secret@robot:9090",
+    ],
+)
+def test_addresses_of_one_robot_are_one(address: str) -> None:
+    assert endpoint(address) == "ws://robot:9090"
+    assert Rosbridge(address).address == "ws://robot:9090"
+
+
+@pytest.mark.parametrize(
+    "host", ["localhost", "LOCALHOST", "127.0.0.1", "[::1]", "[0:0:0:0:0:0:0:1]", socket.gethostname()]
+)
+def test_names_of_this_machine_are_one(host: str) -> None:
+    assert Ros1(f"http://{host}:11311/").address == "http://127.0.0.1:11311"
+    assert Rosbridge(f"ws://{host}").address == "ws://127.0.0.1:80"
+    assert Rosbridge().address == "ws://127.0.0.1:9090"
+
+
+@pytest.mark.parametrize("address", ["nonsense", "", "ws://", "ws://robot:a", "ws://[::1", "ftp://robot"])
+def test_what_is_no_address_stays_as_it_is(address: str) -> None:
+    assert endpoint(address) == address
+
+
+def test_addresses_of_other_robots_stay_apart() -> None:
+    others = (
+        "ws://a:1",
+        "ws://a:2",
+        "ws://b:1",
+        "wss://a:1",
+        "ws://a:1/x",
+        "ws://a:1/x?y",
+        "ws://[fe80::1]:1",
+    )
+    assert len({endpoint(address) for address in others}) == len(others)
+
+
+def test_robot_with_an_address_is_kept_whatever_the_home(tmp_path: Path) -> None:
+    with (
+        Reservation(addressed("ws://robot:9090"), tmp_path / "one"),
+        pytest.raises(NotReadyError, match="another tool"),
+    ):
+        Reservation(addressed("ws://robot:9090"), tmp_path / "two").__enter__()
+    with Reservation(Answering(), tmp_path / "one"), Reservation(Answering(), tmp_path / "two"):
+        assert [file.name for file in (tmp_path / "one" / "robots").iterdir()] == ["answering.lock"]
+
+
+@pytest.mark.parametrize("address", [f"ws://{'x' * 5_000}:9090", "\ud800", "ws://../../robot:9090"])
+def test_any_address_can_be_locked(address: str, tmp_path: Path) -> None:
+    with Reservation(addressed(address), tmp_path), pytest.raises(NotReadyError, match="another tool"):
+        Reservation(addressed(address), tmp_path).__enter__()
+
+
+def test_locks_lie_where_nobody_else_can_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    tmp_path.chmod(0o700)
+    assert machine_wide() == tmp_path / "codebotler"
+    assert (tmp_path / "codebotler").stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("runtime", [None, "", "run", "/no/such/folder", "others"])
+def test_without_a_runtime_folder_locks_are_temporary(
+    runtime: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.robots.reservation.gettempdir", lambda: str(tmp_path))
+    if runtime is None:
+        monkeypatch.delenv("XDG_RUNTIME_DIR")
+    elif runtime == "others":
+        (tmp_path / "run").mkdir()
+        (tmp_path / "run").chmod(0o777)
+        monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
+    else:
+        monkeypatch.setenv("XDG_RUNTIME_DIR", runtime)
+    assert machine_wide() == tmp_path / f"codebotler-{os.getuid()}"
+
+
+@pytest.mark.parametrize("what", ["link", "file", "open", "somebody else's"])
+def test_folder_of_locks_that_is_not_ours_is_refused(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / f"codebotler-{os.getuid()}"
+    monkeypatch.delenv("XDG_RUNTIME_DIR")
+    monkeypatch.setattr("codebotler.robots.reservation.gettempdir", lambda: str(tmp_path))
+    match what:
+        case "link":
+            folder.symlink_to(tmp_path)
+        case "file":
+            folder.touch()
+        case "open":
+            folder.mkdir()
+            folder.chmod(0o777)
+        case _:
+            folder.mkdir(0o700)
+            uid = os.getuid()
+            monkeypatch.setattr("os.getuid", lambda: uid + 1)
+            folder.rename(tmp_path / f"codebotler-{uid + 1}")
+    with pytest.raises(NotReadyError, match=r"it is no folder that only you can write in; remove it"):
+        Reservation(addressed("ws://robot:9090"), tmp_path).__enter__()
