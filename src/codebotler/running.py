@@ -36,7 +36,7 @@ SIGNALS = {
 MOST_ROOMS = 1_000
 """Of a robot, for a check: each drive is compared with all of them."""
 
-WITH_PATTERNS = frozenset({"simulated"})
+WITH_PATTERNS = frozenset({"simulated", "pyrobosim"})
 """Robots whose rooms have regexes for names, as in the world files they come from."""
 
 OF_SIGNALS = 128  # what shells add to the number of a signal, for the status of a process that it ended

@@ -24,6 +24,7 @@ from codebotler.robots.open import all_readiness
 from codebotler.robots.pyrobosim import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY
+from codebotler.running import preflight
 from codebotler.simulator.engine import run
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
@@ -467,3 +468,9 @@ def test_command_runs_a_program_and_ctrl_c_stops_it(tmp_path: Path) -> None:
 def test_it_is_listed() -> None:
     (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
     assert kind.works
+
+
+def test_rooms_are_regexes_for_the_check_as_in_its_world() -> None:
+    plan, place = preflight(connected(World((Room("hall"), Room("kitchen|cafe")), "hall")))
+    assert plan is not None
+    assert (plan.room("the cafe"), place) == ("kitchen|cafe", "hall")
