@@ -16,8 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median, quantiles
 
-from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
+from codebotler.robots.ros import PYTHON, actions_of
+from codebotler.robots.ros1 import SCRIPT, Ros1
 from codebotler.robots.virtual import VirtualRobot
 from codebotler.skills import SKILLS
 from codebotler.world import Room, World

@@ -29,8 +29,8 @@ from codebotler.perception import (
 )
 from codebotler.perception.open import LEAST_SCORE, LOOKING
 from codebotler.robots.base import NotReadyError
-from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1 import PYTHON, master_uri
+from codebotler.robots.ros import PYTHON, actions_of
+from codebotler.robots.ros1 import master_uri
 from codebotler.robots.virtual import SCRIPT
 from codebotler.robots.worker import Worker
 from codebotler.skills import SKILLS, SkillTable

@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from codebotler.robots.ros import Waits
-from codebotler.robots.ros1 import PYTHON, SCRIPT, Ros1
+from codebotler.robots.ros import PYTHON, Waits
+from codebotler.robots.ros1 import SCRIPT, Ros1
 from codebotler.skills import SKILLS, Skill
 
 HERE = Path(__file__).parent

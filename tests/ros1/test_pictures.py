@@ -22,8 +22,8 @@ from PIL import Image
 from codebotler.missionlog import events_of
 from codebotler.perception import image_of
 from codebotler.robots.base import CancelledError, Picture
-from codebotler.robots.ros import Waits
-from codebotler.robots.ros1 import PYTHON, SCRIPT
+from codebotler.robots.ros import PYTHON, Waits
+from codebotler.robots.ros1 import SCRIPT
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS
 from ros_graph import LONG, Graph, Process, free_port, started

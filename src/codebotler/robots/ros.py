@@ -24,6 +24,8 @@ from codebotler.robots.worker import ENDED, Message, Worker
 from codebotler.simulator.robot import RobotError
 from codebotler.skills import SKILLS, Skill, SkillTable
 
+PYTHON = Path("/usr/bin/python3")
+OTHER_PYTHON = f"codebotler robots --ros-python {PYTHON}"
 CANCELS = 1.0  # seconds within which the worker must have passed on a cancel
 NAMED = re.compile(r"([A-Z][A-Za-z]+): (.+)", re.DOTALL)
 """A server's words that begin with the kind of the error."""

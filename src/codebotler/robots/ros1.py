@@ -9,20 +9,17 @@ from urllib.parse import urlsplit
 from codebotler.badinput import BadInput
 from codebotler.robots.address import endpoint
 from codebotler.robots.base import Options, Readiness
-from codebotler.robots.ros import Ros, RosRobot, Waits
+from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
 from codebotler.skills import SKILLS, SkillTable
 
 SCRIPT = Path(__file__).with_name("ros1_worker.py")
 MASTER = "http://localhost:11311"
-PYTHON = Path("/usr/bin/python3")
 NEEDS = ("rospy", "actionlib", "actionlib_msgs", "genpy", "genmsg", "netifaces")
 MEND = (
     "apt-get install -y --no-install-recommends python3-rospy python3-actionlib python3-actionlib-msgs "
     "python3-genmsg python3-genpy python3-netifaces python3-rosmaster"
 )
-
-OTHER_PYTHON = f"codebotler robots --ros-python {PYTHON}"
 
 
 class Ros1(RosRobot):

@@ -11,8 +11,7 @@ from pathlib import Path
 
 from codebotler.badinput import BadInput
 from codebotler.robots.base import Options, Readiness
-from codebotler.robots.ros import Ros, RosRobot, Waits
-from codebotler.robots.ros1 import OTHER_PYTHON, PYTHON
+from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
 from codebotler.skills import SKILLS, SkillTable
 

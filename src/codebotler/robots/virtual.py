@@ -10,8 +10,8 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from codebotler.robots.base import Argument, CancelledError, RobotLostError, untold
-from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1 import PYTHON, master_uri
+from codebotler.robots.ros import PYTHON, actions_of
+from codebotler.robots.ros1 import master_uri
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.worker import Message, Worker
 from codebotler.simulator.robot import RobotError
