@@ -78,6 +78,25 @@ def test_states_and_events_of_missions_are_documented() -> None:
     assert set(re.findall(r"`(\w+)`", rows["event"])) == set(WORDS)
 
 
+def test_every_command_about_reports_runs(tmp_path: Path) -> None:
+    printed = [run(commands, tmp_path, "") for commands in blocks("report.md", "sh")]
+    assert (tmp_path / "report" / "index.html").exists()
+    told = [block for block in blocks("report.md", "text") if "drawn at random" in block]
+    assert told
+    assert all(any(block.strip() in out for out in printed) for block in told)
+
+
+def test_every_table_and_figure_of_a_report_is_explained(tmp_path: Path) -> None:
+    page = (DOCS / "report.md").read_text()
+    for commands in blocks("report.md", "sh")[:2]:
+        run(commands, tmp_path, "")
+    made = {path.stem for path in (tmp_path / "report").glob("*/*")}
+    assert set(re.findall(r"^\| `([\w-]+)` \|", page, re.MULTILINE)) >= made
+    for path in (tmp_path / "report" / "tables").iterdir():
+        for head in path.read_text().splitlines()[0].split(","):
+            assert f"*{head}*" in page or "recorded:" in head, (path.name, head)
+
+
 def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
     table = next(block for block in blocks("evaluate-your-model.md", "text") if "retries" in block)
     first, *_, last = [
@@ -87,7 +106,9 @@ def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
     assert table in run(last, tmp_path, "")
 
 
-@pytest.mark.parametrize("page", ["evaluate-your-model.md", "check-before-you-run.md", "robots.md", "ros.md"])
+@pytest.mark.parametrize(
+    "page", ["evaluate-your-model.md", "report.md", "check-before-you-run.md", "robots.md", "ros.md"]
+)
 def test_pages_are_linked(page: str) -> None:
     assert f"]({page})" in (DOCS / "index.md").read_text()
     assert f"](docs/{page})" in (DOCS.parent / "README.md").read_text()

@@ -11,6 +11,7 @@ from codebotler.cli import obey
 from roboeval.commands.catalogue import tasks
 from roboeval.commands.generating import generate, run
 from roboeval.commands.judging import evaluate, export, import_, show
+from roboeval.commands.reporting import compare, report
 from roboeval.commands.resampling import resample
 
 app = typer.Typer(
@@ -39,6 +40,8 @@ app.command()(run)
 app.command()(show)
 app.command()(tasks)
 app.command()(resample)
+app.command()(report)
+app.command()(compare)
 app.command()(export)
 app.command("import")(import_)
 

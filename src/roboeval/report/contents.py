@@ -1,0 +1,142 @@
+"""What a report holds, section by section, before anything is drawn or written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+from matplotlib.figure import Figure
+
+from roboeval.report import causes, figures, heat, paper, retries, scores
+from roboeval.report.drawing import Look
+from roboeval.report.reading import JudgedRun
+from roboeval.report.sheets import Sheet
+from roboeval.suite import Suite
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure.
+
+    Args:
+        name: of its files, without the ending.
+        caption: what it shows, in sentences.
+        draw: draws it in some colours; None where there is nothing to draw.
+    """
+
+    name: str
+    caption: str
+    draw: Callable[[Look], Figure | None]
+
+
+@dataclass(frozen=True)
+class Prose:
+    """Paragraphs of plain text."""
+
+    paragraphs: tuple[str, ...]
+
+
+Part: TypeAlias = Sheet | Picture | Prose
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the page.
+
+    Args:
+        name: by which links find it.
+        title: its heading.
+        parts: in their order.
+    """
+
+    name: str
+    title: str
+    parts: tuple[Part, ...] = field(default=())
+
+
+def sections(runs: Sequence[JudgedRun], suite: Suite, *, published: bool) -> list[Section]:
+    """All sections of a report.
+
+    Args:
+        runs: judged by this suite, named apart, at least one.
+        suite: by which they were judged.
+        published: whether the published failures stand beside ours.
+    """
+    found = [
+        _results(runs, suite),
+        _thresholds(runs),
+        _causes(runs, published=published),
+        _retries(runs),
+        _cells(runs, suite),
+    ]
+    return [section for section in found if section.parts]
+
+
+def _parts(*parts: Part | None) -> tuple[Part, ...]:
+    return tuple(part for part in parts if part is not None)
+
+
+def _results(runs: Sequence[JudgedRun], suite: Suite) -> Section:
+    picture = Picture(
+        "tasks",
+        "pass@1 by task and model. A bar is the mean over the prompts of a task; its line reaches from the "
+        "worst prompt to the best; a dot stands for 0, and nothing for a task that was not judged. Where it "
+        "was judged, the same tasks with the requirements of common sense only stand beside it.",
+        lambda look: figures.bars(runs, suite, look),
+    )
+    parts = (scores.overall_sheet(runs), picture, scores.task_sheet(runs, suite))
+    return Section("results", "How often programs pass", parts)
+
+
+def _thresholds(runs: Sequence[JudgedRun]) -> Section:
+    picture = Picture(
+        "thresholds",
+        "The share of prompts whose pass@1 is at least the threshold, which falls from 1 on the left. A "
+        "perfect model is a line at 100 %; where a line ends below that, no completion of the other prompts "
+        "passes.",
+        lambda look: figures.thresholds(runs, look),
+    )
+    return Section("thresholds", "How many prompts it can do", (picture, scores.curve_sheet(runs)))
+
+
+def _causes(runs: Sequence[JudgedRun], *, published: bool) -> Section:
+    found = causes.all_causes(runs, published=published)
+    picture = Picture(
+        "causes",
+        "Causes of failures. (a) How completions end, in shares of all. (b) to (d) Of the failures of a "
+        "class, the share of each kind in percent, by model; a model without such failures is left out.",
+        lambda look: heat.causes_figure(found, look),
+    )
+    return Section("causes", "Why programs fail", (picture, causes.causes_sheet(found)))
+
+
+def _retries(runs: Sequence[JudgedRun]) -> Section:
+    curves = Picture(
+        "rejection-sampling",
+        "The share of prompts by threshold of pass@1 where a program that the check rejects is asked for "
+        "again, by the limit of retries.",
+        lambda look: figures.limits(runs, look),
+    )
+    steps = Picture(
+        "accepted",
+        "The share of programs that the check accepts by the limit of retries; the others run against it.",
+        lambda look: figures.at_the_limit(runs, look),
+    )
+    limits, points, accepted = (
+        retries.retries_sheet(runs),
+        retries.curves_sheet(runs),
+        retries.steps_sheet(runs),
+    )
+    parts = () if limits is None else _parts(curves, limits, steps, points, accepted)
+    return Section("rejection-sampling", "What rejection sampling would give", parts)
+
+
+def _cells(runs: Sequence[JudgedRun], suite: Suite) -> Section:
+    beside = scores.published_sheet(runs, suite)
+    unknown = [run.name for run in runs if paper.model_of(run) is None]
+    prose = None
+    if beside is not None and unknown:
+        prose = Prose((f"The paper has no numbers of {', '.join(unknown)}.",))
+    parts = _parts(scores.prompt_sheet(runs, suite), beside, prose)
+    return Section("prompts", "Every prompt, and the paper", parts)
