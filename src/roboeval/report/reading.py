@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from codebotler.terminal import visible
+from roboeval.clusters import trimmed
 from roboeval.evaluation import Evaluation
 from roboeval.metrics import TaskScore, score_by_prompt
 from roboeval.records import Completion, Key
@@ -94,7 +95,7 @@ def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> Judge
     Raises:
         BadInput: one of its files is wrong.
     """
-    kept = tuple(map(trimmed, rows))
+    kept = tuple({**trimmed(row), "task": sys.intern(row["task"])} for row in rows)
     about = load_head(evaluation.run.about) if evaluation.run.about.exists() else {}
     models: set[str | None] = set()
     written: dict[Key, Written] = {}
@@ -122,17 +123,6 @@ def scored(rows: Iterable[Row], suite: Suite) -> tuple[TaskScore, ...]:
     scores = score_by_prompt((row["task"], row["prompt"], row["passed"]) for row in rows)
     by_name = {score.task: score for score in scores}
     return tuple(by_name[name] for name in dict.fromkeys([*suite.tasks, *by_name]) if name in by_name)
-
-
-def trimmed(row: Row) -> Row:
-    """A row without the traces of the worlds that did not decide."""
-    why = row["failure"]
-    deciding = None if why is None else why["world"]
-    verdicts = [
-        verdict if number == deciding else {"world": verdict["world"]}
-        for number, verdict in enumerate(row["verdicts"])
-    ]
-    return {**row, "task": sys.intern(row["task"]), "verdicts": verdicts if why else []}
 
 
 def _written(completion: Completion) -> Written:
