@@ -18,7 +18,7 @@ from roboeval.show import GONE, reason
 from roboeval.suite import Suite
 from roboeval.tables import Row, key_of, kind_of
 
-ALIKE = 0.75  # of their lines two shapes share to be of one group
+ALIKE = 0.6  # of their lines two shapes share to be of one group
 MOST_LINES = 60  # of a difference that people are shown
 
 Ground: TypeAlias = tuple[str, str, str, str | None]

@@ -12,6 +12,7 @@ from roboeval.commands.options import (
     AblationOption,
     JsonOption,
     SuiteOption,
+    command,
     cores,
     expect_current,
     load,
@@ -35,6 +36,10 @@ def report(
     published: Annotated[
         bool, typer.Option("--published", help="Set the paper's causes of failures beside ours.")
     ] = False,
+    price: Annotated[
+        list[str] | None,
+        typer.Option(help="MODEL=INPUT/OUTPUT, of a million tokens each; may be given several times."),
+    ] = None,
     check: Annotated[
         bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
     ] = True,
@@ -43,19 +48,32 @@ def report(
     ] = None,
 ) -> None:
     """Draw the figures of the paper, and one page about how models do, why, and how sure that is."""
+    from codebotler.terminal import busy
     from roboeval.comparison import expect_same_suite
-    from roboeval.report.contents import sections
+    from roboeval.report.contents import Wishes, headline, sections
+    from roboeval.report.cost import expect_known, price_from
     from roboeval.report.reading import named_apart
     from roboeval.report.writing import pieces, write_report
 
+    prices = tuple(map(price_from, price or ()))
     known = load(suite)
     evaluations = [open_evaluation(run, known, suite, ablated=False) for run in runs]
     expect_same_suite({str(run): one.head for run, one in zip(runs, evaluations, strict=True)}, known)
     how = How(check=check, workers=workers or cores())
     read = named_apart([judged_run(one, known, suite, **how) for one in evaluations])
-    parts = sections(read, known, published=published)
-    title = read[0].name if len(read) == 1 else f"{len(read)} models"
-    written = write_report(f"{title}: robot programs, judged", [known.about], parts, out)
+    expect_known(prices, read)
+    words = [
+        *map(str, runs),
+        "--out",
+        out,
+        *(["--published"] * published),
+        *([] if check else ["--no-check"]),
+    ]
+    words += [word for text in price or () for word in ("--price", text)]
+    wishes = Wishes(published, prices, command("report", *words, suite=suite))
+    with busy("putting together"):
+        parts = sections(read, known, wishes)
+    written = write_report(*headline(read, known), parts, out)
     for _ in watched(written, "writing", pieces(parts)):
         pass
     note(f"the report is in {out / 'index.html'}")

@@ -8,8 +8,24 @@ from typing import TypeAlias
 
 from matplotlib.figure import Figure
 
-from roboeval.report import causes, figures, heat, paper, retries, scores
+from roboeval.records import how_many
+from roboeval.report import (
+    causes,
+    cost,
+    differences,
+    failures,
+    figures,
+    heat,
+    origin,
+    paper,
+    retries,
+    robustness,
+    scores,
+    strengths,
+)
+from roboeval.report.cost import Price
 from roboeval.report.drawing import Look
+from roboeval.report.failures import Failures
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Sheet
 from roboeval.suite import Suite
@@ -37,7 +53,14 @@ class Prose:
     paragraphs: tuple[str, ...]
 
 
-Part: TypeAlias = Sheet | Picture | Prose
+@dataclass(frozen=True)
+class Code:
+    """A text whose lines and spaces count, such as a command."""
+
+    text: str
+
+
+Part: TypeAlias = Sheet | Picture | Prose | Code | Failures
 
 
 @dataclass(frozen=True)
@@ -55,20 +78,57 @@ class Section:
     parts: tuple[Part, ...] = field(default=())
 
 
-def sections(runs: Sequence[JudgedRun], suite: Suite, *, published: bool) -> list[Section]:
+@dataclass(frozen=True)
+class Wishes:
+    """What whoever asks for a report may choose.
+
+    Args:
+        published: whether the published failures stand beside ours.
+        prices: of models.
+        command: that makes the report.
+    """
+
+    published: bool = False
+    prices: tuple[Price, ...] = ()
+    command: str = ""
+
+
+def headline(runs: Sequence[JudgedRun], suite: Suite) -> tuple[str, list[str]]:
+    """The title of a page, and what stands below it.
+
+    Args:
+        runs: at least one.
+        suite: by which they were judged.
+    """
+    title = runs[0].name if len(runs) == 1 else f"{len(runs)} models"
+    count = how_many(sum(len(run.rows) for run in runs))
+    by_hand = [run.name for run in runs if (run.model or "").startswith("recorded:")]
+    lead = [f"{count}, judged by the suite \u201c{suite.name}\u201d: {suite.about}."]
+    if by_hand:
+        lead.append(f"Programs of {', '.join(by_hand)} were written by hand, and stand for no model.")
+    return f"Robot programs by {title}", lead
+
+
+def sections(runs: Sequence[JudgedRun], suite: Suite, wishes: Wishes) -> list[Section]:
     """All sections of a report.
 
     Args:
         runs: judged by this suite, named apart, at least one.
         suite: by which they were judged.
-        published: whether the published failures stand beside ours.
+        wishes: what else was asked for.
     """
     found = [
         _results(runs, suite),
+        _differences(runs),
         _thresholds(runs),
-        _causes(runs, published=published),
+        _causes(runs, published=wishes.published),
+        _failures(runs, suite),
+        _strengths(runs, suite),
+        _phrasing(runs, suite),
         _retries(runs),
+        _cost(runs, wishes.prices),
         _cells(runs, suite),
+        _origin(runs, suite, wishes.command),
     ]
     return [section for section in found if section.parts]
 
@@ -140,3 +200,35 @@ def _cells(runs: Sequence[JudgedRun], suite: Suite) -> Section:
         prose = Prose((f"The paper has no numbers of {', '.join(unknown)}.",))
     parts = _parts(scores.prompt_sheet(runs, suite), beside, prose)
     return Section("prompts", "Every prompt, and the paper", parts)
+
+
+def _differences(runs: Sequence[JudgedRun]) -> Section:
+    found = differences.difference_sheet(runs)
+    parts = () if found is None else (Prose(tuple(found[1])), found[0])
+    return Section("differences", "Which is better", parts)
+
+
+def _failures(runs: Sequence[JudgedRun], suite: Suite) -> Section:
+    found = failures.failures(runs, suite)
+    parts = (Prose((failures.ABOUT,)), found, failures.failures_sheet(found)) if found.shown else ()
+    return Section("failures", "What went wrong", parts)
+
+
+def _strengths(runs: Sequence[JudgedRun], suite: Suite) -> Section:
+    parts = _parts(strengths.ability_sheet(runs, suite), strengths.coming_back_sheet(runs, suite))
+    return Section("abilities", "Which ability is missing", parts)
+
+
+def _phrasing(runs: Sequence[JudgedRun], suite: Suite) -> Section:
+    found = robustness.spread_sheet(runs, suite), robustness.phrasing_sheet(runs, suite)
+    return Section("phrasing", "How much phrasing matters", tuple(one for one in found if one.rows))
+
+
+def _cost(runs: Sequence[JudgedRun], prices: Sequence[Price]) -> Section:
+    parts = _parts(cost.cost_sheet(runs, prices), cost.budget_sheet(runs, prices))
+    return Section("cost", "What it costs", parts)
+
+
+def _origin(runs: Sequence[JudgedRun], suite: Suite, command: str) -> Section:
+    parts = (origin.origin_sheet(runs), Prose(origin.about_suite(suite, runs)), Code(command))
+    return Section("origin", "Where this comes from", parts)

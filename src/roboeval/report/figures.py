@@ -52,7 +52,7 @@ def bars(runs: Sequence[JudgedRun], suite: Suite, look: Look) -> Figure:
     for line in range(lines):
         axes = figure.add_subplot(grid[line, 0])
         here = tasks[line * widest : (line + 1) * widest]
-        _bars_on(axes, {run.name: run.scores for run in runs}, here, widest, look)
+        _bars_on(axes, {run.name: run.scores for run in runs}, here, max(widest, FEWEST), look)
         axes.set_ylabel("pass@1")
         if line == 0 and ablated:
             axes.set_title("(a) all requirements", loc="left")
@@ -106,8 +106,8 @@ def _bars_on(
         zeros = [place for place, mean in zip(places, means, strict=True) if mean == 0]
         if zeros:
             axes.plot(zeros, [0] * len(zeros), "o", color=look.colour(number), markersize=2.2, clip_on=False)
-    beside = max(0.0, (FEWEST - room) / 2)
-    axes.set_xlim(-0.5 - beside, room - 0.5 + beside)
+    beside = (room - len(tasks)) / 2 if len(tasks) < FEWEST else 0
+    axes.set_xlim(-0.5 - beside, room - 0.5 - beside)
     axes.set_ylim(0, 1.03)
     axes.set_yticks([0, 0.5, 1])
     axes.grid(visible=True, axis="y")

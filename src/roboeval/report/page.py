@@ -8,9 +8,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from roboeval.report.contents import Part, Picture, Prose, Section
+from roboeval.clusters import Cluster
+from roboeval.records import name_of
+from roboeval.report.contents import Code, Part, Picture, Prose, Section
+from roboeval.report.failures import Failures, Shown
 from roboeval.report.sheets import Cell, Column, Sheet, told
 
+WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
 LONG = 24  # rows from which a table is folded
 STYLE = Path(__file__).with_name("page.css")
 SCRIPT = Path(__file__).with_name("page.js")
@@ -69,6 +73,10 @@ def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
             return _picture(part, drawn)
         case Prose(paragraphs):
             return "".join(f"<p>{_text(words)}</p>\n" for words in paragraphs)
+        case Code(text):
+            return f"<pre>{_text(text)}</pre>\n"
+        case Failures():
+            return f'<div class="clusters">{"".join(map(_cluster, part.shown))}</div>\n'
 
 
 # --- figures
@@ -123,3 +131,49 @@ def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
         tag = 'th scope="row"' if is_head else "td"
         cells.append(f'<{tag} class="{column.kind}"{sort}>{words}</{"th" if is_head else "td"}>')
     return f"<tr>{''.join(cells)}</tr>"
+
+
+# --- groups of failures
+
+
+def _cluster(shown: Shown) -> str:
+    cluster = shown.cluster
+    kind = f"{cluster.failure['class']}: {cluster.failure['kind']}"
+    size = len(cluster.members)
+    data = {"model": shown.model, "task": cluster.task, "kind": kind, "size": str(size)}
+    attributes = "".join(f' data-{name}="{_text(value)}"' for name, value in data.items())
+    check = cluster.failure["check"]
+    why = f"{check}: {cluster.why}" if check else cluster.why
+    return (
+        f'<details class="cluster"{attributes}><summary><b>{size:,}</b><span>{_text(shown.model)}, '
+        f'{_text(cluster.task)}, {_text(kind)}<br><span class="why">{_text(_cut(why, WORDS))}</span></span>'
+        f'</summary><div class="inside">{_inside(cluster)}</div></details>\n'
+    )
+
+
+def _inside(cluster: Cluster) -> str:
+    prompts = ", ".join(map(str, cluster.prompts))
+    world = _text(str(cluster.told["world"]))
+    name = _text(name_of(cluster.representative))
+    head = f"<p>Prompts {prompts}. Such as {name}, in \u201c{world}\u201d.</p>"
+    if cluster.program is None:
+        return f"{head}<p>The program that was judged is gone.</p>"
+    program = f"<pre>{_text(_cut(cluster.program, CHARACTERS))}</pre>"
+    fix = cluster.fix
+    if fix is None:
+        return f"{head}{program}<p>No program of this task passes.</p>"
+    lines = "".join(_changed(sign, line) for sign, line in fix.changes[:LINES])
+    more = f"... {len(fix.changes) - LINES} more lines" if len(fix.changes) > LINES else ""
+    count = f"{fix.changed} line{'s' * (fix.changed != 1)}"
+    return f"{head}{program}<p>{_text(fix.name)} passes, and differs in {count}:</p><pre>{lines}{more}</pre>"
+
+
+def _changed(sign: str, line: str) -> str:
+    tag = {"-": "del", "+": "ins"}.get(sign, "span")
+    words = f"{sign} {_text(_cut(line, WORDS))}"
+    return f"<{tag}>{words}</{tag}>" if tag != "span" else f"{words}\n"
+
+
+def _cut(text: str, most: int) -> str:
+    left = len(text) - most
+    return text if left <= 0 else f"{text[:most]}... {left:,} more characters"

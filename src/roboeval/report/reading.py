@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from codebotler.terminal import visible
@@ -68,15 +69,20 @@ class JudgedRun:
     ablated: tuple[TaskScore, ...] | None = None
     trials: tuple[Prompt, ...] | None = None
 
-    @property
+    @cached_property
     def by_prompt(self) -> dict[tuple[str, int], float]:
         """pass@1 of each prompt."""
         return {(p.task, p.prompt): p.pass_at(1) for score in self.scores for p in score.prompts}
 
-    @property
+    @cached_property
     def by_task(self) -> dict[str, list[float]]:
         """pass@1 of the prompts of each task."""
         return {score.task: [p.pass_at(1) for p in score.prompts] for score in self.scores}
+
+    @cached_property
+    def instructions(self) -> dict[tuple[str, int], str]:
+        """What the model was told for each prompt, where that was recorded."""
+        return {key[:2]: w.instruction for key, w in self.written.items() if w.instruction is not None}
 
     @property
     def failed(self) -> list[Row]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from made_up_runs import HOSTILE, SUITE, cases, made_up
-from roboeval.report.contents import sections
+from roboeval.report.contents import Wishes, sections
 from roboeval.report.page import page
 from roboeval.report.reading import JudgedRun
 from roboeval.report.writing import pieces, write_report
@@ -41,7 +41,7 @@ class Tags(HTMLParser):
 
 
 def made(runs: list[JudgedRun], folder: Path) -> str:
-    parts = sections(runs, SUITE, published=True)
+    parts = sections(runs, SUITE, Wishes(published=True, command="roboeval report"))
     assert len([*write_report("a report", ["about it"], parts, folder)]) == pieces(parts)
     return (folder / "index.html").read_text()
 
