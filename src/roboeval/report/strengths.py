@@ -72,9 +72,9 @@ def coming_back_sheet(runs: Sequence[JudgedRun], suite: Suite) -> Sheet | None:
         Column("pass@1", "share"),
         Column("failed", "count"),
         Column("never returned", "count"),
-        Column("of failures", "share"),
+        Column("share never returned", "share"),
         Column("no such room", "count"),
-        Column("of the failures", "share"),
+        Column("share no such room", "share"),
     )
     found = sheet("coming-back", "Coming back", columns, rows, about=COMES_BACK)
     return found if back and rows else None
