@@ -1,5 +1,6 @@
 """The pages for users: every command on them runs, in their order, as it stands there."""
 
+import csv
 import os
 import re
 import shlex
@@ -78,6 +79,21 @@ def test_states_and_events_of_missions_are_documented() -> None:
     assert set(re.findall(r"`(\w+)`", rows["event"])) == set(WORDS)
 
 
+def test_every_command_about_reports_runs_and_every_number_is_explained(tmp_path: Path) -> None:
+    printed = [run(commands, tmp_path, "") for commands in blocks("report.md", "sh")]
+    told = [block for block in blocks("report.md", "text") if "drawn at random" in block]
+    assert told
+    assert all(any(block.strip() in out for out in printed) for block in told)
+    page = (DOCS / "report.md").read_text()
+    made = {path.stem for path in (tmp_path / "report").glob("*/*")}
+    assert len(made) > 10
+    assert set(re.findall(r"^\| `([\w-]+)` \|", page, re.MULTILINE)) >= made
+    for path in (tmp_path / "report" / "tables").iterdir():
+        with path.open(newline="") as file:
+            heads = next(csv.reader(file))
+        assert all(f"*{head}*" in page or "recorded:" in head for head in heads), (path.name, heads)
+
+
 def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
     table = next(block for block in blocks("evaluate-your-model.md", "text") if "retries" in block)
     first, *_, last = [
@@ -88,7 +104,15 @@ def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "page", ["evaluate-your-model.md", "check-before-you-run.md", "robots.md", "ros.md", "perception.md"]
+    "page",
+    [
+        "evaluate-your-model.md",
+        "report.md",
+        "check-before-you-run.md",
+        "robots.md",
+        "ros.md",
+        "perception.md",
+    ],
 )
 def test_pages_are_linked(page: str) -> None:
     assert f"]({page})" in (DOCS / "index.md").read_text()

@@ -9,8 +9,10 @@ import typer
 from codebotler import __version__
 from codebotler.cli import obey
 from roboeval.commands.catalogue import tasks
+from roboeval.commands.finding import find
 from roboeval.commands.generating import generate, run
 from roboeval.commands.judging import evaluate, export, import_, show
+from roboeval.commands.reporting import compare, report
 from roboeval.commands.resampling import resample
 
 app = typer.Typer(
@@ -37,8 +39,11 @@ app.command()(generate)
 app.command()(evaluate)
 app.command()(run)
 app.command()(show)
+app.command()(find)
 app.command()(tasks)
 app.command()(resample)
+app.command()(report)
+app.command()(compare)
 app.command()(export)
 app.command("import")(import_)
 

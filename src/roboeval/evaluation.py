@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from codebotler.badinput import BadInput
 from roboeval.records import Completion, Key, how_many, name_of, read_judged
 from roboeval.run import Run, load_head
+
+
+class HasKey(Protocol):
+    """Something about one completion."""
+
+    @property
+    def key(self) -> Key:
+        """Of which."""
+
+
+Keyed = TypeVar("Keyed", bound=HasKey)
 
 
 @dataclass(frozen=True)
@@ -85,12 +96,32 @@ class Evaluation:
         self.stale.clear()
         self.count = 0
         for _, row, judged in read_judged(self.run.rows(self.key), self.run.programs(self.key)):
-            key = row["task"], row["prompt"], row["index"]
-            written = self._written.get(key)
-            self.count += 1
-            if written is None or written.hex() != judged:
-                self.stale[key] = None
+            self._see((row["task"], row["prompt"], row["index"]), judged)
             yield row
+
+    def read_by(self, reader: Callable[[Iterator[bytes]], Iterator[Keyed]]) -> Iterator[Keyed]:
+        """Have the rows read elsewhere, as `rows` reads them here; for those who do it on many cores.
+
+        Args:
+            reader: gets the lines of all whole rows, and says for each in turn of which completion it is.
+        """
+        self.stale.clear()
+        self.count = 0
+        programs = self.run.programs(self.key)
+        hashes = programs.read_text(errors="replace").split("\n")[:-1] if programs.exists() else []
+        for number, read in enumerate(reader(self._lines())):
+            self._see(read.key, hashes[number] if number < len(hashes) else None)
+            yield read
+
+    def _lines(self) -> Iterator[bytes]:
+        with self.run.rows(self.key).open("rb") as file:
+            yield from (line for line in file if line.endswith(b"\n") and line.strip())
+
+    def _see(self, key: Key, judged: str | None) -> None:
+        written = self._written.get(key)
+        self.count += 1
+        if written is None or written.hex() != judged:
+            self.stale[key] = None
 
     def judged(self) -> Iterator[Completion]:
         """Read the completions but those of the stale rows, whose verdicts are on other programs."""

@@ -92,14 +92,21 @@ def prompt_data(
             {
                 "indices": [row["index"] for row in same],
                 "gone": key_of(same[0]) not in written,
-                **_reason(same[0], suite, ablated=ablated),
+                **reason(same[0], suite, ablated=ablated),
             }
             for same in programs.values()
         ],
     }
 
 
-def _reason(row: Row, suite: Suite, *, ablated: bool) -> dict[str, Any]:
+def reason(row: Row, suite: Suite, *, ablated: bool) -> dict[str, Any]:
+    """Why a completion fails: the world that decided, and its error or failed check, explained.
+
+    Args:
+        row: of the evaluation; of its verdicts only that of the world that decided is looked at closely.
+        suite: by which it was judged.
+        ablated: whether common sense only was required.
+    """
     why = row["failure"]
     if why is None:
         return {"passed": True, "failure": None}

@@ -88,6 +88,25 @@ def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) 
     return evaluation
 
 
+def expect_current(evaluation: Evaluation, suite: Suite, suite_name: str) -> None:
+    """Refuse verdicts on programs that have changed since; to be called when all rows were read.
+
+    Raises:
+        BadInput: a row judges another program than stands in the run now, or there is no row.
+    """
+    from codebotler.badinput import BadInput
+
+    ablated = bool(evaluation.head.get("ablation"))
+    path = evaluation.run.path
+    again = command("evaluate", path, *options_of(evaluation, suite), suite=suite_name, ablated=ablated)
+    if (complaint := evaluation.complaint()) is not None:
+        raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
+    if evaluation.count == 0:
+        raise BadInput(f"no completion has been judged; `{again}` goes on", file=path)
+    if (unfinished := evaluation.unfinished()) is not None:
+        note(f"{unfinished}, and only these count; `{again}` goes on")
+
+
 def cores() -> int:
     """How many programs to run at the same time."""
     return os.cpu_count() or 1

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,13 +11,18 @@ from roboeval.commands.options import (
     JsonOption,
     RunArgument,
     SuiteOption,
-    command,
     cores,
+    expect_current,
     load,
     open_evaluation,
-    options_of,
 )
-from roboeval.terminal import note, print_json, print_rich, watched
+from roboeval.terminal import print_json, print_rich, watched
+
+if TYPE_CHECKING:
+    from roboeval.evaluation import Evaluation
+    from roboeval.records import Key
+    from roboeval.resampling import Prompt
+    from roboeval.suite import Suite
 
 
 def resample(
@@ -35,33 +41,49 @@ def resample(
     json: JsonOption = False,
 ) -> None:
     """What asking again for programs that a check rejects would have given, from a judged run."""
-    from codebotler.badinput import BadInput
-    from roboeval.checks import Checks
-    from roboeval.resampling import LIMITS, Trial, by_prompt, curve_data, ran, render
-    from roboeval.run import Run
+    from roboeval.resampling import LIMITS, curve_data, ran, render
     from roboeval.tables import key_of
 
     judged_by = load(suite)
     evaluation = open_evaluation(run, judged_by, suite, ablated=False)
     rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
     ended = {key_of(row): (ran(row), bool(row["passed"])) for row in rows}
-    again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite)
-    if (complaint := evaluation.complaint()) is not None:
-        raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
-    if not ended:
-        raise BadInput(f"no completion has been judged; `{again}` goes on", file=run)
-    if (unfinished := evaluation.unfinished()) is not None:
-        note(f"{unfinished}, and only these count; `{again}` goes on")
-    programs = {c.key: (c.task, c.program_sha256) for c in evaluation.judged() if c.key in ended}
-    checks = Checks(Run(run), judged_by, samples=samples, seed=seed)
-    checked = checks.add((c for c in evaluation.judged() if c.key in ended), workers=workers or cores())
-    for _ in watched(checked, "checking", len(set(programs.values()))):
-        pass
-    prompts = by_prompt(
-        (key, Trial(not checks.problems[programs[key]], *outcome)) for key, outcome in ended.items()
-    )
+    expect_current(evaluation, judged_by, suite)
+    prompts = checked(evaluation, judged_by, ended, samples=samples, seed=seed, workers=workers or cores())
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
         print_json({"suite": judged_by.name, "samples": samples, "seed": seed, **curve_data(prompts, limits)})
     else:
         print_rich(render(prompts, limits, title=str(run)))
+
+
+def checked(
+    evaluation: Evaluation,
+    suite: Suite,
+    ended: Mapping[Key, tuple[bool, bool]],
+    *,
+    samples: int = 5,
+    seed: int = 0,
+    workers: int,
+) -> tuple[Prompt, ...]:
+    """The completions of a run by prompt, as the check sees them; what it said stays in the run.
+
+    Args:
+        evaluation: that lies in the run.
+        suite: by which it was judged.
+        ended: which completions, and of each whether it ran without an error and whether it passed.
+        samples: how many worlds to imagine for each program.
+        seed: from which they are drawn.
+        workers: how many programs are checked at the same time.
+    """
+    from roboeval.checks import Checks
+    from roboeval.resampling import Trial, by_prompt
+
+    programs = {c.key: (c.task, c.program_sha256) for c in evaluation.judged() if c.key in ended}
+    checks = Checks(evaluation.run, suite, samples=samples, seed=seed)
+    checking = checks.add((c for c in evaluation.judged() if c.key in ended), workers=workers)
+    for _ in watched(checking, "checking", len(set(programs.values()))):
+        pass
+    return by_prompt(
+        (key, Trial(not checks.problems[programs[key]], *outcome)) for key, outcome in ended.items()
+    )

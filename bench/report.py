@@ -1,0 +1,128 @@
+"""How long does a report of five models with 4,000 completions each take, in how much memory?
+
+The runs are made up: verdicts on the programs that ship with the package, repeated with other texts in them,
+so that four in five programs of a run differ. What a check says is made up as well, so that no program runs:
+checking is `roboeval resample`'s, and is done once for a run. It prints the share of each step, and compares
+with a minute, 1 GB, and 5 MB of the page.
+"""
+
+import hashlib
+import os
+import resource
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from roboeval.evaluate import evaluate, head
+from roboeval.evaluation import Evaluation
+from roboeval.records import Completion, recorded_completions, to_line
+from roboeval.report.contents import Wishes, headline, sections
+from roboeval.report.reading import JudgedRun, named_apart, read_run
+from roboeval.report.writing import write_report
+from roboeval.resampling import Trial, by_prompt
+from roboeval.run import Run, to_text
+from roboeval.suite import Suite, load_suite
+from roboeval.tables import key_of
+
+MODELS = int(os.environ.get("MODELS", "5"))
+COMPLETIONS = int(os.environ.get("COMPLETIONS", "50"))  # of each prompt
+SECONDS, MEGABYTES, PAGE = 60, 1024, 5_000_000
+
+
+@contextmanager
+def timed(what: str, spent: dict[str, float]) -> Iterator[None]:
+    """Note how long a step takes."""
+    start = time.perf_counter()
+    yield
+    spent[what] = spent.get(what, 0.0) + time.perf_counter() - start
+
+
+@cache
+def verdicts() -> list[dict[str, Any]]:
+    """On the recorded programs, in their order."""
+    return list(evaluate(recorded(), load_suite(), workers=2))
+
+
+@cache
+def recorded() -> list[Completion]:
+    """The programs that ship with the package."""
+    names = ("recorded:careful", "recorded:hasty")
+    return [completion for name in names for completion in recorded_completions(name, load_suite())]
+
+
+def made_up(folder: Path, number: int, suite: Suite) -> Run:
+    """A run whose completions nobody wrote, judged like the recorded ones that they repeat."""
+    run = Run(folder / f"model-{number}")
+    rows = verdicts()
+    by_prompt: dict[tuple[str, int], list[int]] = {}
+    for at, row in enumerate(rows):
+        by_prompt.setdefault((row["task"], row["prompt"]), []).append(at)
+    run.rows("paper").parent.mkdir(parents=True)
+    about = {"model": f"model-{number}", "settings": {"temperature": 0.2}, "codebotler": "0.1.0"}
+    run.about.write_bytes(to_text(about))
+    run.head("paper").write_bytes(to_text({**head(suite), "ablation": False, "tasks": None}))
+    with (
+        run.completions.open("wb") as completions,
+        run.rows("paper").open("wb") as judged,
+        run.programs("paper").open("w") as hashes,
+    ):
+        for (task, prompt), those in by_prompt.items():
+            for index in range(COMPLETIONS):
+                at = those[(index * (number + 1)) % len(those)]
+                text = index if index % 5 else 0
+                program = f"{recorded()[at].program}    # {text}\n    note{text % 7} = {text}\n"
+                usage = {"input_tokens": 1_500, "output_tokens": 120 + index}
+                row = {"task": task, "prompt": prompt, "index": index, "model": f"model-{number}"}
+                row |= {"program": program, "instruction": recorded()[at].instruction}
+                completions.write(to_line({**row, "usage": usage, "latency_s": 1.5}))
+                judged.write(to_line({**rows[at], "index": index}))
+                hashes.write(hashlib.sha256(program.encode()).hexdigest() + "\n")
+    return run
+
+
+def read(run: Run, suite: Suite) -> JudgedRun:
+    """A run as the command reads it, with a check that rejects what ends in an error."""
+    evaluation = Evaluation(run, "paper")
+    judged = read_run(evaluation, evaluation.rows(), suite)
+    trials = (
+        (key_of(row), Trial(ok := row["failure"] is None or bool(row["failure"]["check"]), ok, row["passed"]))
+        for row in judged.rows
+    )
+    return JudgedRun(**{**judged.__dict__, "trials": by_prompt(trials)})
+
+
+def main() -> None:
+    """Print the shares."""
+    suite = load_suite()
+    spent: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        runs = [made_up(folder, number, suite) for number in range(MODELS)]
+        with timed("reading", spent):
+            judged = named_apart([read(run, suite) for run in runs])
+        with timed("putting together", spent):
+            parts = sections(judged, suite, Wishes(command="bench"))
+        written = write_report(*headline(judged, suite), parts, folder / "report")
+        before = time.perf_counter()
+        for piece in written:
+            kind = "drawing" if (folder / "report" / "figures" / f"{piece}.png").exists() else "writing"
+            spent[kind] = spent.get(kind, 0.0) + time.perf_counter() - before
+            before = time.perf_counter()
+        size = (folder / "report" / "index.html").stat().st_size
+    total = sum(spent.values())
+    count = sum(len(run.rows) for run in judged)
+    for step, seconds in spent.items():
+        print(f"{step}: {seconds:.1f} s, {seconds / total:.0%}")
+    largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(
+        f"{MODELS} models, {count:,} completions: {total:.0f} of {SECONDS} s, "
+        f"{largest:.0f} of {MEGABYTES} MB, {size:,} of {PAGE:,} bytes"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""Why programs fail: shares of classes and kinds of failures, by model (section V.B of the paper)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from roboeval.report import paper
+from roboeval.report.reading import JudgedRun
+from roboeval.report.sheets import Column, Sheet, sheet
+from roboeval.taxonomy import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, ROBOT_KINDS, TASK
+
+KINDS: Mapping[str, Sequence[str]] = {PYTHON: PYTHON_KINDS, ROBOT: ROBOT_KINDS, TASK: CATEGORIES}
+PASSED = "passed"
+ABOUT = (
+    "A completion fails for one reason: the error, or else the first failed check, of the first world that "
+    "it does not satisfy. Shares of classes are of all completions, shares of kinds of the failures of their "
+    "class."
+)
+
+
+@dataclass(frozen=True)
+class Causes:
+    """How the completions of one model ended.
+
+    Args:
+        name: of the run; with ", published" where the numbers are the paper's.
+        classes: the share of all completions by class, of those that passed as well.
+        kinds: by class, the share of its failures by kind; empty where nothing failed by it.
+        counts: of completions by class and kind; None where only shares are known.
+    """
+
+    name: str
+    classes: Mapping[str, float]
+    kinds: Mapping[str, Mapping[str, float]]
+    counts: Mapping[tuple[str, str], int] | None = None
+
+
+def causes_of(run: JudgedRun) -> Causes:
+    """Count how the completions of a run ended."""
+    counts = Counter((why["class"], why["kind"]) for row in run.rows if (why := row["failure"]) is not None)
+    total = len(run.rows)
+    by_class = Counter[str]()
+    for (name, _), count in counts.items():
+        by_class[name] += count
+    names = [*CLASSES, *sorted(by_class.keys() - set(CLASSES))]
+    return Causes(
+        run.name,
+        {PASSED: 1 - by_class.total() / total, **{name: by_class[name] / total for name in names}},
+        {
+            name: {kind: n / by_class[name] for (of, kind), n in sorted(counts.items()) if of == name}
+            for name in names
+        },
+        counts,
+    )
+
+
+def published_causes(run: JudgedRun) -> Causes | None:
+    """What the paper's authors published of the model that a run names; None if it names another."""
+    model = paper.model_of(run)
+    if model is None:
+        return None
+    shares = {PASSED: paper.class_share(model, None)}
+    shares |= {name: paper.class_share(model, name) for name in CLASSES}
+    kinds = {
+        name: {kind: share for kind, share in paper.kind_shares(model, name).items() if share}
+        for name in CLASSES
+    }
+    return Causes(f"{run.name}, published", shares, kinds)
+
+
+def all_causes(runs: Sequence[JudgedRun], *, published: bool) -> list[Causes]:
+    """The causes of each run, each followed by the published ones if they are asked for and there."""
+    found: list[Causes] = []
+    for run in runs:
+        found.append(causes_of(run))
+        theirs = published_causes(run) if published else None
+        found += [theirs] if theirs is not None else []
+    return found
+
+
+def kinds_in_order(causes: Sequence[Causes], failure_class: str) -> list[str]:
+    """The kinds of a class that some model fails by, known ones first."""
+    there = {kind for one in causes for kind in one.kinds.get(failure_class, {})}
+    known = [kind for kind in KINDS.get(failure_class, ()) if kind in there]
+    return [*known, *sorted(there - set(known))]
+
+
+def causes_sheet(causes: Sequence[Causes]) -> Sheet:
+    """All shares and counts."""
+    columns = [
+        Column("model"),
+        Column("class"),
+        Column("kind"),
+        Column("completions", "count"),
+        Column("share", "share"),
+    ]
+    rows: list[list[str | int | float | None]] = []
+    for one in causes:
+        for name, share in one.classes.items():
+            rows.append([one.name, name, "all", _count(one, name), share])
+            rows += [
+                [one.name, name, kind, None if one.counts is None else one.counts[name, kind], part]
+                for kind, part in one.kinds.get(name, {}).items()
+            ]
+    notes = [paper.TWO_SUMS] if any(one.counts is None for one in causes) else []
+    return sheet("causes", "Causes of failures", columns, rows, about=ABOUT, notes=notes)
+
+
+def _count(one: Causes, failure_class: str) -> int | None:
+    if one.counts is None or failure_class == PASSED:
+        return None
+    return sum(count for (name, _), count in one.counts.items() if name == failure_class)

@@ -1,0 +1,138 @@
+"""How all figures look, and how they are written so that the same numbers give the same bytes."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+WIDE, NARROW = 7.16, 3.5  # inches: both columns of a paper, and one
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000", "#F0E442")
+"""Okabe and Ito's, which people who see colours differently tell apart, too."""
+
+DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+MOST_COLOURS = len(COLOURS)
+LONGEST_NAME = 26
+
+
+@dataclass(frozen=True)
+class Look:
+    """The colours of a figure's background, text and lines."""
+
+    paper: str
+    ink: str
+    faint: str
+    black: str
+    middle: str
+
+    def colour(self, number: int) -> str:
+        """The colour of something that is told apart by its number."""
+        colour = COLOURS[number % MOST_COLOURS]
+        return self.black if colour == "#000000" else colour
+
+
+LIGHT = Look(paper="#ffffff", ink="#1b1b1f", faint="#d5d5da", black="#000000", middle="#7fb5d5")
+DARK = Look(paper="#17181c", ink="#e6e6ea", faint="#3d3f47", black="#ffffff", middle="#2b5f80")
+
+
+@contextmanager
+def looking(look: Look) -> Iterator[None]:
+    """Draw and write figures in one style; no setting of the reader's own plays a part."""
+    settings: dict[Any, Any] = {
+        "font.family": "DejaVu Sans",
+        "font.size": 7.5,
+        "axes.titlesize": 8,
+        "axes.labelsize": 7.5,
+        "xtick.labelsize": 7,
+        "ytick.labelsize": 7,
+        "legend.fontsize": 7,
+        "legend.frameon": False,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.linewidth": 0.6,
+        "axes.edgecolor": look.ink,
+        "axes.labelcolor": look.ink,
+        "axes.facecolor": look.paper,
+        "axes.axisbelow": True,
+        "text.color": look.ink,
+        "text.parse_math": False,
+        "xtick.color": look.ink,
+        "ytick.color": look.ink,
+        "xtick.major.width": 0.6,
+        "ytick.major.width": 0.6,
+        "grid.color": look.faint,
+        "grid.linewidth": 0.5,
+        "hatch.linewidth": 0.5,
+        "lines.linewidth": 1.4,
+        "figure.facecolor": look.paper,
+        "savefig.facecolor": look.paper,
+        "svg.hashsalt": "roboeval",
+        "svg.fonttype": "path",
+        "pdf.fonttype": 42,
+        "pdf.compression": 6,
+    }
+    with warnings.catch_warnings(), mpl.rc_context():
+        warnings.simplefilter("ignore")  # a name may hold letters that the font lacks
+        mpl.rcdefaults()
+        mpl.rcParams.update(settings)
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of so many inches that places what stands in it by itself."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def written(figure: Figure, kind: str) -> bytes:
+    """A figure as png, pdf or svg, with no date and no version in it."""
+    nothing: dict[str, dict[str, None]] = {
+        "png": {"Software": None},
+        "pdf": {"Creator": None, "Producer": None, "CreationDate": None},
+        "svg": {"Creator": None, "Date": None},
+    }
+    if figure.get_layout_engine() is not None:  # once, for all formats: each time moves things a little
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+    content = io.BytesIO()
+    figure.savefig(content, format=kind, dpi=300 if kind == "png" else 72, metadata=nothing[kind])
+    return _slim(content.getvalue()) if kind == "svg" else content.getvalue()
+
+
+def _slim(svg: bytes) -> bytes:
+    """The same drawing with each letter's shape written once, and not at each of its uses."""
+    seen: set[bytes] = set()
+
+    def once(shape: re.Match[bytes]) -> bytes:
+        is_new = shape[1] not in seen
+        seen.add(shape[1])
+        return shape[0] if is_new else b""
+
+    svg = re.sub(rb"<!--.*?-->|<metadata>.*?</metadata>", b"", svg, flags=re.DOTALL)
+    svg = re.sub(rb'<path id="(\w+-[0-9a-f]+)"[^>]*?/>', once, svg, flags=re.DOTALL)
+    return re.sub(rb"<defs>\s*</defs>|\s*\n\s*", b"\n", svg)
+
+
+def brief(name: str, most: int = LONGEST_NAME) -> str:
+    """A name that fits into a figure."""
+    return name if len(name) <= most else f"{name[: most - 1]}…"
+
+
+def share_axis(axes: Axes, *, along: str = "y") -> None:
+    """Let an axis show shares from 0 to 100 %."""
+    axis = axes.yaxis if along == "y" else axes.xaxis
+    (axes.set_ylim if along == "y" else axes.set_xlim)(0, 1)
+    axis.set_ticks([0, 0.25, 0.5, 0.75, 1], ["0", "25", "50", "75", "100 %"])
+    axes.grid(visible=True, axis="y" if along == "y" else "x")

@@ -1,0 +1,179 @@
+"""The page of a report: one file that opens without a network and reads without a script."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+from roboeval.clusters import Cluster
+from roboeval.records import name_of
+from roboeval.report.contents import Code, Part, Picture, Prose, Section
+from roboeval.report.failures import Failures, Shown
+from roboeval.report.sheets import Cell, Column, Sheet, told
+
+WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
+LONG = 24  # rows from which a table is folded
+STYLE = Path(__file__).with_name("page.css")
+SCRIPT = Path(__file__).with_name("page.js")
+Drawn = tuple[bytes, bytes]
+"""A figure as SVG, for light pages and for dark ones."""
+
+
+def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Mapping[str, Drawn]) -> str:
+    """The page. Every text in it is text: whatever a model wrote is shown and never obeyed.
+
+    Args:
+        title: of the page.
+        lead: paragraphs at its beginning.
+        sections: what stands on it.
+        drawn: the figures by name; those that are not there are left out.
+    """
+    script = SCRIPT.read_text()
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
+    links = "".join(f'<li><a href="#{_text(s.name)}">{_text(s.title)}</a></li>' for s in sections)
+    body = "".join(_section(section, drawn) for section in sections)
+    paragraphs = "".join(f"<p>{_text(words)}</p>" for words in lead)
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<title>{_text(title)}</title>\n<style>\n{STYLE.read_text()}</style>\n</head>\n<body>\n"
+        f'<a class="skip" href="#main">To the results</a>\n'
+        f"<header><h1>{_text(title)}</h1>{paragraphs}</header>\n"
+        f'<nav aria-label="Sections"><ol>{links}</ol></nav>\n'
+        f'<main id="main">\n{body}</main>\n<script>{script}</script>\n</body>\n</html>\n'
+    )
+
+
+def _text(words: str) -> str:
+    """Words as HTML shows them; what is no text at all, such as half a surrogate pair, is written out."""
+    plain = "".join(
+        c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in words
+    )
+    return escape(plain, quote=True)
+
+
+def _section(section: Section, drawn: Mapping[str, Drawn]) -> str:
+    parts = "".join(_part(part, drawn) for part in section.parts)
+    name = _text(section.name)
+    head = f'<h2 id="{name}-h">{_text(section.title)}</h2>'
+    return f'<section id="{name}" aria-labelledby="{name}-h">{head}\n{parts}</section>\n'
+
+
+def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
+    match part:
+        case Sheet():
+            return _table(part)
+        case Picture():
+            return _picture(part, drawn)
+        case Prose(paragraphs):
+            return "".join(f"<p>{_text(words)}</p>\n" for words in paragraphs)
+        case Code(text):
+            return f"<pre>{_text(text)}</pre>\n"
+        case Failures():
+            return f'<div class="clusters">{"".join(map(_cluster, part.shown))}</div>\n'
+
+
+# --- figures
+
+
+def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
+    if picture.name not in drawn:
+        return ""
+    light, dark = map(_data, drawn[picture.name])
+    caption = _text(picture.caption)
+    return (
+        f'<figure id="figure-{_text(picture.name)}"><picture>'
+        f'<source media="screen and (prefers-color-scheme: dark)" srcset="{dark}">'
+        f'<img src="{light}" alt="{caption}"></picture>'
+        f'<figcaption>{caption} <span class="files">figures/{_text(picture.name)}.pdf, .png</span>'
+        "</figcaption></figure>\n"
+    )
+
+
+def _data(svg: bytes) -> str:
+    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
+
+
+# --- tables
+
+
+def _table(sheet: Sheet) -> str:
+    heads = "".join(f'<th scope="col" class="{c.kind}">{_text(c.head)}</th>' for c in sheet.columns)
+    rows = "".join(_row(row, sheet.columns) for row in sheet.rows)
+    title = f"{_text(sheet.title)}"
+    about = f"<p>{_text(sheet.about)}</p>" if sheet.about else ""
+    notes = "".join(f'<p class="note">{_text(note)}</p>' for note in sheet.notes)
+    table = (
+        f'<div class="wide" tabindex="0" role="region" aria-label="{title}"><table>'
+        f"<thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>"
+    )
+    files = f'<p class="files">tables/{_text(sheet.name)}.csv</p>'
+    inside = f"{about}{table}{notes}{files}"
+    name = _text(sheet.name)
+    if len(sheet.rows) > LONG:
+        summary = f"<summary>{title} <span>{len(sheet.rows):,} rows</span></summary>"
+        return f'<details class="sheet" id="table-{name}">{summary}{inside}</details>\n'
+    return f'<div class="sheet" id="table-{name}"><h3>{title}</h3>{inside}</div>\n'
+
+
+def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
+    cells = []
+    for number, (cell, column) in enumerate(zip(row, columns, strict=True)):
+        sort = "" if cell is None or isinstance(cell, str) else f' data-v="{cell!r}"'
+        words = _text(told(cell, column.kind))
+        is_head = number == 0 and column.kind == "text"
+        tag = 'th scope="row"' if is_head else "td"
+        cells.append(f'<{tag} class="{column.kind}"{sort}>{words}</{"th" if is_head else "td"}>')
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+# --- groups of failures
+
+
+def _cluster(shown: Shown) -> str:
+    cluster = shown.cluster
+    kind = f"{cluster.failure['class']}: {cluster.failure['kind']}"
+    size = len(cluster.members)
+    data = {"model": shown.model, "task": cluster.task, "kind": kind, "size": str(size)}
+    attributes = "".join(f' data-{name}="{_text(value)}"' for name, value in data.items())
+    check = cluster.failure["check"]
+    why = f"{check}: {cluster.why}" if check else cluster.why
+    return (
+        f'<details class="cluster"{attributes}><summary><b>{size:,}</b><span>{_text(shown.model)}, '
+        f'{_text(cluster.task)}, {_text(kind)}<br><span class="why">{_text(_cut(why, WORDS))}</span></span>'
+        f'</summary><div class="inside">{_inside(cluster)}</div></details>\n'
+    )
+
+
+def _inside(cluster: Cluster) -> str:
+    prompts = ", ".join(map(str, cluster.prompts))
+    world = _text(str(cluster.told["world"]))
+    name = _text(name_of(cluster.representative))
+    head = f"<p>Prompts {prompts}. Such as {name}, in \u201c{world}\u201d.</p>"
+    if cluster.program is None:
+        return f"{head}<p>The program that was judged is gone.</p>"
+    program = f"<pre>{_text(_cut(cluster.program, CHARACTERS))}</pre>"
+    fix = cluster.fix
+    if fix is None:
+        return f"{head}{program}<p>No program of this task passes.</p>"
+    lines = "".join(_changed(sign, line) for sign, line in fix.changes[:LINES])
+    more = f"... {len(fix.changes) - LINES} more lines" if len(fix.changes) > LINES else ""
+    count = f"{fix.changed} line{'s' * (fix.changed != 1)}"
+    return f"{head}{program}<p>{_text(fix.name)} passes, and differs in {count}:</p><pre>{lines}{more}</pre>"
+
+
+def _changed(sign: str, line: str) -> str:
+    tag = {"-": "del", "+": "ins"}.get(sign, "span")
+    words = f"{sign} {_text(_cut(line, WORDS))}"
+    return f"<{tag}>{words}</{tag}>" if tag != "span" else f"{words}\n"
+
+
+def _cut(text: str, most: int) -> str:
+    left = len(text) - most
+    return text if left <= 0 else f"{text[:most]}... {left:,} more characters"

@@ -1,0 +1,113 @@
+"""What the paper's authors published, and where it may stand beside what was judged here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from roboeval.report.reading import JudgedRun
+from roboeval.suite import Suite
+
+SUITE = "paper"
+NAMES: Mapping[str, tuple[str, ...]] = {
+    "GPT-4": ("gpt-4",),
+    "GPT-3.5": ("gpt-3.5", "text-davinci-003"),
+    "PaLM2": ("palm-2", "palm2", "text-bison-001"),
+    "CodeLlama": ("codellama", "codellama-34b-python-hf"),
+    "StarCoder": ("starcoder",),
+}
+"""What runs of the paper's models are called, in small letters, without the provider."""
+
+CLASSES = {
+    "PythonError": ("Python Error", "python_error"),
+    "RobotExecutionError": ("Robot Execution Error", "execution_error"),
+    "TaskCompletionError": ("Task Completion Error", "completion_error"),
+}
+KINDS = {
+    "Manipulation at Location": "ManipulationAtLocation",
+    "Event Ordering": "EventOrdering",
+    "Correct Initial/Terminal": "InitialTerminal",
+    "Exhaustive Search": "ExhaustiveSearch",
+    "Ask Statement at Location": "AskAtLocation",
+    "Say Statement at Location": "SayAtLocation",
+    "Check Entity Statements at Location": "CheckEntityAtLocation",
+}
+
+OTHER_PHRASINGS = (
+    "Published numbers are means over the authors' own five prompts of a task. The suite's instructions are "
+    "other phrasings of the same tasks, so only means of tasks are set side by side for runs that were "
+    "generated with them."
+)
+OWN_PROMPTS = (
+    "Published numbers of single prompts stand only beside completions that were written for the authors' "
+    "own prompts: imported ones, which do not say that they answer the suite's instructions."
+)
+TWO_SUMS = (
+    "Published means are those of the published table of pass@1: 46.3 % for CodeLlama and 31.25 % for "
+    "StarCoder. The published breakdown of failures sums up to 45.7 % and 31.2 % of completions that succeed."
+)
+
+
+@cache
+def published() -> dict[str, Any]:
+    """The published numbers."""
+    data: dict[str, Any] = json.loads(Path(__file__).with_name("published.json").read_text())
+    return data
+
+
+def model_of(run: JudgedRun) -> str | None:
+    """The model of the paper that a run names; None if it names another.
+
+    Without a recorded model, the name of the folder counts.
+    """
+    if run.head.get("suite") != SUITE:
+        return None
+    name = (run.model or run.folder).lower().rpartition(":")[2].rpartition("/")[2]
+    return next((model for model, names in NAMES.items() if name in names), None)
+
+
+def is_of_authors_prompts(run: JudgedRun, suite: Suite) -> bool:
+    """Whether completions were written for the authors' own prompts.
+
+    They come from elsewhere, so that run.json names no settings, and none names an instruction of the suite.
+    """
+    ours = {prompt for task in suite.tasks.values() for prompt in task.prompts}
+    return "settings" not in run.about and not any(w.instruction in ours for w in run.written.values())
+
+
+def cell(model: str, task: str, prompt: int) -> float | None:
+    """The published pass@1 of one of the authors' prompts; None if there is none."""
+    rows = published()["pass_at_1"].get(task, [])
+    return rows[prompt][_column(model)] if prompt < len(rows) else None
+
+
+def task_mean(model: str, task: str) -> float | None:
+    """The mean of the published pass@1 over the prompts of a task; None if there is none."""
+    rows = published()["pass_at_1"].get(task)
+    return None if rows is None else sum(row[_column(model)] for row in rows) / len(rows)
+
+
+def overall_mean(model: str, tasks: list[str]) -> float | None:
+    """The mean of the published pass@1 over the prompts of some tasks; None if one was not published."""
+    means = [task_mean(model, task) for task in tasks]
+    known = [mean for mean in means if mean is not None]
+    return sum(known) / len(known) if means and len(known) == len(means) else None
+
+
+def class_share(model: str, failure_class: str | None) -> float:
+    """The published share of completions that succeed (None) or fail by a class."""
+    name = "Successful Completion" if failure_class is None else CLASSES[failure_class][0]
+    return float(published()["failure_breakdown_percent"]["overall_error"][name][_column(model)]) / 100
+
+
+def kind_shares(model: str, failure_class: str) -> dict[str, float]:
+    """The published shares of kinds among the failures of a class."""
+    kinds = published()["failure_breakdown_percent"][CLASSES[failure_class][1]]
+    return {KINDS.get(kind, kind): shares[_column(model)] / 100 for kind, shares in kinds.items()}
+
+
+def _column(model: str) -> int:
+    return int(published()["models"].index(model))

@@ -1,0 +1,166 @@
+"""Judged runs as a report reads them: each row with what it needs, and who wrote what at which cost."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from codebotler.terminal import visible
+from roboeval.clusters import trimmed
+from roboeval.evaluation import Evaluation
+from roboeval.metrics import TaskScore, score_by_prompt
+from roboeval.records import Completion, Key
+from roboeval.resampling import Prompt
+from roboeval.run import load_head
+from roboeval.suite import Suite
+from roboeval.tables import Row
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a report needs of a completion.
+
+    Args:
+        program: its source.
+        instruction: what the model was told; None where nobody recorded it.
+        input_tokens: that the request took; None where nobody counted.
+        output_tokens: that the reply took; None where nobody counted.
+        seconds: from the request to the reply; None where nobody measured.
+    """
+
+    program: str
+    instruction: str | None = None
+    input_tokens: int | None = None
+    output_tokens: int | None = None
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class JudgedRun:
+    """A run with its verdicts.
+
+    Args:
+        name: as figures and tables call it; no two runs of a report share it.
+        folder: the name of its folder.
+        model: who wrote the completions; None where nobody recorded it, or several did.
+        about: what run.json says.
+        head: by what it was judged.
+        rows: of the evaluation; of their verdicts only that of the world that decided keeps its trace.
+        written: the completions by key.
+        scores: in the order of the suite.
+        total: how many completions there are to judge.
+        ablated: scores where only common sense is required; None where nobody judged that.
+        trials: its completions as the check sees them; None where they were not checked.
+    """
+
+    name: str
+    folder: str
+    model: str | None
+    about: Mapping[str, Any]
+    head: Mapping[str, Any]
+    rows: tuple[Row, ...]
+    written: Mapping[Key, Written]
+    scores: tuple[TaskScore, ...]
+    total: int
+    ablated: tuple[TaskScore, ...] | None = None
+    trials: tuple[Prompt, ...] | None = None
+
+    @cached_property
+    def by_prompt(self) -> dict[tuple[str, int], float]:
+        """pass@1 of each prompt."""
+        return {(p.task, p.prompt): p.pass_at(1) for score in self.scores for p in score.prompts}
+
+    @cached_property
+    def by_task(self) -> dict[str, list[float]]:
+        """pass@1 of the prompts of each task."""
+        return {score.task: [p.pass_at(1) for p in score.prompts] for score in self.scores}
+
+    @cached_property
+    def instructions(self) -> dict[tuple[str, int], str]:
+        """What the model was told for each prompt, where that was recorded."""
+        return {key[:2]: w.instruction for key, w in self.written.items() if w.instruction is not None}
+
+    @property
+    def failed(self) -> list[Row]:
+        """The rows that failed."""
+        return [row for row in self.rows if not row["passed"]]
+
+
+def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> JudgedRun:
+    """Read a judged run.
+
+    Args:
+        evaluation: that lies in it.
+        rows: of that, read once.
+        suite: by which it was judged.
+
+    Raises:
+        BadInput: one of its files is wrong.
+    """
+    kept = tuple({**trimmed(row), "task": sys.intern(row["task"])} for row in rows)
+    about = load_head(evaluation.run.about) if evaluation.run.about.exists() else {}
+    models: set[str | None] = set()
+    written: dict[Key, Written] = {}
+    for completion in evaluation.judged():
+        models.add(completion.model)
+        key = sys.intern(completion.task), completion.prompt, completion.index
+        written[key] = _written(completion)
+    folder = evaluation.run.path.resolve().name
+    model = models.pop() if len(models) == 1 else None
+    return JudgedRun(
+        name=visible(model or folder),
+        folder=folder,
+        model=model,
+        about=about,
+        head=evaluation.head,
+        rows=kept,
+        written=written,
+        scores=scored(kept, suite),
+        total=evaluation.scope.total,
+    )
+
+
+def scored(rows: Iterable[Row], suite: Suite) -> tuple[TaskScore, ...]:
+    """The scores of tasks, in the order of the suite."""
+    scores = score_by_prompt((row["task"], row["prompt"], row["passed"]) for row in rows)
+    by_name = {score.task: score for score in scores}
+    return tuple(by_name[name] for name in dict.fromkeys([*suite.tasks, *by_name]) if name in by_name)
+
+
+def _written(completion: Completion) -> Written:
+    more = completion.model_extra or {}
+    usage = more.get("usage")
+    usage = usage if isinstance(usage, dict) else {}
+    instruction = completion.instruction
+    return Written(
+        program=completion.program,
+        instruction=None if instruction is None else sys.intern(instruction),
+        input_tokens=_whole(usage.get("input_tokens")),
+        output_tokens=_whole(usage.get("output_tokens")),
+        seconds=_number(more.get("latency_s")),
+    )
+
+
+def _whole(value: object) -> int | None:
+    return value if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else None
+
+
+def _number(value: object) -> float | None:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool) and value >= 0
+    return float(value) if is_number else None  # type: ignore[arg-type]  # a number, as was just seen
+
+
+def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
+    """The same runs, named so that no two share a name: by folder too where the model does not tell."""
+    names = _apart([run.name for run in runs], [f"{run.name} ({run.folder})" for run in runs])
+    names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
+    return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
+
+
+def _apart(names: Sequence[str], longer: Sequence[str]) -> list[str]:
+    counts = Counter(names)
+    return [long if counts[name] > 1 else name for name, long in zip(names, longer, strict=True)]

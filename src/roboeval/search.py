@@ -1,0 +1,167 @@
+"""Which completions of a judged run did something: a formula tried on all their traces, on all cores."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import dataclass
+from itertools import chain, islice
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.badinput import BadInput
+from codebotler.rtl import CannotJudge, Formula, holds, parse
+from codebotler.terminal import visible
+from codebotler.trace import Trace
+from codebotler.tracefile import trace_from
+from roboeval.clusters import trimmed
+from roboeval.records import Key, how_many, name_of
+from roboeval.tables import Row, key_of
+
+BATCH = 100  # rows that a process looks through at a time
+SMALL = 20  # batches for which other processes are not worth their start
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is looked for.
+
+    Args:
+        formula: an RTL formula; None matches every trace.
+        negated: whether it shall not hold.
+        task: only completions of this task.
+        world: only in the world of this number, counted from 1, or whose `about` this is.
+    """
+
+    formula: str | None = None
+    negated: bool = False
+    task: str | None = None
+    world: str | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a row says to a question.
+
+    Args:
+        key: the completion.
+        passed: whether it passed.
+        worlds: numbers, from 1, and names of the worlds in which it does what is looked for.
+        row: of a completion that failed and does it somewhere, as `trimmed` leaves it.
+    """
+
+    key: Key
+    passed: bool
+    worlds: tuple[tuple[int, str], ...]
+    row: Row | None
+
+
+def asked_of(row: Row, question: Question, formula: Formula | None) -> Found:
+    """What one row says.
+
+    Args:
+        row: of an evaluation.
+        question: what is looked for.
+        formula: its formula, parsed.
+    """
+    worlds = [] if question.task not in {None, row["task"]} else list(_worlds(row, question, formula))
+    kept = trimmed(row) if worlds and not row["passed"] else None
+    return Found(key_of(row), row["passed"], tuple(worlds), kept)
+
+
+def _worlds(row: Row, question: Question, formula: Formula | None) -> Iterator[tuple[int, str]]:
+    for number, verdict in enumerate(row["verdicts"], 1):
+        about = verdict["world"]
+        named = question.world in {None, str(number)} or about.lower() == str(question.world).lower()
+        if named and (formula is None or _holds(formula, verdict["trace"]) != question.negated):
+            yield number, about
+
+
+def _holds(formula: Formula, data: Iterable[object]) -> bool:
+    trace: Trace = trace_from(data, further=True)
+    try:
+        return holds(formula, trace)
+    except CannotJudge:
+        return False
+
+
+def search(rows: Iterable[bytes], question: Question, *, workers: int = 1) -> Iterator[Found]:
+    """Look through the rows of an evaluation, in their order.
+
+    Args:
+        rows: lines of an evaluation's file.
+        question: what is looked for.
+        workers: how many processes look.
+
+    Raises:
+        RtlSyntaxError: the formula is none.
+        BadInput: a line is no row of an evaluation.
+    """
+    formula = None if question.formula is None else parse(question.formula)
+    lines = iter(rows)
+    first = list(islice(lines, BATCH * SMALL))
+    if workers == 1 or len(first) < BATCH * SMALL:
+        for line in chain(first, lines):
+            yield _looked(line, question, formula)
+        return
+    # Other processes are started anew: this one may have threads, which a fork would break.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context) as pool:
+        waiting: deque[Future[list[Found]]] = deque()
+        batches = _batches(chain(first, lines))
+        for batch in batches:
+            waiting.append(pool.submit(look_through, batch, question))
+            if len(waiting) > 4 * workers:
+                yield from waiting.popleft().result()
+        while waiting:
+            yield from waiting.popleft().result()
+
+
+def _batches(lines: Iterator[bytes]) -> Iterator[list[bytes]]:
+    while batch := list(islice(lines, BATCH)):
+        yield batch
+
+
+def look_through(lines: list[bytes], question: Question) -> list[Found]:
+    """What some rows say; the work of one process."""
+    formula = None if question.formula is None else parse(question.formula)
+    return [_looked(line, question, formula) for line in lines]
+
+
+def _looked(line: bytes, question: Question, formula: Formula | None) -> Found:
+    try:
+        return asked_of(json.loads(line), question, formula)
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        if isinstance(error, BadInput):
+            raise
+        raise BadInput("a line of the evaluation is no row of one; --redo starts over") from None
+
+
+def found_view(found: Sequence[Found], total: int) -> RenderableType:
+    """How many completions were found, by task, for a person.
+
+    Args:
+        found: those that do what was looked for.
+        total: how many were looked at.
+    """
+    head = Text(f"found {len(found):,} of {how_many(total)}", "bold")
+    if not found:
+        return head
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("task", overflow="fold")
+    for name in ("found", "passed", "such as"):
+        table.add_column(name, justify="right" if name != "such as" else "left")
+    by_task: dict[str, list[Found]] = {}
+    for one in found:
+        by_task.setdefault(one.key[0], []).append(one)
+    for task, those in by_task.items():
+        passed = sum(one.passed for one in those)
+        example = f"{name_of(those[0].key)}, world {those[0].worlds[0][0]}"
+        table.add_row(Text(visible(task)), f"{len(those):,}", f"{passed:,}", Text(visible(example), "dim"))
+    return Group(head, Text(), table)

@@ -1,0 +1,99 @@
+"""Figures look as they did when a person last looked at them, and break on nothing."""
+
+import io
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from made_up_runs import SUITE, cases
+from roboeval.report.causes import all_causes
+from roboeval.report.drawing import DARK, LIGHT, Look, looking, written
+from roboeval.report.figures import at_the_limit, bars, limits, thresholds
+from roboeval.report.heat import causes_figure
+from roboeval.report.reading import JudgedRun
+
+PICTURES = Path(__file__).with_name("pictures")
+DRAWINGS: dict[str, Callable[[list[JudgedRun], Look], Figure | None]] = {
+    "tasks": lambda runs, look: bars(runs, SUITE, look),
+    "thresholds": thresholds,
+    "causes": lambda runs, look: causes_figure(all_causes(runs, published=True), look),
+    "rejection-sampling": limits,
+    "accepted": at_the_limit,
+}
+KEPT = [*(("usual", name) for name in DRAWINGS), *(("40 models", name) for name in DRAWINGS)]
+KEPT += [("one prompt", "tasks"), ("all failures", "causes"), ("no failures", "causes")]
+SIZE = (480, 480)
+TOLERANCE = 0.012  # of the whole range, on average over all points
+
+
+def picture(case: str, name: str, look: Look = LIGHT) -> Image.Image | None:
+    with looking(look):
+        figure = DRAWINGS[name](cases()[case], look)
+        if figure is None:
+            return None
+        drawn = Image.open(io.BytesIO(written(figure, "png"))).convert("RGB")
+    drawn.thumbnail(SIZE)
+    return drawn
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+@pytest.mark.parametrize("case", cases())
+def test_nothing_breaks_a_figure(case: str, name: str) -> None:
+    drawn = picture(case, name)
+    if drawn is None:
+        assert case == "all failures"  # whose programs were not checked
+        return
+    dark = np.asarray(drawn).mean(axis=2) < 128
+    assert 0.0005 < dark.mean() < 0.6
+    edge = np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]])
+    assert edge.mean() < 0.02, "something is cut off"
+
+
+@pytest.mark.parametrize(("case", "name"), KEPT)
+def test_figures_look_as_they_did(case: str, name: str) -> None:
+    drawn = picture(case, name)
+    assert drawn is not None
+    path = PICTURES / f"{case} {name}.png".replace(" ", "-")
+    if os.environ.get("REDRAW"):  # then somebody looks at them
+        drawn.quantize(64).save(path, optimize=True)
+    kept = Image.open(path).convert("RGB")
+    assert kept.size == drawn.size
+    difference = np.abs(np.asarray(kept, dtype=float) - np.asarray(drawn, dtype=float)).mean() / 255
+    assert difference < TOLERANCE
+
+
+def test_other_numbers_look_different() -> None:
+    kept = picture("usual", "causes")
+    other = picture("no failures", "causes")
+    assert kept is not None
+    assert other is not None
+    one, two = (np.asarray(drawn.resize((400, 300)), dtype=float) for drawn in (kept, other))
+    assert np.abs(one - two).mean() / 255 > TOLERANCE
+
+
+@pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
+def test_the_same_numbers_give_the_same_bytes(kind: str) -> None:
+    def drawn() -> bytes:
+        with looking(DARK):
+            figure = bars(cases()["usual"], SUITE, DARK)
+            return written(figure, kind)
+
+    first = drawn()
+    assert first == drawn()
+    assert b"CreationDate" not in first
+    assert b"<dc:date>" not in first
+
+
+def test_a_readers_own_style_plays_no_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = picture("one prompt", "tasks")
+    monkeypatch.setitem(mpl.rcParams, "axes.facecolor", "red")
+    after = picture("one prompt", "tasks")
+    assert before is not None
+    assert after is not None
+    assert before.tobytes() == after.tobytes()

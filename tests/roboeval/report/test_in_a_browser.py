@@ -1,0 +1,130 @@
+"""The page in a real browser: tables are sorted, groups filtered, and without a script it still reads.
+
+Without a Chromium these tests are skipped and say so.
+"""
+
+import base64
+import hashlib
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from made_up_runs import HOSTILE, SUITE, made_up
+from roboeval.report.contents import Wishes, sections
+from roboeval.report.page import SCRIPT
+from roboeval.report.reading import Written
+from roboeval.report.writing import write_report
+
+CLICKS = """
+addEventListener("load", () => {
+  const seen = [];
+  addEventListener("error", (event) => seen.push("error: " + event.message));
+  const table = document.querySelector("#table-overall table");
+  const names = () => [...table.tBodies[0].rows].map((row) => row.cells[0].textContent.slice(0, 4)).join(",");
+  const button = [...table.tHead.querySelectorAll("button")].find((one) => one.textContent === "pass@1");
+  button.click();
+  seen.push("down: " + names());
+  button.click();
+  seen.push("up: " + names() + " " + button.parentNode.getAttribute("aria-sort"));
+  const groups = [...document.querySelectorAll(".cluster")];
+  const shown = () => groups.filter((one) => one.offsetParent !== null).length;
+  const all = shown();
+  const [model, , , search] = document.querySelectorAll(".filters select, .filters input");
+  model.value = "strong";
+  model.dispatchEvent(new Event("input"));
+  const told = document.querySelector("output");
+  seen.push("filtered: " + (shown() > 0 && shown() < all) + " " + told.textContent);
+  search.value = "no such words";
+  search.dispatchEvent(new Event("input"));
+  seen.push("none: " + shown());
+  dispatchEvent(new Event("beforeprint"));
+  seen.push("open: " + document.querySelectorAll("details.sheet:not([open])").length);
+  dispatchEvent(new Event("afterprint"));
+  seen.push("closed: " + document.querySelectorAll("details.sheet[open]").length);
+  seen.push("pictures: " + [...document.images].every((one) => one.naturalWidth > 100));
+  seen.push("hacked: " + (window.hacked === undefined));
+  seen.push("wide: " + (document.documentElement.scrollWidth <= innerWidth));
+  document.title = seen.join(" | ");
+});
+"""
+
+
+@pytest.fixture(scope="module")
+def chromium() -> str:
+    found = shutil.which("chromium") or shutil.which("google-chrome")
+    if found is None:
+        pytest.skip("there is no Chromium here")
+    return found
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    program = f"</pre><img src=x onerror='window.hacked=1'><script>window.hacked=1</script>{HOSTILE}"
+    runs = [
+        made_up("strong", {"Visit": (9, 8), "CountMugs": (10, 3)}),
+        made_up("weak", {"Visit": (0, 2), "CountMugs": (1, 0)}),
+        made_up(HOSTILE, {"Visit": (4, 5)}),
+    ]
+    for run in runs:
+        assert isinstance(run.written, dict)
+        run.written.update({key: Written(program) for key in run.written if key[2] > 6})
+    list(write_report("t", ["about it"], sections(runs, SUITE, Wishes(command="c")), folder))
+    return folder / "index.html"
+
+
+def opened(chromium: str, page: Path, folder: Path, *options: str) -> str:
+    """The page as it stands after its scripts have run."""
+    ended = subprocess.run(
+        [
+            chromium,
+            *("--headless=new", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=3000"),
+            *(f"--user-data-dir={folder / 'profile'}", "--window-size=1200,900", *options),
+            *("--dump-dom", page.as_uri()),
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    return ended.stdout
+
+
+def test_sorting_filtering_and_printing(chromium: str, page: Path, tmp_path: Path) -> None:
+    text = page.read_text()
+    digest = base64.b64encode(hashlib.sha256(CLICKS.encode()).digest()).decode()
+    text = text.replace("script-src ", f"script-src 'sha256-{digest}' ", 1)
+    clicked = tmp_path / "clicked.html"
+    clicked.write_text(text.replace("</body>", f"<script>{CLICKS}</script></body>"))
+    title = re.search(r"<title>(.*?)</title>", opened(chromium, clicked, tmp_path), re.DOTALL)
+    assert title is not None
+    assert title[1].split(" | ") == [
+        "down: stro,&lt;scr,weak",
+        "up: weak,&lt;scr,stro ascending",
+        "filtered: true 10 of 46 groups, 10 completions",
+        "none: 0",
+        "open: 0",
+        "closed: 0",
+        "pictures: true",
+        "hacked: true",
+        "wide: true",
+    ]
+
+
+def test_without_a_script_it_reads_as_a_document(chromium: str, page: Path, tmp_path: Path) -> None:
+    quiet = tmp_path / "quiet.html"
+    quiet.write_text(page.read_text().replace(SCRIPT.read_text(), ""))
+    text = opened(chromium, quiet, tmp_path)
+    assert "<button" not in text
+    assert 'class="filters"' not in text
+    assert text.count('<th scope="col"') > 20
+    assert "How often programs pass" in text
+
+
+def test_no_other_script_runs(chromium: str, page: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.html"
+    other.write_text(page.read_text().replace("</body>", "<script>document.title = 'ran'</script></body>"))
+    assert "<title>ran</title>" not in opened(chromium, other, tmp_path)

@@ -1,0 +1,212 @@
+"""The tables of a report: hand-computed numbers, the paper's beside ours, and CSV that holds them all."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from made_up_runs import HOSTILE, SUITE, made_up, usual
+from roboeval.evaluation import Evaluation
+from roboeval.report import paper
+from roboeval.report.causes import all_causes, causes_of, causes_sheet, kinds_in_order
+from roboeval.report.reading import JudgedRun, Written, named_apart, read_run
+from roboeval.report.retries import accepted, retries_sheet, steps_sheet
+from roboeval.report.scores import (
+    curve,
+    curve_sheet,
+    overall_sheet,
+    prompt_sheet,
+    published_sheet,
+    task_sheet,
+)
+from roboeval.report.sheets import Column, Sheet, sheet, told, write_csv
+from roboeval.resume import evaluate_run
+from roboeval.run import Run, open_source
+from roboeval.suite import Suite
+from roboeval.taxonomy import PYTHON
+
+
+def column(table: Sheet, head: str) -> list[object]:
+    at = [column.head for column in table.columns].index(head)
+    return [row[at] for row in table.rows]
+
+
+def test_tasks_have_mean_worst_and_best_prompt() -> None:
+    table = task_sheet(usual(), SUITE)
+    (row,) = [row for row in table.rows if row[:3] == ("Visit", "strong", "all")]
+    assert row[3:] == pytest.approx((29 / 30, 0.9, 1.0))
+    assert [row[2] for row in table.rows].count("common sense only") == 2
+    assert "middle, weak" in table.notes[0]
+
+
+def test_the_curve_by_hand() -> None:
+    assert curve([1.0, 0.5, 0.5, 0.0]) == [(1.0, 0.25), (0.5, 0.75)]
+    assert curve([0.0]) == [(1.0, 0.0)]
+    table = curve_sheet([made_up("a", {"Visit": (10, 5, 5, 0)})])
+    assert table.rows == ((1.0, 0.25), (0.5, 0.75))
+
+
+def test_intervals_of_prompts_and_of_tasks() -> None:
+    table = overall_sheet([made_up("a", {"Visit": (10, 10), "CountMugs": (0, 0)})])
+    row = dict(zip((c.head for c in table.columns), table.rows[0], strict=True))
+    assert row["pass@1"] == 0.5
+    assert (row["tasks: low"], row["tasks: high"]) == (0.0, 1.0)
+    assert 0 < row["completions"] == 40  # type: ignore[operator]
+
+
+def test_an_unfinished_run_says_so() -> None:
+    run = replace(made_up("a", {"Visit": (1,)}), total=99)
+    assert overall_sheet([run]).notes == ("a: only 10 of 99 completions are judged, and only these count.",)
+
+
+def test_causes_are_counted() -> None:
+    one = causes_of(made_up("a", {"Visit": (3,)}))  # the fourth to the tenth fail, by all kinds in turn
+    assert one.classes["passed"] == pytest.approx(0.3)
+    assert one.classes[PYTHON] == pytest.approx(0.2)
+    assert one.kinds[PYTHON] == {"NameError": 0.5, "ZeroDivisionError": 0.5}
+    assert kinds_in_order([one], PYTHON) == ["NameError", "ZeroDivisionError"]
+    assert sum(one.classes.values()) == pytest.approx(1)
+
+
+def test_retries_as_they_are_elsewhere() -> None:
+    runs = [made_up("a", {"Visit": (5,)}), made_up("b", {"Visit": (5,)}, trials=None)]
+    table = retries_sheet(runs)
+    assert table is not None
+    assert {row[0] for row in table.rows} == {"a"}
+    assert runs[0].trials is not None
+    share = accepted(runs[0].trials)
+    assert column(table, "at the limit") == pytest.approx([1 - share[n] for n in (0, 2, 4, 8, 100)])
+    assert steps_sheet(runs[1:]) is retries_sheet(runs[1:]) is None
+
+
+# --- the paper's numbers
+
+
+def paper_run(name: str, **changes: object) -> JudgedRun:
+    run = made_up(name, {"CountSavory": (5,) * 5}, head={"suite": "paper", "digest": "0"})
+    return replace(run, **changes)  # type: ignore[arg-type]  # fields of a run
+
+
+@pytest.mark.parametrize(
+    ("name", "model"),
+    [
+        ("openai-chat:gpt-4", "GPT-4"),
+        ("openai-chat:gpt-4o", None),
+        ("completions:bigcode/starcoder", "StarCoder"),
+        ("hf:codellama/CodeLlama-34b-Python-hf", "CodeLlama"),
+        ("codellama/CodeLlama-7b-Python-hf", None),
+        ("text-bison-001", "PaLM2"),
+    ],
+)
+def test_names_of_the_papers_models(name: str, model: str | None) -> None:
+    assert paper.model_of(paper_run(name)) == model
+    assert paper.model_of(replace(paper_run(name), head={"suite": "mine"})) is None
+
+
+def test_cells_stand_only_beside_the_authors_own_prompts(paper_suite: Suite) -> None:
+    theirs = paper_run("gpt-4")
+    heads = [c.head for c in prompt_sheet([theirs], paper_suite).columns]
+    assert heads == ["task", "prompt", "gpt-4", "gpt-4, published"]
+    ours = {"CountSavory": Written("", paper_suite.tasks["CountSavory"].prompts[0])}
+    for other in (
+        replace(theirs, about={"settings": {}}),
+        replace(theirs, written={("CountSavory", 0, 0): ours["CountSavory"]}),
+    ):
+        assert "gpt-4, published" not in [c.head for c in prompt_sheet([other], paper_suite).columns]
+        means = published_sheet([other], paper_suite)
+        assert means is not None
+        assert paper.OTHER_PHRASINGS in means.notes
+        assert column(means, "published")[0] == pytest.approx(0.995)
+
+
+@pytest.fixture
+def paper_suite(paper: Suite) -> Suite:
+    return paper
+
+
+def test_published_means_are_those_of_the_table_of_pass_at_1(paper_suite: Suite) -> None:
+    tasks = list(paper_suite.tasks)
+    assert paper.overall_mean("CodeLlama", tasks) == pytest.approx(0.463, abs=5e-4)
+    assert paper.overall_mean("StarCoder", tasks) == pytest.approx(0.3125, abs=5e-5)
+    assert paper.class_share("CodeLlama", None) == 0.457
+    assert paper.class_share("StarCoder", None) == 0.312
+    table = published_sheet([paper_run("starcoder")], paper_suite)
+    assert table is not None
+    assert paper.TWO_SUMS in table.notes
+
+
+def test_published_causes_only_where_asked_for() -> None:
+    runs = [paper_run("gpt-4"), paper_run("mine")]
+    assert [one.name for one in all_causes(runs, published=False)] == ["gpt-4", "mine"]
+    assert [one.name for one in all_causes(runs, published=True)] == ["gpt-4", "gpt-4, published", "mine"]
+    table = causes_sheet(all_causes(runs, published=True))
+    assert paper.TWO_SUMS in table.notes
+    shares = {row[2]: row[4] for row in table.rows if row[:2] == ("gpt-4, published", "TaskCompletionError")}
+    assert shares["SayAtLocation"] == pytest.approx(0.682)
+    assert shares["InitialTerminal"] == pytest.approx(0.317)
+
+
+@pytest.mark.parametrize(("file", "model"), [("gpt-4", "GPT-4"), ("palm-2", "PaLM2")])
+def test_reports_of_published_completions_equal_the_published_cells(
+    corpus: Path, paper_suite: Suite, tmp_path: Path, file: str, model: str
+) -> None:
+    run = Run(tmp_path / file)
+    run.keep(open_source(str(corpus / "corpus" / "completions" / f"{file}.jsonl"), paper_suite))
+    for _ in evaluate_run(run, paper_suite, tasks=None, ablated=False, redo=False, workers=2):
+        pass
+    evaluation = Evaluation(run, "paper")
+    read = read_run(evaluation, evaluation.rows(), paper_suite)
+    table = prompt_sheet([read], paper_suite)
+    assert len(table.rows) == 20
+    assert column(table, file) == pytest.approx(column(table, f"{file}, published"))
+    assert column(table, file) == pytest.approx([paper.cell(model, *row[:2]) for row in table.rows])  # type: ignore[arg-type]
+
+
+# --- names, and CSV
+
+
+def test_runs_are_named_apart() -> None:
+    run = made_up("gpt-4", {"Visit": (1,)})
+    runs = [
+        replace(run, folder="a"),
+        replace(run, folder="b"),
+        replace(run, folder="b"),
+        made_up("x", {"Visit": (1,)}),
+    ]
+    assert [one.name for one in named_apart(runs)] == ["gpt-4 (a)", "gpt-4 (b) #2", "gpt-4 (b) #3", "x"]
+
+
+def test_csv_holds_all_digits_and_no_formula(tmp_path: Path) -> None:
+    table = sheet(
+        "t",
+        "T",
+        ["name", Column("share", "share"), Column("=n", "count")],
+        [["=1+1", 1 / 3, 4], [HOSTILE, None, None]],
+    )
+    write_csv(table, tmp_path)
+    with (tmp_path / "t.csv").open(newline="") as file:
+        head, first, second = csv.reader(file)
+    assert head == ["name", "share", "'=n"]
+    assert first == ["'=1+1", str(1 / 3), "4"]
+    assert second[1:] == ["", ""]
+    assert "<script>" in second[0]
+
+
+def test_cells_as_people_read_them() -> None:
+    assert [
+        told(None, "share"),
+        told(0.12345, "share"),
+        told(0.1, "difference"),
+        told(-0.1, "difference"),
+    ] == [
+        "-",
+        "0.123",
+        "+0.100",
+        "-0.100",
+    ]
+    assert [told(1e-17, "difference"), told(1234, "count"), told(1234.5678, "number")] == [
+        "0.000",
+        "1,234",
+        "1,235",
+    ]

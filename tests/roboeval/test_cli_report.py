@@ -1,0 +1,76 @@
+"""`roboeval report` as a person meets it."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from command_line import refused, roboeval
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with two small judged runs, of hasty and of careful programs."""
+    folder = tmp_path_factory.mktemp("runs")
+    for name in ("hasty", "careful"):
+        made = roboeval(
+            *("run", "--model", f"recorded:{name}", "--tasks", "LunchTime,SayGoodDay"),
+            *("--num-completions", "4", "--out", name),
+            cwd=folder,
+        )
+        assert made.status == 0, made
+    return folder
+
+
+def test_a_report_of_two_runs(runs: Path) -> None:
+    made = roboeval("report", "hasty", "careful", "--out", "report", cwd=runs)
+    assert made.status == 0, made
+    assert made.out == ""
+    assert made.err.endswith("the report is in report/index.html\n")
+    text = (runs / "report" / "index.html").read_text()
+    assert "recorded:hasty" in text
+    for kind in ("png", "pdf"):
+        names = {path.stem for path in (runs / "report" / "figures").glob(f"*.{kind}")}
+        assert names == {"tasks", "thresholds", "causes", "rejection-sampling", "accepted"}
+    again = roboeval("report", "hasty", "careful", "--out", "report2", cwd=runs)
+    assert again.status == 0
+    assert (runs / "report2" / "index.html").read_text().replace("report2", "report") == text
+
+
+def test_without_a_check_no_program_runs(runs: Path) -> None:
+    made = roboeval("report", "careful", "--out", "quick", "--no-check", cwd=runs)
+    assert made.status == 0, made
+    assert not (runs / "quick" / "figures" / "accepted.png").exists()
+
+
+def test_what_is_refused(runs: Path, tmp_path: Path) -> None:
+    assert refused("report", tmp_path, "--out", tmp_path / "r") == (
+        f"{tmp_path}: is no run: it holds no completions.jsonl"
+    )
+    (tmp_path / "file").write_text("")
+    said = refused("report", runs / "careful", "--out", tmp_path / "file", "--no-check")
+    assert said == f"{tmp_path / 'file'}: cannot be made (Not a directory)"
+    assert refused("report", runs / "careful", "--out", "") == "nothing is named; name a folder"
+
+
+def test_runs_of_different_suites_are_not_set_side_by_side(runs: Path) -> None:
+    head = runs / "careful" / "evaluations" / "paper.json"
+    kept = head.read_text()
+    head.write_text(json.dumps(json.loads(kept) | {"digest": "f" * 64}))
+    ended = roboeval("report", "hasty", "careful", "--out", "mixed", cwd=runs)
+    head.write_text(kept)
+    assert ended.status == 2
+    assert re.search(r"other content \(ffffffff and [0-9a-f]{8}\)", ended.err), ended
+    assert "`roboeval evaluate careful --redo`" in ended.err
+    assert not (runs / "mixed").exists()
+
+
+def test_help_imports_nothing_that_draws() -> None:
+    code = (
+        "import sys, roboeval.cli; print([m for m in ('matplotlib', 'numpy', 'polars') if m in sys.modules])"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout == "[]\n"
