@@ -10,6 +10,10 @@ from codebotler.web.access import Access
 from codebotler.web.guard import LOOPBACK, Rules
 
 
+WAITING = 128
+"""So many may wait to be let in."""
+
+
 @dataclass(frozen=True)
 class Place:
     """Where the page is.
@@ -33,7 +37,7 @@ class Place:
         return self.host in LOOPBACK or self.host.startswith("127.")
 
     def listening(self) -> socket.socket:
-        """A socket that is bound there."""
+        """A socket that is open there."""
         try:
             family, kind, protocol, _, address = socket.getaddrinfo(
                 self.host, self.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
@@ -41,6 +45,7 @@ class Place:
             bound = socket.socket(family, kind, protocol)
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             bound.bind(address)
+            bound.listen(WAITING)  # whoever opens the link at once waits, and is not turned away
         except OSError as error:
             raise BadInput(
                 f"nobody can listen on {self.host}, port {self.port}: {error.strerror}; "
