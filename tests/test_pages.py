@@ -87,7 +87,9 @@ def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
     assert table in run(last, tmp_path, "")
 
 
-@pytest.mark.parametrize("page", ["evaluate-your-model.md", "check-before-you-run.md", "robots.md", "ros.md"])
+@pytest.mark.parametrize(
+    "page", ["evaluate-your-model.md", "check-before-you-run.md", "robots.md", "ros.md", "serve.md"]
+)
 def test_pages_are_linked(page: str) -> None:
     assert f"]({page})" in (DOCS / "index.md").read_text()
     assert f"](docs/{page})" in (DOCS.parent / "README.md").read_text()

@@ -220,6 +220,7 @@ def view_data(view: View) -> dict[str, Any]:
         "trouble": view.trouble,
         "instruction": view.order.instruction,
         "model": view.order.model,
+        "author": view.author,
         "program": view.program,
         "digest": view.digest,
         "is_written": view.is_written,

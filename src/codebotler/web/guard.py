@@ -256,11 +256,7 @@ def _with_headers(send: Send) -> Send:
     async def with_headers(message: Message) -> None:
         nonlocal is_page
         if message["type"] == "http.response.start":
-            kept = [
-                (name, value)
-                for name, value in message["headers"]
-                if not name.lower().startswith(b"access-control-")
-            ]
+            kept = list(message["headers"])
             is_page = any(
                 name.lower() == b"content-type" and value.startswith(b"text/html") for name, value in kept
             )

@@ -12,6 +12,7 @@ from codebotler.drives import named_rooms
 from codebotler.mission import MissionError
 from codebotler.missionlog import Summary
 from codebotler.models.recorded import recorded_model
+from codebotler.program import called_skills
 from codebotler.running import unknown_rooms
 from codebotler.simulator.imagined import Plan
 from codebotler.terminal import shortened
@@ -99,17 +100,16 @@ class Instruct:
 
 
 def _examples(desk: Desk) -> list[str]:
-    """Instructions that the recorded model knows, one of each kind, for rooms that are there."""
+    """Short instructions that the recorded model knows, of different kinds, for rooms that are there."""
     plan = None if desk.world is None else Plan.of(desk.world)
-    found: list[str] = []
-    programs: set[tuple[str, ...]] = set()
-    for instruction, replies in recorded_model("recorded").replies.items():
-        rooms = named_rooms(replies[0].program)
-        fits = plan is None or not unknown_rooms(replies[0].program, plan)
-        if fits and rooms not in programs:
-            programs.add(rooms)
-            found.append(instruction)
-    return sorted(found, key=len)[:MOST_EXAMPLES]
+    found: dict[frozenset[str], str] = {}
+    for instruction, replies in sorted(
+        recorded_model("recorded").replies.items(), key=lambda known: len(known[0])
+    ):
+        program = replies[0].program
+        if plan is None or (named_rooms(program) and not unknown_rooms(program, plan)):
+            found.setdefault(frozenset(called_skills(program)), instruction)
+    return list(found.values())[:MOST_EXAMPLES]
 
 
 def _before(desk: Desk) -> list[Summary]:

@@ -16,7 +16,7 @@ EVERY = 0.1
 HEAD = '<link rel="stylesheet" href="/static/page.css">'
 BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
 <button id="stop" type="button" aria-keyshortcuts="Escape"><b>STOP</b><small>Esc</small></button></div>
-<script src="/static/stop.js" defer></script>"""
+<script src="/static/stop.js"></script>"""
 
 
 def frame(title: str, here: str) -> None:
@@ -48,7 +48,7 @@ def add(desk: Desk) -> None:
     @ui.page("/", response_timeout=10.0)
     async def operate() -> None:
         frame("Robot", "/")
-        with ui.element("main").classes("operate"):
+        with ui.element("div").classes("operate"):
             instruct = Instruct(desk)
             program = ProgramPane(desk)
             status = Status(desk)

@@ -30,7 +30,7 @@ def add(desk: Desk, frame: Callable[[str, str], None]) -> None:
     @ui.page("/missions")
     async def list_missions() -> None:
         frame("Missions", "/missions")
-        with ui.element("main").classes("past"):
+        with ui.element("div").classes("past"):
             Words("h1", "Missions")
             try:
                 known = await asyncio.to_thread(missions, desk.home)
@@ -46,7 +46,7 @@ def add(desk: Desk, frame: Callable[[str, str], None]) -> None:
     @ui.page("/missions/{mission}")
     async def one(mission: str) -> None:
         frame("Mission", "")
-        with ui.element("main").classes("past"):
+        with ui.element("div").classes("past"):
             try:
                 summary, events = await asyncio.to_thread(_read, desk, mission)
             except BadInput as error:
@@ -84,7 +84,7 @@ def _show(summary: Summary, events: list[Line]) -> None:
     Words("h2", "What happened")
     with ui.element("ol").classes("timeline"):
         for line in events[:MOST_EVENTS]:
-            words = told(line)
+            words = None if line["event"] == "feedback" else told(line)
             if words is not None:
                 with ui.element("li").classes(f"event event-{line['event']}"):
                     Words("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")

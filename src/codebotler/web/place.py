@@ -9,7 +9,6 @@ from codebotler.badinput import BadInput
 from codebotler.web.access import Access
 from codebotler.web.guard import LOOPBACK, Rules
 
-
 WAITING = 128
 """So many may wait to be let in."""
 

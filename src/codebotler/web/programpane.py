@@ -81,11 +81,9 @@ class ProgramPane:
                 self._editor.value = shown
         self._editor.set_enabled(view.may_be_edited)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
-        model = view.order.model
-        what = (
-            "Recorded: people wrote this program." if model.startswith("recorded") else f"Written by {model}."
-        )
-        self._writer.say(what if model and view.program else "")
+        author = view.author
+        what = "Recorded: people wrote this." if author.startswith("recorded") else f"Written by {author}."
+        self._writer.say(what if author and view.program else "")
         self._show_verdict(view)
         self._show_word(view)
         drawn = (view.found, view.problems, view.unknown, shown)

@@ -58,6 +58,7 @@ class View:
         trouble: why it could not go on, in a sentence.
         order: what was asked for.
         program: as it stands; a reply as far as it has come, while a model writes.
+        author: the model that wrote the program as it stands; empty if a person did.
         is_written: whether a model is writing just now.
         found: by the check of this very program; None until it is there.
         problems: of the check and of the robot's skills, each in a sentence.
@@ -75,6 +76,7 @@ class View:
     trouble: str = ""
     order: Order = field(default_factory=Order)
     program: str = ""
+    author: str = ""
     is_written: bool = False
     found: Check | None = None
     problems: tuple[str, ...] = ()
@@ -184,7 +186,8 @@ class Turn:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._wish = program
-            self._change(program=program, found=None, busy="checking", problems=(), unknown=())
+            changed = {"found": None, "problems": (), "unknown": ()}
+            self._change(program=program, author="", busy="checking", **changed)
             self._lock.notify_all()
 
     def ask_again(self, *, repair: bool) -> None:
@@ -308,7 +311,7 @@ class Turn:
             program = asyncio.run(self._reply(model, before, problems))
         except asyncio.CancelledError:
             return
-        self._show(is_written=False, order=replace(order, model=model.name))
+        self._show(is_written=False, author=model.name)
         self._take(mission, program)
 
     async def _reply(self, model: Model, before: str, problems: Sequence[str]) -> str:
@@ -339,14 +342,14 @@ class Turn:
 
     def _take(self, mission: Mission, program: str) -> None:
         """Make a program the mission's, and check it."""
-        model = self._view.order.model
         with self._paper, self._lock:
             if self._wish not in {None, program}:
                 return  # somebody wants another one by now
             self._wish = None
             self._change(program=program, busy="checking", found=None, problems=(), unknown=())
+            author = self._view.author
         try:
-            mission.draft(program, model)
+            mission.draft(program, author)
             found = self._means.check(program, self._view.plan)
             lacking = beyond(program, self._means.robot)
             problems = (*(problem.sentence for problem in found.problems), *lacking)

@@ -139,7 +139,9 @@ def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) 
 # --- other pages
 
 
-@pytest.mark.parametrize("host", ["evil.example", "localhost.evil.example", "10.0.0.1", "", "localhost:@evil"])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "localhost.evil.example", "10.0.0.1", "", "localhost:@evil"]
+)
 def test_only_our_own_names_are_answered_to(server: PageServer, host: str) -> None:
     """A page whose name was made to lead here (DNS rebinding) still calls us by that name."""
     cookie = server.cookie
@@ -185,9 +187,7 @@ def test_a_browser_that_says_not_from_where_changes_nothing(server: PageServer) 
 def test_other_pages_embed_nothing(server: PageServer, site: str) -> None:
     cookie = server.cookie
     assert server.ask("GET", "/api/robot", cookie=cookie, sec_fetch_site=site).status == 403
-    assert (
-        server.ask("GET", "/", cookie=cookie, sec_fetch_site=site, sec_fetch_mode="navigate").status == 200
-    )
+    assert server.ask("GET", "/", cookie=cookie, sec_fetch_site=site, sec_fetch_mode="navigate").status == 200
 
 
 def test_nobody_is_invited(server: PageServer) -> None:
@@ -271,10 +271,10 @@ def role_at(path: str, token: str) -> int:
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b""})
 
-    async def send(message: Message) -> None:  # noqa: RUF029 - as ASGI has it
+    async def send(message: Message) -> None:
         sent.append(message)
 
-    async def receive() -> Message:  # noqa: RUF029 - as ASGI has it
+    async def receive() -> Message:
         return {"type": "http.request", "body": b""}
 
     headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
@@ -284,7 +284,9 @@ def role_at(path: str, token: str) -> int:
     return int(sent[0]["status"])
 
 
-@pytest.mark.parametrize("path", ["/", "/missions", "/api", "/api/missions", "/api/stop", "/faces", "/api/faces"])
+@pytest.mark.parametrize(
+    "path", ["/", "/missions", "/api", "/api/missions", "/api/stop", "/faces", "/api/faces"]
+)
 def test_a_face_cannot_run_programs(path: str) -> None:
     assert role_at(path, "a face's") == 403
     assert role_at(path, "an operator's") == 200
