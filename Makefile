@@ -74,6 +74,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/check.py
 	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
+	$(BIN)/python bench/page_stop.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"

@@ -13,6 +13,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from pageserver import PageServer
+from server import Fault, Server
 from viewing import PHONE, TABLET, OpenPage
 
 TEA = """def task_program():
@@ -77,6 +78,28 @@ def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> Non
         page.get_by_role("button", name="Run it on the robot").click()
         expect(page.locator(".headline")).to_have_text("Done")
         assert page.locator(".moment").count() > 5
+        page.context.close()
+
+
+def test_a_program_is_seen_while_it_is_written(tmp_path: Path, opened: OpenPage) -> None:
+    with (
+        Server(fault=lambda _: Fault.DRIP) as model,
+        PageServer(tmp_path, "--model", "completions:slow", "--base-url", model.url) as server,
+    ):
+        page = opened(server)
+        page.locator("textarea").fill("Say hello")
+        page.locator("textarea").press("Control+Enter")
+        expect(page.get_by_role("button", name="Writing …")).to_be_disabled()
+        expect(page.locator(".cm-line").first).not_to_be_empty()
+        before = len(text_of(page))
+        page.wait_for_function(f"document.querySelector('.cm-content').innerText.length > {before}")
+        other = opened(server)
+        expect(other.locator(".cm-line").first).not_to_be_empty()
+        other.locator("#stop").click()
+        expect(page.locator(".headline")).to_have_text("Stopped")
+        expect(page.get_by_role("button", name="Write the program")).to_be_enabled()
+        page.context.close()
+        other.context.close()
 
 
 def test_what_is_said_and_asked_and_told_is_shown(server: PageServer, opened: OpenPage) -> None:
@@ -262,6 +285,7 @@ def test_what_became_of_a_mission_is_said_after_the_tool_died(tmp_path: Path, op
         expect(page.locator(".interrupted").first).to_contain_text("the tool died during go_to")
         page.get_by_role("button", name="I have seen it").click()
         expect(page.locator(".interrupted").first).to_be_hidden()
+        page.context.close()
 
 
 def test_without_the_token_there_is_a_sentence(server: PageServer) -> None:

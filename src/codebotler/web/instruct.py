@@ -24,7 +24,7 @@ MOST_EXAMPLES, MOST_BEFORE = 4, 6
 RECORDED = "recorded"
 ABOUT_RECORDED = (
     "A recorded model is no model: people wrote these programs for known instructions, so that all can be "
-    "tried without a key. It knows the examples below."
+    "tried without a key. It knows only such instructions as the examples."
 )
 
 
@@ -42,7 +42,7 @@ class Instruct:
             Words("h2", "Instruct").props("id=h-instruct")
             self._text = (
                 ui.textarea("What is the robot to do?")
-                .props('outlined autogrow input-class="words" maxlength=20000 dir=auto')
+                .props('outlined autogrow input-class="words" maxlength=200000 dir=auto')
                 .on("keydown.ctrl.enter", self._ask)
             )
             self._model = ui.select(list(desk.models), value=desk.models[0], label="Who writes the program")

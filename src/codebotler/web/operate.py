@@ -9,6 +9,7 @@ from codebotler.web.instruct import Instruct
 from codebotler.web.past import add as add_past
 from codebotler.web.programpane import ProgramPane
 from codebotler.web.status import Status
+from codebotler.web.words import Words
 
 EVERY = 0.1
 """Seconds after which a page looks whether something has changed."""
@@ -48,6 +49,7 @@ def add(desk: Desk) -> None:
     @ui.page("/", response_timeout=10.0)
     async def operate() -> None:
         frame("Robot", "/")
+        Words("h1", "Operate the robot", "unseen")
         with ui.element("div").classes("operate"):
             instruct = Instruct(desk)
             program = ProgramPane(desk)

@@ -23,11 +23,17 @@ PAUSE = 0.3
 """Seconds without a key after which what was typed is checked."""
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
+NAMED = """
+    document.querySelectorAll(".cm-content").forEach((e) => e.setAttribute("aria-label", "Program"));
+    document.querySelectorAll(".cm-scroller").forEach((e) => e.setAttribute("tabindex", "0"));
+"""
+"""What people need who see no screen, or use no mouse, and CodeMirror does not offer."""
+
 MOST_MARKS = 400
 MOST_PROBLEMS = 20
 SPOKEN = frozenset({"say", "ask", "answer"})
-LIGHT: Final = "githubLight"
-DARK: Final = "githubDark"
+LIGHT: Final = "vscodeLight"
+DARK: Final = "vscodeDark"
 
 
 class ProgramPane:
@@ -65,9 +71,7 @@ class ProgramPane:
         """Use the colours of the browser's light or dark mode."""
         if await ui.run_javascript("matchMedia('(prefers-color-scheme: dark)').matches", timeout=5.0):
             self._editor.theme = DARK
-        ui.run_javascript(
-            "document.querySelectorAll('.cm-content').forEach(e => e.setAttribute('aria-label', 'Program'))"
-        )
+        ui.run_javascript(NAMED)
 
     def show(self, view: View) -> None:
         """Show the program that is at hand."""
