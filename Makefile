@@ -5,7 +5,8 @@
 # torch (3.11); it makes an environment of its own, since nothing else needs so much. `make test-pyrobosim` tests the
 # robot in pyrobosim, in an environment of its own, too. `make test-faults` asks a server that fails
 # one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
-# the system's Python must have rospy (`codebotler robots` says what is missing).
+# the system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
+# Chromium; SHOTS names a folder for its screenshots.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -21,7 +22,7 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo test test-ros1 test-transformers test-pyrobosim test-faults fuzz lint bench clean
+.PHONY: demo serve test test-ros1 test-browser test-transformers test-pyrobosim test-faults fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -36,14 +37,20 @@ demo: $(VENV)/installed
 	@echo
 	@echo "To see why a program fails, keep the verdicts: $(BIN)/roboeval evaluate recorded:hasty --out runs/hasty"
 
+serve: $(VENV)/installed
+	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler serve --world examples/office.yaml --speed 5
+
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --ignore tests/ros1 \
+	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --ignore tests/ros1 --ignore tests/browser \
 		--ignore tests/codebotler/models/test_local.py \
 		--ignore tests/codebotler/perception/test_zeroshot.py \
 		--ignore tests/codebotler/robots/test_pyrobosim.py $(TESTS)
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
+
+test-browser: $(VENV)/tested
+	$(BIN)/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py \
@@ -76,6 +83,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/report.py
 	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
+	$(BIN)/python bench/page_stop.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"

@@ -13,6 +13,7 @@ from roboeval.suite import Suite, load_suite
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="A test that is skipped has failed.")
+    parser.addoption("--shots", help="The folder that gets the screenshots of tests in a browser.")
 
 
 def pytest_configure() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SHOWS = {
+    "api_client.py": "problems: []\n",
     "is_in_room_server.py": "usage: is_in_room_server.py",
     "judge_a_program.py": "looks_into_every_lab: the robot went to sam's lab at step 1 but did not look",
     "run_a_program.py": "finished\ngoto: kitchen\ncheck: mug\nsay: True\n",

@@ -110,6 +110,7 @@ def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
         "report.md",
         "check-before-you-run.md",
         "robots.md",
+        "serve.md",
         "ros.md",
         "perception.md",
     ],

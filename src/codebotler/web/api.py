@@ -1,0 +1,262 @@
+"""Everything the page does, over HTTP: missions, checks, the robot."""
+
+from __future__ import annotations
+
+import io
+import json
+import threading
+from collections.abc import AsyncIterator, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Header, HTTPException
+from fastapi.responses import Response, StreamingResponse
+from pydantic import BaseModel, ConfigDict, Field
+
+from codebotler.archive import find, missions, summary_of
+from codebotler.badinput import BadInput
+from codebotler.mission import MissionError
+from codebotler.missionlog import EVENTS, Line, Summary, events_of
+from codebotler.missionmcap import write_mcap
+from codebotler.web.desk import MOST_PROGRAM, Desk
+from codebotler.web.turn import Order, View
+
+HERE = "current"
+"""Names the mission at hand in an address."""
+
+QUIET = 15.0
+"""Seconds after which a stream says that it is still there."""
+
+Text = Annotated[str, Field(max_length=MOST_PROGRAM)]
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class NewMission(_Form):
+    """What somebody asks for: an instruction, a program, or both."""
+
+    instruction: Text = ""
+    model: Annotated[str, Field(max_length=200)] = Field("", description="The first one, if none is named.")
+    program: Text = ""
+
+
+class NewProgram(_Form):
+    """A program in the place of the one at hand."""
+
+    program: Text
+
+
+class Approval(_Form):
+    """Somebody's word for a program."""
+
+    program: str = Field(description="The digest of the program that was looked at.")
+    despite_problems: bool = False
+
+
+class ProgramToCheck(_Form):
+    """A program that is only checked."""
+
+    program: Text
+
+
+def router(desk: Desk) -> APIRouter:
+    """The addresses of the API.
+
+    Args:
+        desk: what they speak of.
+    """
+    api = APIRouter(prefix="/api", tags=["missions"])
+    _add_missions(api, desk)
+    _add_changes(api, desk)
+    _add_events(api, desk)
+    _add_rest(api, desk)
+    return api
+
+
+def _add_missions(api: APIRouter, desk: Desk) -> None:
+    @api.get("/missions")
+    def list_missions() -> list[dict[str, Any]]:
+        """All missions, in the order in which they began."""
+        with _refusing():
+            return [asdict(summary) for summary in missions(desk.home)]
+
+    @api.post("/missions", status_code=201)
+    async def create(new: NewMission) -> dict[str, Any]:
+        """Begin a mission; its program is written and checked meanwhile. One that runs is not disturbed."""
+        model = new.model or ("" if new.program else desk.models[0])
+        with _refusing():
+            turn = desk.begin(Order(new.instruction, model, new.program))
+        await desk.board.until(lambda: bool(turn.view.id) or turn.view.is_over)
+        if not turn.view.id:
+            raise HTTPException(409, turn.view.trouble or "it was stopped before it began")
+        return view_data(turn.view)
+
+    @api.get("/missions/{mission}")
+    def show(mission: str) -> dict[str, Any]:
+        """A mission: the one at hand with its check, one of before in short."""
+        view = desk.view
+        if mission in {HERE, view.id}:
+            return view_data(view)
+        return asdict(_past(desk, mission)[0])
+
+    @api.get("/missions/{mission}/events.jsonl")
+    def jsonl(mission: str) -> Response:
+        """The events as they lie on the disk."""
+        summary, _ = _past(desk, mission)
+        data = (desk.home / "missions" / summary.id / EVENTS).read_bytes()
+        return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
+
+    @api.get("/missions/{mission}/events.mcap")
+    def mcap(mission: str, clock: Literal["wall", "robot"] = "wall") -> Response:
+        """The events as MCAP, which Foxglove opens."""
+        summary, events = _past(desk, mission)
+        file = io.BytesIO()
+        write_mcap(file, summary, events, folder=desk.home / "missions" / summary.id, clock=clock)
+        return _file(file.getvalue(), f"{summary.id}.mcap", "application/octet-stream")
+
+
+def _add_changes(api: APIRouter, desk: Desk) -> None:
+    @api.put("/missions/{mission}/program")
+    def edit(mission: str, new: NewProgram) -> dict[str, Any]:
+        """Put another program in the place of the one at hand; it is checked meanwhile."""
+        _expect_at_hand(desk, mission)
+        with _refusing():
+            return view_data(desk.edit(new.program).view)
+
+    @api.post("/missions/{mission}/approve")
+    def approve(mission: str, approval: Approval) -> dict[str, Any]:
+        """Let the robot run the program that was looked at, and no other."""
+        _expect_at_hand(desk, mission)
+        turn = desk.turn
+        assert turn is not None, "it is at hand"
+        with _refusing():
+            turn.approve(approval.program, despite_problems=approval.despite_problems)
+        return view_data(turn.view)
+
+    @api.post("/missions/{mission}/stop", status_code=202)
+    async def stop_mission(mission: str) -> dict[str, Any]:
+        """Stop the mission at hand; `state` says when it has stopped."""
+        _expect_at_hand(desk, mission)
+        _stop(desk)
+        return view_data(desk.view)
+
+    @api.post("/stop", status_code=202)
+    async def stop(*, only_moving: bool = False) -> dict[str, Any]:
+        """Stop whatever goes on, or only a robot that runs; whether there is anything to stop."""
+        view = desk.view
+        stopping = view.is_running if only_moving else not view.is_over
+        if stopping:
+            _stop(desk)
+        return {"stopping": stopping}
+
+
+def _add_events(api: APIRouter, desk: Desk) -> None:
+    @api.get("/missions/{mission}/events", response_class=StreamingResponse)
+    async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
+        """The events as they happen (server-sent), from the first one on or after `Last-Event-ID`."""
+        _expect_at_hand(desk, mission)
+        return StreamingResponse(
+            _stream(desk, last_event_id),
+            media_type="text/event-stream",
+            headers={"cache-control": "no-store"},
+        )
+
+
+def _add_rest(api: APIRouter, desk: Desk) -> None:
+    @api.post("/check", tags=["checks"])
+    def check(new: ProgramToCheck) -> dict[str, Any]:
+        """Say what is wrong with a program, in the rooms of the mission at hand if there is one."""
+        with _refusing():
+            return desk.check(new.program, desk.view.plan).data()
+
+    @api.get("/robot", tags=["robot"])
+    def robot() -> dict[str, Any]:
+        """The robot, its skills and its mission."""
+        view = desk.view
+        return {
+            "robot": desk.robot.name,
+            "skills": [skill.signature for skill in desk.robot.skills.values()],
+            "missing": dict(desk.robot.missing),
+            "models": list(desk.models),
+            "mission": view.id,
+            "state": view.state,
+            "reason": view.reason,
+            "is_over": view.is_over,
+        }
+
+
+def _stop(desk: Desk) -> None:
+    """On a thread of its own: a stop waits for nothing, and holds nothing up."""
+    threading.Thread(target=desk.stop, args=("the page",), daemon=True).start()
+
+
+async def _stream(desk: Desk, known: int) -> AsyncIterator[str]:
+    """Lines of a server-sent stream. Who reads slowly is sent what there is by then; nothing waits for it."""
+    turn = desk.turn
+    assert turn is not None, "it is at hand"
+
+    def has_more() -> bool:
+        return bool(turn.events(known)) or turn.view.is_over
+
+    while True:
+        for line in turn.events(known):
+            known += 1
+            yield f"id: {known}\nevent: {line['event']}\ndata: {json.dumps(line)}\n\n"
+        if turn.view.is_over and not turn.events(known):
+            return
+        if not await desk.board.until(has_more, QUIET):
+            yield ": still there\n\n"
+
+
+def view_data(view: View) -> dict[str, Any]:
+    """A view as plain data."""
+    return {
+        "id": view.id,
+        "state": view.state,
+        "busy": view.busy,
+        "trouble": view.trouble,
+        "instruction": view.order.instruction,
+        "model": view.order.model,
+        "author": view.author,
+        "program": view.program,
+        "digest": view.digest,
+        "is_written": view.is_written,
+        "problems": list(view.problems),
+        "unknown_rooms": list(view.unknown),
+        "check": None if view.found is None else view.found.data(),
+        "reason": view.reason,
+        "doing": view.progress.doing,
+        "clock": view.progress.clock,
+        "is_over": view.is_over,
+    }
+
+
+def _expect_at_hand(desk: Desk, mission: str) -> None:
+    if not desk.view.id or mission not in {HERE, desk.view.id}:
+        raise HTTPException(409, "that is not the mission at hand")
+
+
+def _past(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:
+    try:
+        folder = find(desk.home, desk.view.id if mission == HERE else mission)
+        return summary_of(folder), events_of(folder)
+    except BadInput as error:
+        raise HTTPException(404, error.sentence) from None
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    try:
+        yield
+    except MissionError as error:
+        raise HTTPException(409, error.sentence) from None
+    except BadInput as error:
+        raise HTTPException(422, str(error)) from None
+
+
+def _file(data: bytes, name: str, kind: str) -> Response:
+    shown = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+    return Response(data, media_type=kind, headers=shown)

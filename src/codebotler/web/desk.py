@@ -1,0 +1,162 @@
+"""The operator's desk: the robot, the mission at hand and those before, the same for every viewer."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Self
+
+from codebotler.archive import recover
+from codebotler.check import check
+from codebotler.mission import GRACE, MissionError
+from codebotler.missionlog import Line, Summary
+from codebotler.models.base import Model
+from codebotler.problems import Check
+from codebotler.robots.base import Robot
+from codebotler.simulator.engine import Lanes
+from codebotler.simulator.imagined import Plan
+from codebotler.web.board import Board
+from codebotler.web.turn import Means, Order, Turn, View
+from codebotler.world import World
+
+MOST_PROGRAM = 200_000
+"""Characters of a program or an instruction; longer ones are mistakes."""
+
+NOTHING = View()
+
+
+class Desk:
+    """Holds a robot and the mission at hand; as a context manager, from the start of the tool to its end.
+
+    All methods are for any thread. Those that say so are back at once, the others may wait for a disk or for
+    a robot.
+
+    Args:
+        robot: not connected; it is, while a mission has it.
+        home: the folder of missions.
+        open_model: gives a model by its name.
+        models: the names that are offered, the first one by default.
+        world: where the robot is, if somebody has measured it.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        home: Path,
+        open_model: Callable[[str], Model],
+        *,
+        models: Sequence[str] = ("recorded:careful", "recorded:hasty"),
+        world: World | None = None,
+    ) -> None:
+        self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
+        self.board = Board()
+        self.interrupted: tuple[Summary, ...] = ()
+        self._means = Means(robot, home, open_model, self.check, self.board.change)
+        self._lock = threading.Lock()  # held for moments
+        self._turn: Turn | None = None
+        self._checking = threading.Lock()
+        self._held = ExitStack()
+        self._lanes: Lanes | None = None
+
+    def __enter__(self) -> Self:
+        self.interrupted = tuple(recover(self.home))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        turn = self._turn
+        if turn is not None:
+            if not turn.view.is_over:
+                turn.stop("the end of the tool")
+            turn.join(GRACE + 1)
+        with self._checking:
+            self._held.close()
+
+    @property
+    def turn(self) -> Turn | None:
+        """The mission at hand, or the last one; at once."""
+        return self._turn
+
+    @property
+    def view(self) -> View:
+        """What all viewers see; at once."""
+        turn = self._turn
+        return NOTHING if turn is None else turn.view
+
+    def events(self, start: int = 0) -> list[Line]:
+        """The events of the mission at hand, from one on; at once."""
+        turn = self._turn
+        return [] if turn is None else turn.events(start)
+
+    def begin(self, order: Order) -> Turn:
+        """Begin a mission; one that is not running yet makes room for it. Back at once.
+
+        Raises:
+            MissionError: the robot is on another one, or the order cannot be carried out.
+        """
+        order = Order(order.instruction.strip(), order.model.strip(), order.program)
+        if not order.program.strip() and not (order.instruction and order.model):
+            raise MissionError("nothing is asked for; say what the robot is to do")
+        for text in (order.instruction, order.program):
+            _expect_short(text)
+        with self._lock:
+            before = self._turn
+            if before is not None and before.view.is_running:
+                raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
+            self._turn = turn = Turn(before.view.number + 1 if before else 1, order, self._means, before)
+        if before is not None and not before.view.is_over:
+            threading.Thread(target=before.stop, args=("another instruction",), daemon=True).start()
+        turn.start()
+        self.board.change()
+        return turn
+
+    def edit(self, program: str) -> Turn:
+        """Put another program in the place of the one at hand; after its end this begins a mission.
+
+        Back at once.
+
+        Raises:
+            MissionError: the robot runs, or a model is writing.
+        """
+        _expect_short(program)
+        turn = self._turn
+        if turn is None or turn.view.is_over:
+            return self.begin(Order(self.view.order.instruction, program=program))
+        turn.edit(program)
+        return turn
+
+    def stop(self, by: str) -> bool:
+        """Stop the mission at hand; back when the robot was told so.
+
+        Args:
+            by: who wants it, in words.
+
+        Returns:
+            whether there was one.
+        """
+        turn = self._turn
+        if turn is None or turn.view.is_over:
+            return False
+        turn.stop(by)
+        return True
+
+    def check(self, program: str, plan: Plan | None = None) -> Check:
+        """Say what is wrong with a program, one after the other.
+
+        Args:
+            program: its source.
+            plan: the robot's rooms; without them they are taken from the program.
+
+        Raises:
+            EngineError: no isolated process could be started.
+        """
+        with self._checking:
+            if self._lanes is None:
+                self._lanes = self._held.enter_context(Lanes(1))
+            return check(program, plan=plan, lanes=self._lanes)
+
+
+def _expect_short(text: str) -> None:
+    if len(text) > MOST_PROGRAM:
+        raise MissionError(f"{len(text):,} characters are too many; at most {MOST_PROGRAM:,} are taken")

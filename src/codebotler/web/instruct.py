@@ -1,0 +1,122 @@
+"""The first pane: what somebody asks for, in plain words."""
+
+from __future__ import annotations
+
+import asyncio
+
+from nicegui import html, ui
+
+from codebotler.archive import missions
+from codebotler.badinput import BadInput
+from codebotler.drives import named_rooms
+from codebotler.mission import MissionError
+from codebotler.missionlog import Summary
+from codebotler.models.recorded import recorded_model
+from codebotler.program import called_skills
+from codebotler.running import unknown_rooms
+from codebotler.simulator.imagined import Plan
+from codebotler.terminal import shortened
+from codebotler.web.desk import Desk
+from codebotler.web.turn import Order, View
+from codebotler.web.words import Press, Words
+
+MOST_EXAMPLES, MOST_BEFORE = 4, 6
+RECORDED = "recorded"
+ABOUT_RECORDED = (
+    "A recorded model is no model: people wrote these programs for known instructions, so that all can be "
+    "tried without a key. It knows only such instructions as the examples."
+)
+
+
+class Instruct:
+    """Takes an instruction and says who is to write the program.
+
+    Args:
+        desk: on which it is put.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._number = -1
+        with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
+            Words("h2", "Instruct").props("id=h-instruct")
+            self._text = (
+                ui.textarea("What is the robot to do?")
+                .props('outlined autogrow input-class="words" maxlength=200000 dir=auto')
+                .on("keydown.ctrl.enter", self._ask)
+            )
+            self._model = ui.select(list(desk.models), value=desk.models[0], label="Who writes the program")
+            self._model.props("outlined dense").on_value_change(self._about_model)
+            self._about = Words("p", ABOUT_RECORDED, "quiet")
+            self._write = Press("Write the program", self._ask, "primary")
+            self._trouble = Words("p", "", "trouble").props("role=alert")
+            self._examples = ui.element("div").classes("picks")
+            self._before = ui.element("div").classes("picks")
+        self._about_model()
+        self._trouble.say("")
+
+    async def load(self) -> None:
+        """Fill in what has to be read first: examples, and what was asked for before."""
+        examples = await asyncio.to_thread(_examples, self._desk)
+        before = await asyncio.to_thread(_before, self._desk)
+        if examples:
+            self._fill(self._examples, "Examples", [(text, "") for text in examples])
+        if before:
+            self._fill(
+                self._before, "Asked before", [(summary.instruction, summary.state) for summary in before]
+            )
+
+    def show(self, view: View) -> None:
+        """Show what is at hand."""
+        if view.number != self._number:
+            self._number = view.number
+            if view.order.instruction:
+                self._text.value = view.order.instruction
+        self._write.allow(not view.is_written and not view.is_running)
+        self._write.say("Writing …" if view.is_written else "Write the program")
+        self._trouble.say(view.trouble)
+
+    def _ask(self) -> None:
+        try:
+            self._desk.begin(Order(self._text.value or "", self._model.value or ""))
+        except MissionError as error:
+            ui.notify(error.sentence, type="warning", position="top")
+
+    def _about_model(self) -> None:
+        self._about.set_visibility(str(self._model.value).startswith(RECORDED))
+
+    def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
+        where.clear()
+        with where:
+            Words("h3", title)
+            for text, state in texts:
+                with html.button(type="button").classes("pick").on("click", lambda t=text: self._take(t)):
+                    Words("span", shortened(text, 200))
+                    if state:
+                        Words("small", state, f"state state-{state}")
+
+    def _take(self, text: str) -> None:
+        self._text.value = text
+
+
+def _examples(desk: Desk) -> list[str]:
+    """Short instructions that the recorded model knows, of different kinds, for rooms that are there."""
+    plan = None if desk.world is None else Plan.of(desk.world)
+    found: dict[frozenset[str], str] = {}
+    for instruction, replies in sorted(
+        recorded_model("recorded").replies.items(), key=lambda known: len(known[0])
+    ):
+        program = replies[0].program
+        if plan is None or (named_rooms(program) and not unknown_rooms(program, plan)):
+            found.setdefault(frozenset(called_skills(program)), instruction)
+    return list(found.values())[:MOST_EXAMPLES]
+
+
+def _before(desk: Desk) -> list[Summary]:
+    """The last different instructions."""
+    try:
+        known = missions(desk.home)
+    except (BadInput, OSError):
+        return []
+    last = {summary.instruction: summary for summary in known if summary.instruction}
+    return sorted(last.values(), key=lambda summary: -summary.created)[:MOST_BEFORE]

@@ -1,0 +1,96 @@
+"""The pages about past missions: all of them, and one with what happened when."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from datetime import datetime
+
+from nicegui import html, ui
+
+from codebotler.archive import find, missions, summary_of
+from codebotler.badinput import BadInput
+from codebotler.missionlog import Line, Summary, events_of
+from codebotler.missionview import told
+from codebotler.terminal import shortened
+from codebotler.web.desk import Desk
+from codebotler.web.words import Words
+
+MOST, MOST_EVENTS = 200, 1_000
+
+
+def add(desk: Desk, frame: Callable[[str, str], None]) -> None:
+    """Put the pages at their addresses.
+
+    Args:
+        desk: whose missions.
+        frame: what all pages have, given the title and the address.
+    """
+
+    @ui.page("/missions")
+    async def list_missions() -> None:
+        frame("Missions", "/missions")
+        with ui.element("div").classes("past"):
+            Words("h1", "Missions")
+            try:
+                known = await asyncio.to_thread(missions, desk.home)
+            except BadInput as error:
+                Words("p", str(error), "trouble")
+                return
+            if not known:
+                Words("p", "There is none yet.", "quiet")
+            with ui.element("ol").classes("rows"):
+                for summary in reversed(known[-MOST:]):
+                    _row(summary)
+
+    @ui.page("/missions/{mission}")
+    async def one(mission: str) -> None:
+        frame("Mission", "")
+        with ui.element("div").classes("past"):
+            try:
+                summary, events = await asyncio.to_thread(_read, desk, mission)
+            except BadInput as error:
+                Words("p", error.sentence, "trouble")
+                return
+            _show(summary, events)
+
+
+def _read(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:
+    folder = find(desk.home, mission)
+    return summary_of(folder), events_of(folder)
+
+
+def _row(summary: Summary) -> None:
+    with ui.element("li"), html.a(href=f"/missions/{summary.id}"):
+        Words("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
+        Words("span", shortened(summary.instruction or "a program of one's own", 160), "text")
+        Words("small", summary.state, f"state state-{summary.state}")
+
+
+def _show(summary: Summary, events: list[Line]) -> None:
+    began = datetime.fromtimestamp(summary.created).astimezone()
+    Words("h1", shortened(summary.instruction, 300) or "A program of one's own")
+    with ui.element("p").classes("facts"):
+        Words("small", summary.state, f"state state-{summary.state}")
+        by = f", written by {summary.model}" if summary.model else ""
+        Words("span", f"{began:%d %b %Y, %H:%M:%S}, on the robot {summary.robot}{shortened(by)}")
+    if summary.reason:
+        Words("p", shortened(summary.reason), "reason")
+    with ui.element("p").classes("downloads"):
+        for kind, name in (("jsonl", "Events (JSON lines)"), ("mcap", "MCAP, for Foxglove")):
+            html.a(name, href=f"/api/missions/{summary.id}/events.{kind}").props("download")
+    for problem in summary.problems:
+        Words("p", shortened(problem), "trouble")
+    Words("h2", "What happened")
+    with ui.element("ol").classes("timeline"):
+        for line in events[:MOST_EVENTS]:
+            words = None if line["event"] == "feedback" else told(line)
+            if words is not None:
+                with ui.element("li").classes(f"event event-{line['event']}"):
+                    Words("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
+                    Words("small", f"{line['clock']:.1f} s")
+                    Words("span", words.plain, "text")
+    if len(events) > MOST_EVENTS:
+        Words("p", f"{len(events) - MOST_EVENTS:,} more; all of them are in the files.", "quiet")
+    Words("h2", "Program")
+    Words("pre", summary.program.encode(errors="replace").decode(), "source").props("tabindex=0")

@@ -1,0 +1,59 @@
+"""Where the page is: an address, a port, and the names by which it may be called."""
+
+from __future__ import annotations
+
+import socket
+from dataclasses import dataclass
+
+from codebotler.badinput import BadInput
+from codebotler.web.access import Access
+from codebotler.web.guard import LOOPBACK, Rules
+
+WAITING = 128
+"""So many may wait to be let in."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the page is.
+
+    Args:
+        host: the address that is listened on.
+        port: from 0, which takes a free one.
+        names: under which it may be called besides.
+
+    Raises:
+        BadInput: nobody can listen there.
+    """
+
+    host: str = "127.0.0.1"
+    port: int = 8080
+    names: tuple[str, ...] = ()
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only this machine gets there."""
+        return self.host in LOOPBACK or self.host.startswith("127.")
+
+    def listening(self) -> socket.socket:
+        """A socket that is open there."""
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(
+                self.host, self.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+            )[0]
+            bound = socket.socket(family, kind, protocol)
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bound.bind(address)
+            bound.listen(WAITING)  # whoever opens the link at once waits, and is not turned away
+        except OSError as error:
+            raise BadInput(
+                f"nobody can listen on {self.host}, port {self.port}: {error.strerror}; "
+                "choose another --port, or --host"
+            ) from None
+        return bound
+
+    def rules(self, access: Access, port: int) -> Rules:
+        """Whom the guard lets in."""
+        named = {name.lower() for name in (self.host, *self.names)}
+        hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
+        return Rules(access, frozenset(hosts), not self.is_loopback, f"codebotler-{port}")

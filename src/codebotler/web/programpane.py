@@ -1,0 +1,239 @@
+"""The second pane: the program, what is wrong with it, and what the robot would do."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from nicegui import ui
+
+from codebotler.mission import MissionError, State
+from codebotler.problems import Check
+from codebotler.skills import SKILLS
+from codebotler.terminal import shortened
+from codebotler.web.desk import Desk
+from codebotler.web.strip import Scene, Strip, strips
+from codebotler.web.turn import View
+from codebotler.web.words import Press, Words
+
+PAUSE = 0.3
+"""Seconds without a key after which what was typed is checked."""
+
+SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
+NAMED = """
+    document.querySelectorAll(".cm-content").forEach((e) => e.setAttribute("aria-label", "Program"));
+    document.querySelectorAll(".cm-scroller").forEach((e) => e.setAttribute("tabindex", "0"));
+"""
+"""What people need who see no screen, or use no mouse, and CodeMirror does not offer."""
+
+MOST_MARKS = 400
+MOST_PROBLEMS = 20
+SPOKEN = frozenset({"say", "ask", "answer"})
+LIGHT: Final = "vscodeLight"
+DARK: Final = "vscodeDark"
+
+
+class ProgramPane:
+    """Shows the program of the mission at hand, takes another one, and somebody's word for it.
+
+    Args:
+        desk: on which it lies.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._known = ""  # as the desk has it, in so far as this browser was told
+        self._typed_at: float | None = None
+        self._drawn: tuple[object, ...] = ()
+        with ui.element("section").classes("pane program").props("aria-labelledby=h-program"):
+            with ui.element("div").classes("head"):
+                Words("h2", "Program").props("id=h-program")
+                self._busy = Words("span", "", "busy").props("role=status")
+            self._writer = Words("p", "", "quiet")
+            self._editor = ui.codemirror(
+                "", language="Python", theme=LIGHT, line_wrapping=True, on_change=self._typed
+            ).classes("editor")
+            self._verdict = Words("p", "", "verdict").props("role=status")
+            self._problems = ui.element("ul").classes("problems")
+            self._word = ui.element("div").classes("word")
+            with self._word:
+                self._despite = ui.checkbox("Run it despite the problems", on_change=self._ticked)
+                self._run = Press("Run it on the robot", self._approve, "go")
+                self._repair = Press("Have it mended", lambda: self._again(repair=True), "plain")
+                self._again_button = Press("Ask again", lambda: self._again(repair=False), "plain")
+            self._board = ui.element("div").classes("storyboard")
+        self._view = desk.view
+
+    async def take_colours(self) -> None:
+        """Use the colours of the browser's light or dark mode."""
+        if await ui.run_javascript("matchMedia('(prefers-color-scheme: dark)').matches", timeout=5.0):
+            self._editor.theme = DARK
+        ui.run_javascript(NAMED)
+
+    def show(self, view: View) -> None:
+        """Show the program that is at hand."""
+        self._view = view
+        shown = _for_editor(view.program)
+        if shown != self._known:
+            is_mine = shown == self._editor.value
+            self._known = shown
+            if not is_mine:
+                self._typed_at = None
+                self._editor.value = shown
+        self._editor.set_enabled(view.may_be_edited)
+        self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
+        author = view.author
+        what = "Recorded: people wrote this." if author.startswith("recorded") else f"Written by {author}."
+        self._writer.say(what if author and view.program else "")
+        self._show_verdict(view)
+        self._show_word(view)
+        drawn = (view.found, view.problems, view.unknown, shown)
+        if drawn != self._drawn:
+            self._drawn = drawn
+            self._draw(view, shown)
+
+    def send_typed(self) -> None:
+        """Have the desk check what was typed, once nothing more was for a moment."""
+        if self._typed_at is None or time.monotonic() - self._typed_at < PAUSE:
+            return
+        self._typed_at = None
+        typed = self._editor.value or ""
+        if typed == self._known:
+            return
+        self._known = typed
+        try:
+            self._desk.edit(typed)
+        except MissionError as error:
+            ui.notify(error.sentence, type="warning", position="top")
+            self._known = ""
+            self.show(self._desk.view)
+
+    def _typed(self) -> None:
+        if self._editor.value != self._known:
+            self._typed_at = time.monotonic()
+
+    # --- somebody's word
+
+    def _show_verdict(self, view: View) -> None:
+        count = len(view.problems)
+        if view.found is None:
+            self._verdict.say("")
+            return
+        many = f"{count} problems" if count > 1 else "1 problem"
+        self._verdict.classes(add="bad" if count else "good", remove="good" if count else "bad")
+        told = f"{many}. The robot should not run this." if count else "The check found no problem."
+        if view.found.rooms_are_guessed:
+            told += " The robot does not tell its rooms; they were taken from the program."
+        self._verdict.say(told)
+
+    def _show_word(self, view: View) -> None:
+        open_ = view.state in {State.DRAFTING, State.CHECKED} and not view.is_over and bool(view.program)
+        may_again = view.may_be_approved and bool(view.order.model)
+        self._word.set_visibility(open_ or self._may_rerun(view))
+        self._despite.set_visibility(open_ and bool(view.problems))
+        if not view.problems:
+            self._despite.value = False
+        self._repair.set_visibility(may_again and bool(view.problems))
+        self._again_button.set_visibility(may_again)
+        self._run.text = (
+            "Check it again, to run it once more" if self._may_rerun(view) else "Run it on the robot"
+        )
+        self._ticked()
+
+    def _may_rerun(self, view: View) -> bool:
+        return view.is_over and bool(view.program)
+
+    def _ticked(self) -> None:
+        view = self._desk.view
+        accepted = not view.problems or bool(self._despite.value)
+        self._run.allow(self._may_rerun(view) or (view.may_be_approved and accepted))
+        self._run.classes(add="risky" if view.problems else "", remove="" if view.problems else "risky")
+
+    async def _approve(self) -> None:
+        turn, view = self._desk.turn, self._view
+        if self._may_rerun(view):
+            self._known = ""
+            self._try(lambda: self._desk.edit(view.program))
+        elif self._typed_at is not None:
+            ui.notify("The program was just changed; wait for its check.", position="top")
+        elif turn is not None:
+            try:
+                despite = bool(self._despite.value)
+                await asyncio.to_thread(turn.approve, view.digest, despite_problems=despite)
+            except MissionError as error:
+                ui.notify(error.sentence, type="warning", position="top")
+
+    def _again(self, *, repair: bool) -> None:
+        turn = self._desk.turn
+        if turn is not None:
+            self._try(lambda: turn.ask_again(repair=repair))
+
+    def _try(self, do: Callable[[], object]) -> None:
+        try:
+            do()
+        except MissionError as error:
+            ui.notify(error.sentence, type="warning", position="top")
+
+    # --- what was found
+
+    def _draw(self, view: View, shown: str) -> None:
+        self._editor.decorations = [*_skills(shown), *_marks(view.found, shown)]
+        self._problems.clear()
+        with self._problems:
+            for sentence in (*view.problems, *view.unknown)[:MOST_PROBLEMS]:
+                kind = "problem" if sentence in view.problems else "unsure"
+                Words("li", shortened(sentence), kind)
+        self._board.clear()
+        if view.found is not None:
+            with self._board:
+                _draw_strips(strips(view.found))
+
+
+def _for_editor(program: str) -> str:
+    """A program as an editor shows it: it knows one kind of line break, and JSON no half characters."""
+    return re.sub("\r\n?", "\n", program).encode(errors="replace").decode()
+
+
+def _skills(program: str) -> list[dict[str, Any]]:
+    found = list(SKILL_CALL.finditer(program))[:MOST_MARKS]
+    return [{"kind": "mark", "from": m.start(), "to": m.end(), "class": "skill"} for m in found]
+
+
+def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
+    """Problems at their lines: the line is coloured, and the words stand after it."""
+    if found is None:
+        return []
+    lines = program.split("\n")
+    marks: list[dict[str, Any]] = []
+    for problem in found.problems[:MOST_PROBLEMS]:
+        if problem.line is None or problem.line > len(lines):
+            continue
+        end = sum(len(line) + 1 for line in lines[: problem.line]) - 1
+        marks.append({"kind": "line", "line": problem.line, "class": "problem-line"})
+        words = f"  ◂ {shortened(problem.message, 160)}"
+        marks.append({"kind": "widget", "position": end, "text": words, "class": "problem-words"})
+    return marks
+
+
+def _draw_strips(shown: list[Strip]) -> None:
+    Words("h3", "What the robot would do" if shown else "")
+    for strip in shown:
+        with ui.element("article").classes("strip"):
+            if strip.world:
+                Words("p", f"Where {strip.world}", "world")
+            with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
+                for scene in strip.scenes:
+                    _draw_scene(scene)
+            Words("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
+
+
+def _draw_scene(scene: Scene) -> None:
+    with ui.element("li").classes("scene" if scene.deeds or not scene.is_found else "scene passing"):
+        Words("b", scene.room, "room")
+        if not scene.is_found:
+            Words("span", "there is no such room", "deed missing")
+        for deed in scene.deeds:
+            Words("span", deed.text, f"deed deed-{deed.kind}" if deed.kind in SPOKEN else "deed")

@@ -1,0 +1,152 @@
+"""What a robot is doing and has said, as far as the events of its mission tell."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+from codebotler.missionlog import Line
+from codebotler.missionview import told
+from codebotler.program import parsed
+from codebotler.skills import SKILLS
+from codebotler.terminal import shortened
+from codebotler.world import Point
+
+AT = re.compile(r"at \((-?\d+(?:\.\d+)?), (-?\d+(?:\.\d+)?)\)")
+MOST = 200
+ENDS = frozenset({"result", "error", "cancelled", "late"})
+HEARD = {"say": "says", "ask": "asks"}
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Something that happened, in words.
+
+    Args:
+        clock: seconds by the robot's clock since the program began.
+        kind: of the event; `says`, `asks` and `hears` for what is spoken.
+        text: what happened; any text.
+    """
+
+    clock: float
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a mission has come.
+
+    Args:
+        doing: what the robot does just now, in words; empty while it does nothing.
+        skill: the name of the skill that goes on.
+        line: of the program, where only one call can be meant.
+        clock: seconds by the robot's clock since the program began.
+        room: to which it drove last, in the program's words; empty before it drove.
+        at: where it is in metres, as far as it tells.
+        is_driving: whether it is on its way to `room`.
+        moments: what happened, the last 200.
+    """
+
+    doing: str = ""
+    skill: str = ""
+    line: int | None = None
+    clock: float = 0.0
+    room: str = ""
+    at: Point | None = None
+    is_driving: bool = False
+    moments: tuple[Moment, ...] = ()
+
+    def after(self, line: Line, program: str) -> Progress:
+        """How far it has come with one more event.
+
+        Args:
+            line: the event.
+            program: which runs.
+        """
+        event = line["event"]
+        now = replace(self, clock=max(self.clock, line["clock"]))
+        if event == "feedback":
+            place = AT.search(line["text"])
+            return replace(now, at=(float(place[1]), float(place[2]))) if place else now
+        if event == "skill":
+            now = now.with_skill(line, program)
+        elif event in ENDS:
+            now = replace(now, doing="", skill="", line=None, is_driving=False)
+        words = None if event == "state" else told(line)
+        if words is None or (event == "sleep" and not line["seconds"]):
+            return now
+        return replace(now, moments=(*now.moments, _moment(line, words.plain))[-MOST:])
+
+    def with_skill(self, line: Line, program: str) -> Progress:
+        """As a skill begins."""
+        words, name = told(line), line["skill"]
+        drives = name in SKILLS and getattr(SKILLS[name].recording, "kind", "") == "goto"
+        now = replace(
+            self,
+            doing=words.plain if words else name,
+            skill=name,
+            line=line_of(program, name, tuple(map(_plain, line["arguments"].values()))),
+            is_driving=drives,
+        )
+        return replace(now, room=next(iter(line["arguments"].values()))) if drives else now
+
+
+def _moment(line: Line, words: str) -> Moment:
+    event, clock = line["event"], line["clock"]
+    skill = line.get("skill", "")
+    if event == "skill" and skill in HEARD:
+        spoken = line["arguments"].get("message" if skill == "say" else "question", "")
+        options = line["arguments"].get("options")
+        offered = f" [{' | '.join(map(str, options))}]" if options else ""
+        return Moment(clock, HEARD[skill], shortened(f"{spoken}{offered}"))
+    if event == "result" and skill == "ask":
+        return Moment(clock, "hears", shortened(str(line["result"])))
+    return Moment(clock, event, words)
+
+
+def _plain(argument: object) -> object:
+    return tuple(argument) if isinstance(argument, list) else argument
+
+
+def line_of(program: str, skill: str, given: Sequence[object]) -> int | None:
+    """The line of the only call in a program that can be meant; None where several can, or none.
+
+    Args:
+        program: its source.
+        skill: which is called.
+        given: the arguments, in order.
+    """
+    lines = {line for line, fixed in _calls(program).get(skill, ()) if _fits(fixed, given)}
+    return lines.pop() if len(lines) == 1 else None
+
+
+UNKNOWN: Any = object()
+
+
+def _fits(fixed: Sequence[object], given: Sequence[object]) -> bool:
+    return all(one is UNKNOWN or one == other for one, other in zip(fixed, given, strict=False))
+
+
+@lru_cache(maxsize=16)
+def _calls(program: str) -> Mapping[str, Sequence[tuple[int, tuple[object, ...]]]]:
+    """For each skill the calls with what their arguments surely are."""
+    tree = parsed(program)
+    if not isinstance(tree, ast.Module):
+        return {}
+    found: dict[str, list[tuple[int, tuple[object, ...]]]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in SKILLS:
+            found.setdefault(node.func.id, []).append((node.lineno, tuple(_values(node))))
+    return found
+
+
+def _values(call: ast.Call) -> Iterator[object]:
+    for argument in call.args:
+        if isinstance(argument, ast.Starred):
+            return
+        yield argument.value if isinstance(argument, ast.Constant) else UNKNOWN

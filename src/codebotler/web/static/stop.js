@@ -1,0 +1,56 @@
+// STOP: needs nothing of the rest of the page, and works before that is there.
+(() => {
+  const button = document.getElementById("stop");
+  const told = document.getElementById("stop-told");
+  const LOST = "The tool cannot be reached. Use the robot's emergency stop.";
+  const ENDS = {
+    stopped: "The robot has stopped.",
+    done: "The mission had ended by itself.",
+    interrupted: "The mission was interrupted.",
+  };
+  let pressed = 0;
+
+  const say = (text, kind = "") => {
+    told.textContent = text;
+    told.className = kind;
+  };
+
+  const watch = async (which) => {
+    for (;;) {
+      const now = await (await fetch("/api/robot")).json();
+      if (which !== pressed) return;
+      if (now.is_over) {
+        const text = ENDS[now.state] ?? `The mission failed: ${now.reason}`;
+        say(text, now.state === "failed" ? "bad" : "good");
+        return;
+      }
+      await new Promise((later) => setTimeout(later, 100));
+    }
+  };
+
+  const stop = async (onlyMoving) => {
+    const which = ++pressed;
+    if (!onlyMoving) say("Telling the robot to stop …", "busy");
+    try {
+      const answer = await fetch(`/api/stop?only_moving=${onlyMoving}`, { method: "POST" });
+      if (!answer.ok) throw new Error(answer.status);
+      const { stopping } = await answer.json();
+      if (stopping) {
+        say("Told to stop; it has not stopped yet.", "busy");
+        await watch(which);
+      } else if (!onlyMoving) {
+        say("Nothing is running.");
+      }
+    } catch {
+      say(LOST, "bad");
+    }
+    setTimeout(() => which === pressed && !told.classList.contains("bad") && say(""), 8000);
+  };
+
+  button.addEventListener("click", () => stop(false));
+  window.addEventListener(
+    "keydown",
+    (event) => event.key === "Escape" && !event.isComposing && !event.repeat && stop(true),
+    true,
+  );
+})();

@@ -1,0 +1,117 @@
+"""The third pane: what the robot does, where it is, and what it said and was told."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from codebotler.mission import State
+from codebotler.web.desk import Desk
+from codebotler.web.floorplan import floorplan
+from codebotler.web.progress import Moment
+from codebotler.web.turn import View
+from codebotler.web.words import Press, Words
+from codebotler.world import Room, World, laid_out
+
+HEADLINES = {
+    None: "Nothing is asked for",
+    State.DRAFTING: "The program is being written",
+    State.CHECKED: "Waits for your word",
+    State.APPROVED: "About to start",
+    State.RUNNING: "Running",
+    State.DONE: "Done",
+    State.FAILED: "Failed",
+    State.STOPPING: "Told to stop; has not stopped yet",
+    State.STOPPED: "Stopped",
+    State.INTERRUPTED: "Interrupted",
+}
+SPOKEN = {"says": "said", "asks": "asked", "hears": "was told"}
+MOST_MOMENTS = 60
+
+
+class Status:
+    """Shows how far the mission at hand has come.
+
+    Args:
+        desk: whose mission.
+    """
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        self._drawn: tuple[Moment, ...] = ()
+        self._mapped: object = None
+        with ui.element("section").classes("pane status").props("aria-labelledby=h-status"):
+            with ui.element("div").classes("head"):
+                Words("h2", "Status").props("id=h-status")
+                Words("span", desk.robot.name, "robot-name")
+            self._gone = ui.element("div").classes("interrupted")
+            self._state = Words("p", "", "headline").props("role=status aria-live=polite")
+            self._doing = Words("p", "", "doing")
+            self._where = Words("p", "", "quiet")
+            self._reason = Words("p", "", "reason")
+            self._map = ui.html("", sanitize=False).classes("map")
+            self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
+        self._tell_interrupted()
+
+    def show(self, view: View) -> None:
+        """Show how far it has come."""
+        progress = view.progress
+        state = view.state
+        headline = HEADLINES[state]
+        if state is None and view.busy and not view.is_over:
+            headline = "About to begin"
+        self._state.say(headline)
+        self._state.classes(replace=f"headline {state or 'none'}")
+        self._doing.say(progress.doing.capitalize() if view.is_running else "")
+        where = [f"line {progress.line}"] if progress.line is not None else []
+        where += (
+            [f"{progress.clock:.1f} s by the robot's clock"] if progress.moments and progress.clock else []
+        )
+        self._where.say(" · ".join(where))
+        self._reason.say(view.reason)
+        self._draw_map(view)
+        self._draw_moments(progress.moments)
+
+    def _draw_map(self, view: View) -> None:
+        progress, plan = view.progress, view.plan
+        world = self._desk.world
+        if world is None and plan is not None:
+            world = World(tuple(map(Room, plan.rooms)), plan.start)
+        if world is None:
+            return
+        room = (plan.room(progress.room) if plan and progress.room else None) or world.robot
+        at = progress.at
+        if at is None:
+            at = next((one.stand_at for one in laid_out(world).rooms if one.name == room), None)
+        what = (id(self._desk.world), plan, at, room)
+        if what != self._mapped:
+            self._mapped = what
+            self._map.set_content(floorplan(world, at, room))
+
+    def _draw_moments(self, moments: tuple[Moment, ...]) -> None:
+        """Put what is new on top; all anew where it is another mission."""
+        if moments == self._drawn:
+            return
+        known = len(self._drawn)
+        if moments[:known] != self._drawn or known > MOST_MOMENTS:
+            self._log.clear()
+            known = max(0, len(moments) - MOST_MOMENTS)
+        self._drawn = moments
+        with self._log:
+            for moment in moments[known:]:
+                with ui.element("li").classes(f"moment moment-{moment.kind}") as row:
+                    Words("time", f"{moment.clock:.1f} s")
+                    if moment.kind in SPOKEN:
+                        Words("small", SPOKEN[moment.kind])
+                    Words("span", moment.text, "text")
+                row.move(target_index=0)
+
+    def _tell_interrupted(self) -> None:
+        self._gone.set_visibility(bool(self._desk.interrupted))
+        with self._gone:
+            for summary in self._desk.interrupted:
+                Words("p", f"Mission {summary.id} was interrupted: {summary.reason}")
+            Press("I have seen it", self._seen, "plain")
+
+    def _seen(self) -> None:
+        self._desk.interrupted = ()
+        self._gone.set_visibility(False)

@@ -1,0 +1,86 @@
+"""A real browser (the system's Chromium, by Playwright) in front of the page as a user starts it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
+
+from pageserver import PageServer
+from viewing import DESK, OpenPage
+
+QUIETLY = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-sync",
+    "--no-first-run",
+]
+SECONDS = 20.0
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    if path is None:
+        pytest.skip("there is no Chromium here: apt-get install chromium")
+    expect.set_options(timeout=SECONDS * 1000)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=QUIETLY)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    """A page with a simulated robot in a small house, where two seconds pass in one."""
+    with PageServer(tmp_path_factory.mktemp("page"), "--speed", "2") as server:
+        yield server
+
+
+@pytest.fixture
+def opened(browser: Browser) -> Iterator[OpenPage]:
+    """Opens pages in browsers of their own, and takes amiss whatever any of them complains about."""
+    complaints: list[str] = []
+
+    def heard(message: ConsoleMessage) -> None:
+        if message.type in {"error", "warning"}:
+            complaints.append(f"{message.text} at {message.location}")
+
+    with ExitStack() as contexts:
+
+        def open_page(
+            server: PageServer,
+            path: str = "",
+            *,
+            size: tuple[int, int] = DESK,
+            dark: bool = False,
+            beside: Page | None = None,
+        ) -> Page:
+            if beside is None:
+                context = browser.new_context(
+                    viewport={"width": size[0], "height": size[1]}, color_scheme="dark" if dark else "light"
+                )
+                contexts.callback(context.close)
+            else:
+                context = beside.context
+            context.set_default_timeout(SECONDS * 1000)
+            page = context.new_page()
+            page.on("console", heard)
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+            page.goto(server.link.replace("/?", f"/{path}?"))
+            return page
+
+        yield open_page
+    assert complaints == []
+
+
+@pytest.fixture
+def shots(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """The folder for screenshots: that of --shots, if it is given."""
+    folder = request.config.getoption("--shots") or tmp_path
+    return Path(folder)

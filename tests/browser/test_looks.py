@@ -1,0 +1,85 @@
+"""Every page at every size, light and dark: nobody is shut out, and there are pictures for the guide."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TypeAlias
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, expect
+
+from pageserver import PageServer
+from viewing import DESK, PHONE, TABLET, OpenPage
+
+OFFICE = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
+PROBLEMS = """def task_program():
+    for room in ["printer room 1", "printer room 2"]:
+        go_to(room)
+        if not is_in_room("stapler"):
+            say("There is no stapler in " + room)
+    go_to("alice office")
+    answer = ask("alice", "Shall I order one?", ["Yes", "No"])
+    say("You said " + answer)
+"""
+GRAVE = {"serious", "critical"}
+Screen: TypeAlias = tuple[str, tuple[int, int], bool]
+SCREENS: list[Screen] = [
+    (f"{name}-{'dark' if dark else 'light'}", size, dark)
+    for name, size in (("desk", DESK), ("tablet", TABLET), ("phone", PHONE))
+    for dark in (False, True)
+]
+
+
+@pytest.fixture(scope="module")
+def office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    with PageServer(tmp_path_factory.mktemp("office"), "--speed", "10", world=OFFICE) as server:
+        yield server
+
+
+def expect_no_grave_fault(page: Page) -> None:
+    found = Axe().run(page).response["violations"]
+    grave = [fault for fault in found if fault["impact"] in GRAVE]
+    assert [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in grave] == []
+
+
+@pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
+def test_pages(
+    office: PageServer,
+    opened: OpenPage,
+    shots: Path,
+    screen: Screen,
+) -> None:
+    which, size, dark = screen
+    page = opened(office, size=size, dark=dark)
+
+    def look(name: str) -> None:
+        page.evaluate("scrollTo(0, 0)")
+        page.wait_for_timeout(400)
+        page.screenshot(path=shots / f"{name}-{which}.png", full_page=True)
+        expect_no_grave_fault(page)
+
+    expect(page.locator(".picks .pick").first).to_be_visible()
+    look("empty")
+    page.locator(".picks .pick").first.click()
+    page.get_by_role("button", name="Write the program").click()
+    expect(page.get_by_role("button", name="Run it on the robot")).to_be_enabled()
+    look("checked")
+    page.get_by_role("button", name="Run it on the robot").click()
+    expect(page.locator(".moment").nth(3)).to_be_visible()
+    look("running")
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_have_text("The robot has stopped.")
+    look("stopped")
+    mission = office.call("POST", "/api/missions", {"program": PROBLEMS}).data["id"]
+    expect(page.locator(".problem-line")).to_be_visible()
+    look("problems")
+    office.call("POST", "/api/stop")
+    while not office.call("GET", "/api/robot").data["is_over"]:
+        time.sleep(0.02)
+    for name, path in (("missions", "missions"), ("mission", f"missions/{mission}"), ("api", "api")):
+        page.goto(f"http://localhost:{office.port}/{path}")
+        expect(page.locator("h1")).to_be_visible()
+        look(name)

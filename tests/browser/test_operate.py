@@ -1,0 +1,293 @@
+"""A person operates a robot from a browser, and never has to open a terminal."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import re
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, Route, expect
+
+from pageserver import PageServer
+from server import Fault, Server
+from viewing import PHONE, TABLET, OpenPage
+
+TEA = """def task_program():
+    go_to("study")
+    answer = ask("ann", "Would you like tea?", ["Yes", "No"])
+    if answer == "Yes":
+        go_to("kitchen")
+        say("Tea for ann, please")
+"""
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
+BAD = "def task_program():\n    go_to('hall')\n    go_to('cellar')\n"
+NUMBERS = itertools.count(1)
+
+
+def write(page: Page, program: str) -> None:
+    """Type a program in the place of what is there."""
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(program)
+
+
+def checked(page: Page, program: str) -> None:
+    """Type a program that no test before has typed."""
+    mark = f"# {next(NUMBERS)}"
+    write(page, f"{program}{mark}\n")
+    expect(page.locator(".cm-content")).to_contain_text(mark)
+    expect(page.get_by_text("checking")).to_be_hidden()
+    expect(page.get_by_text("The check found no problem.")).to_be_visible()
+
+
+def run(page: Page, program: str) -> None:
+    checked(page, program)
+    page.get_by_role("button", name="Run it on the robot").click()
+    expect(page.locator(".headline")).to_have_text("Running")
+
+
+def text_of(page: Page) -> str:
+    """What the editor shows."""
+    return "\n".join(page.locator(".cm-line").all_inner_texts())
+
+
+@pytest.fixture(autouse=True)
+def at_rest(server: PageServer) -> None:
+    """Every test begins with a robot that does nothing."""
+    server.call("POST", "/api/stop")
+    while not server.call("GET", "/api/robot").data["is_over"]:
+        time.sleep(0.02)
+
+
+def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> None:
+    world = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
+    with PageServer(tmp_path, "--speed", "40", world=world) as server:
+        page = opened(server)
+        page.locator(".picks .pick").first.click()
+        page.get_by_role("button", name="Write the program").click()
+        expect(page.get_by_text("Recorded: people wrote this.")).to_be_visible()
+        expect(page.get_by_text("The check found no problem.")).to_be_visible()
+        assert page.locator(".strip .scene").count() > 3
+        assert "def task_program" in text_of(page)
+        assert page.locator(".cm-content .skill").count() > 2
+        expect(page.locator(".headline")).to_have_text("Waits for your word")
+        page.get_by_role("button", name="Run it on the robot").click()
+        expect(page.locator(".headline")).to_have_text("Done")
+        assert page.locator(".moment").count() > 5
+        page.context.close()
+
+
+def test_a_program_is_seen_while_it_is_written(tmp_path: Path, opened: OpenPage) -> None:
+    with (
+        Server(fault=lambda _: Fault.DRIP) as model,
+        PageServer(tmp_path, "--model", "completions:slow", "--base-url", model.url) as server,
+    ):
+        page = opened(server)
+        page.locator("textarea").fill("Say hello")
+        page.locator("textarea").press("Control+Enter")
+        expect(page.get_by_role("button", name="Writing …")).to_be_disabled()
+        expect(page.locator(".cm-line").first).not_to_be_empty()
+        before = len(text_of(page))
+        page.wait_for_function(f"document.querySelector('.cm-content').innerText.length > {before}")
+        other = opened(server)
+        expect(other.locator(".cm-line").first).not_to_be_empty()
+        other.locator("#stop").click()
+        expect(page.locator(".headline")).to_have_text("Stopped")
+        expect(page.get_by_role("button", name="Write the program")).to_be_enabled()
+        page.context.close()
+        other.context.close()
+
+
+def test_what_is_said_and_asked_and_told_is_shown(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    run(page, TEA)
+    expect(page.locator(".doing")).to_have_text(re.compile("Drives to"))
+    expect(page.get_by_text("line 2", exact=False)).to_be_visible()
+    expect(page.locator(".headline")).to_have_text("Done")
+    expect(page.locator(".moment-asks")).to_contain_text("Would you like tea?")
+    expect(page.locator(".moment-hears .text")).to_have_text("Yes")
+    expect(page.locator(".moment-says .text")).to_have_text("Tea for ann, please")
+    expect(page.locator(".floorplan .here")).to_have_count(1)
+
+
+def test_every_tab_and_every_reload_shows_the_same(server: PageServer, opened: OpenPage) -> None:
+    first = opened(server)
+    checked(first, TEA)
+    second, elsewhere = opened(server, beside=first), opened(server, size=PHONE)
+    for page in (second, elsewhere):
+        expect(page.get_by_text("The check found no problem.")).to_be_visible()
+        assert TEA in text_of(page)
+    write(elsewhere, FAR)
+    for page in (first, second):
+        expect(page.locator(".cm-content")).to_contain_text("range(50)")
+    first.reload()
+    expect(first.locator(".cm-content")).to_contain_text("range(50)")
+    expect(first.get_by_role("button", name="Run it on the robot")).to_be_enabled()
+    first.get_by_role("button", name="Run it on the robot").click()
+    for page in (first, second, elsewhere):
+        expect(page.locator(".headline")).to_have_text("Running")
+
+
+def test_an_edit_is_checked_within_a_second_and_problems_stand_at_their_lines(
+    server: PageServer, opened: OpenPage
+) -> None:
+    page = opened(server)
+    checked(page, TEA)
+    write(page, BAD)
+    began = time.monotonic()
+    page.wait_for_selector(".cm-line.problem-line")
+    assert time.monotonic() - began < 1.0
+    expect(page.locator(".cm-line.problem-line")).to_contain_text('there is no room "cellar"')
+    assert page.locator(".cm-line.problem-line").evaluate("e => [...e.parentNode.children].indexOf(e)") == 2
+    button = page.get_by_role("button", name="Run it on the robot")
+    expect(button).to_be_disabled()
+    page.get_by_text("Run it despite the problems").click()
+    expect(button).to_be_enabled()
+    write(page, BAD.replace("cellar", "kitchen"))
+    expect(page.get_by_text("The check found no problem.")).to_be_visible()
+    expect(page.locator(".problem-line")).to_have_count(0)
+
+
+def test_a_despite_is_for_one_program_only(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    write(page, BAD)
+    page.get_by_text("Run it despite the problems").click()
+    write(page, BAD.replace("cellar", "attic"))
+    expect(page.locator(".problem-line")).to_contain_text("attic")
+    expect(page.get_by_role("button", name="Run it on the robot")).to_be_disabled()
+
+
+@pytest.mark.parametrize("how", ["click", "Escape"])
+def test_stop_ends_what_the_robot_does(server: PageServer, opened: OpenPage, how: str) -> None:
+    page = opened(server)
+    run(page, FAR)
+    if how == "click":
+        page.locator("#stop").click()
+    else:
+        page.keyboard.press("Escape")
+    expect(page.locator("#stop-told")).to_have_text("The robot has stopped.")
+    expect(page.locator(".headline")).to_have_text("Stopped")
+    assert server.call("GET", "/api/robot").data["state"] == "stopped"
+
+
+def test_escape_leaves_a_program_alone_that_waits(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    checked(page, TEA)
+    page.keyboard.press("Escape")
+    page.wait_for_timeout(500)
+    expect(page.locator(".headline")).to_have_text("Waits for your word")
+
+
+def test_stop_needs_nothing_of_the_rest_of_the_page(server: PageServer, opened: OpenPage) -> None:
+    """The page was just reloaded, and none of NiceGUI's scripts has come yet."""
+    page = opened(server)
+    run(page, FAR)
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:  # Playwright wants a function of Python's own
+        held.append(route)
+
+    page.context.route("**/_nicegui/**/*.js", hold)
+    page.reload(wait_until="commit")
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_have_text("The robot has stopped.")
+    assert held
+    assert page.locator(".headline").count() == 0
+
+
+def test_a_stop_is_not_said_to_have_worked_before_it_has(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    run(page, FAR)
+    answer = {"state": "stopping", "reason": "", "is_over": False}
+    page.route("**/api/robot", lambda route: route.fulfill(body=json.dumps(answer)))
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_have_text("Told to stop; it has not stopped yet.")
+    page.wait_for_timeout(500)
+    expect(page.locator("#stop-told")).to_have_text("Told to stop; it has not stopped yet.")
+
+
+def test_a_tool_that_cannot_be_reached_is_said(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    page.route("**/api/stop*", lambda route: route.fulfill(body="lost"))
+    page.locator("#stop").click()
+    expect(page.locator("#stop-told")).to_contain_text("emergency stop")
+
+
+@pytest.mark.parametrize("size", [(1440, 900), TABLET, PHONE])
+def test_stop_is_always_in_the_same_place_and_nothing_is_wider_than_the_screen(
+    server: PageServer, opened: OpenPage, size: tuple[int, int]
+) -> None:
+    places = set()
+    page = opened(server, size=size)
+    checked(page, TEA + "    # " + "a long line " * 30 + "\n")
+    for path in ("/", "/missions", "/missions/" + server.call("GET", "/api/robot").data["mission"]):
+        page.goto(f"http://localhost:{server.port}{path}")
+        expect(page.locator("h1, h2").first).to_be_visible()
+        page.mouse.wheel(0, 3000)
+        page.wait_for_timeout(200)
+        box = page.locator("#stop").bounding_box()
+        assert box is not None
+        places.add((box["x"], box["y"]))
+        assert box["x"] + box["width"] <= size[0]
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0], path
+    assert len(places) == 1
+
+
+def test_a_robot_keeps_its_mission_when_the_page_closes(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    run(page, FAR)
+    page.context.close()
+    time.sleep(1)
+    assert server.call("GET", "/api/robot").data["state"] == "running"
+
+
+def test_twenty_tabs_stay_in_step(server: PageServer, opened: OpenPage) -> None:
+    first = opened(server)
+    pages = [first, *(opened(server, beside=first) for _ in range(19))]
+    run(first, FAR)
+    for page in pages:
+        expect(page.locator(".headline")).to_have_text("Running")
+    pages[7].keyboard.press("Escape")
+    began = time.monotonic()
+    for page in pages:
+        expect(page.locator(".headline")).to_have_text("Stopped")
+    assert time.monotonic() - began < 5
+
+
+def test_past_missions_are_told_and_downloaded(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    run(page, TEA)
+    expect(page.locator(".headline")).to_have_text("Done")
+    page.get_by_role("link", name="Missions").click()
+    expect(page.locator(".rows .state-done").first).to_be_visible()
+    page.locator(".rows a").first.click()
+    expect(page.locator(".timeline")).to_contain_text("Would you like tea?")
+    expect(page.locator(".source")).to_contain_text("task_program")
+    for link, begins in (("Events", b'{"time"'), ("MCAP", b"\x89MCAP")):
+        with page.expect_download() as download:
+            page.get_by_role("link", name=link).click()
+        assert Path(download.value.path()).read_bytes().startswith(begins)
+
+
+def test_what_became_of_a_mission_is_said_after_the_tool_died(tmp_path: Path, opened: OpenPage) -> None:
+    with PageServer(tmp_path) as server:
+        page = opened(server)
+        run(page, FAR)
+        expect(page.locator(".doing")).to_have_text(re.compile("Drives to"))
+        page.context.close()
+        server.end(signal.SIGKILL)
+    with PageServer(tmp_path) as server:
+        page = opened(server)
+        expect(page.locator(".interrupted").first).to_contain_text("the tool died during go_to")
+        page.get_by_role("button", name="I have seen it").click()
+        expect(page.locator(".interrupted").first).to_be_hidden()
+        page.context.close()
+
+
+def test_without_the_token_there_is_a_sentence(server: PageServer) -> None:
+    answer = server.ask("GET", "/", accept="text/html")
+    assert "open the link that codebotler serve printed" in answer.text

@@ -1,0 +1,117 @@
+"""The page as a user starts it: a process of its own, on a free port."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+WORLD = """about: a small house
+robot: hall
+rooms: [hall, kitchen, study]
+objects: {kitchen: [mug]}
+people: {study: [{name: ann, answers: ["yes"]}]}
+"""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a server answered.
+
+    Args:
+        status: of HTTP.
+        headers: by lower-case name.
+        text: its body.
+    """
+
+    status: int
+    headers: dict[str, str]
+    text: str
+
+    @property
+    def data(self) -> Any:  # noqa: ANN401 - JSON has no types
+        return json.loads(self.text)
+
+
+class PageServer:
+    """`codebotler serve` in a folder; as a context manager it ends with it.
+
+    Args:
+        folder: where the world file and the missions lie.
+        arguments: further ones.
+    """
+
+    def __init__(self, folder: Path, *arguments: str, world: str = WORLD) -> None:
+        self.home = folder / "home"
+        (folder / "world.yaml").write_text(world)
+        command = [sys.executable, "-m", "codebotler.cli", "serve", "--port", "0", "--world", "world.yaml"]
+        self._said = folder / "said.txt"
+        with self._said.open("w") as file:
+            self._process = subprocess.Popen(
+                [*command, *arguments],
+                cwd=folder,
+                stderr=file,
+                env={**os.environ, "CODEBOTLER_HOME": str(self.home), "NO_PROXY": "*"},
+            )
+        while (link := re.search(r"http://\S+:(\d+)/(?:\?token=(\S+))?\n", self.said)) is None:
+            assert self._process.poll() is None, self.said
+            time.sleep(0.02)
+        self.link, self.port, self.token = link[0].strip(), int(link[1]), link[2] or ""
+
+    @property
+    def said(self) -> str:
+        """What it has told whoever started it."""
+        return self._said.read_text()
+
+    @property
+    def pid(self) -> int:
+        """The number of its process."""
+        return self._process.pid
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.end()
+
+    def end(self, number: int = signal.SIGTERM) -> int:
+        """End it, and give its status."""
+        if self._process.poll() is None:
+            self._process.send_signal(number)
+        return self._process.wait(20)
+
+    def ask(self, method: str, path: str, body: object = None, **headers: str) -> Answer:
+        """Send a request as it stands; without a token, unless a header has one."""
+        given = {name.replace("_", "-"): value for name, value in headers.items()}
+        text = body if isinstance(body, bytes | str) else None if body is None else json.dumps(body)
+        if text is not None:
+            given.setdefault("content-type", "application/json")
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=20)
+        try:
+            connection.request(method, path, text, given)
+            answer = connection.getresponse()
+            found = {name.lower(): value for name, value in answer.getheaders()}
+            return Answer(answer.status, found, answer.read().decode())
+        finally:
+            connection.close()
+
+    def call(self, method: str, path: str, body: object = None) -> Answer:
+        """Send a request as the API's clients do, with the token."""
+        return self.ask(method, path, body, authorization=f"Bearer {self.token}")
+
+    @property
+    def cookie(self) -> str:
+        """What a browser sends that has opened the link."""
+        answer = self.ask("GET", f"/?token={self.token}")
+        return answer.headers["set-cookie"].partition(";")[0]

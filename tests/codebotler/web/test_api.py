@@ -1,0 +1,171 @@
+"""The API: everything the page does, by a client that has the token."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.archive import missions
+from pageserver import PageServer
+
+HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+BAD = "def task_program():\n    go_to('cellar')\n"
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    with PageServer(tmp_path_factory.mktemp("api"), "--speed", "1") as server:
+        yield server
+
+
+def until(server: PageServer, holds: Callable[[dict[str, Any]], bool], seconds: float = 15.0) -> Any:  # noqa: ANN401 - JSON
+    ends = time.monotonic() + seconds
+    while not holds(now := server.call("GET", "/api/missions/current").data):
+        assert time.monotonic() < ends, now
+        time.sleep(0.02)
+    return now
+
+
+def begun(server: PageServer, program: str) -> Any:  # noqa: ANN401 - JSON
+    answer = server.call("POST", "/api/missions", {"program": program})
+    assert answer.status == 201, answer.text
+    return until(server, lambda now: now["check"] is not None)
+
+
+def stream(server: PageServer, mission: str, last: int = 0) -> list[tuple[int, dict[str, Any]]]:
+    """All events of a mission with their numbers, as a browser's EventSource would have them."""
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=30)
+    headers = {"Authorization": f"Bearer {server.token}", "Last-Event-ID": str(last)}
+    connection.request("GET", f"/api/missions/{mission}/events", headers=headers)
+    answer = connection.getresponse()
+    assert answer.headers["content-type"].startswith("text/event-stream")
+    found, number = [], 0
+    for line in answer:
+        name, _, value = line.decode().rstrip("\n").partition(": ")
+        if name == "id":
+            number = int(value)
+        elif name == "data":
+            found.append((number, json.loads(value)))
+    connection.close()
+    return found
+
+
+def test_a_mission_from_its_program_to_its_files(server: PageServer) -> None:
+    view = begun(server, HELLO)
+    approval = {"program": view["digest"]}
+    assert server.call("POST", f"/api/missions/{view['id']}/approve", approval).status == 200
+    events = stream(server, view["id"])
+    assert [number for number, _ in events] == list(range(1, len(events) + 1))
+    assert events[-1][1]["state"] == "done"
+    assert stream(server, "current", last=len(events) - 1) == events[-1:]
+    jsonl = server.call("GET", f"/api/missions/{view['id']}/events.jsonl")
+    assert [json.loads(line) for line in jsonl.text.splitlines()] == [event for _, event in events]
+    assert f'filename="{view["id"]}.jsonl"' in jsonl.headers["content-disposition"]
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    token = {"Authorization": f"Bearer {server.token}"}
+    connection.request("GET", f"/api/missions/{view['id']}/events.mcap", headers=token)
+    assert connection.getresponse().read(5) == b"\x89MCAP"
+    connection.close()
+    assert server.call("GET", "/api/missions").data[-1]["state"] == "done"
+    assert server.call("GET", f"/api/missions/{view['id']}").data["state"] == "done"
+
+
+def test_problems_need_a_word_and_the_program_that_was_seen(server: PageServer) -> None:
+    view = begun(server, BAD)
+    path = f"/api/missions/{view['id']}/approve"
+    refused = server.call("POST", path, {"program": view["digest"]})
+    assert (refused.status, "has problems" in refused.data["detail"]) == (409, True)
+    other = server.call("POST", path, {"program": "0" * 16, "despite_problems": True})
+    assert (other.status, "was changed since" in other.data["detail"]) == (409, True)
+    assert server.call("PUT", f"/api/missions/{view['id']}/program", {"program": HELLO}).status == 200
+    mended = until(server, lambda now: now["check"] is not None)
+    assert (mended["problems"], mended["program"]) == ([], HELLO)
+
+
+def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:
+    view = begun(server, FAR)
+    server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
+    until(server, lambda now: now["doing"] != "")
+    assert server.call("POST", "/api/missions", {"program": HELLO}).status == 409
+    began = time.monotonic()
+    assert server.call("POST", f"/api/missions/{view['id']}/stop").status == 202
+    assert until(server, lambda now: now["is_over"])["state"] == "stopped"
+    assert time.monotonic() - began < 2
+    assert server.call("POST", "/api/stop").data == {"stopping": False}
+
+
+def test_a_key_stops_only_a_robot_that_runs(server: PageServer) -> None:
+    begun(server, HELLO)
+    assert server.call("POST", "/api/stop?only_moving=true").data == {"stopping": False}
+    assert server.call("GET", "/api/robot").data["state"] == "checked"
+    assert server.call("POST", "/api/stop").data == {"stopping": True}
+
+
+def test_a_check_alone_begins_nothing(server: PageServer) -> None:
+    before = len(missions(server.home))
+    found = server.call("POST", "/api/check", {"program": "def task_program():\n    fly()\n"}).data
+    assert (found["accepted"], found["problems"][0]["line"]) == (False, 2)
+    assert len(missions(server.home)) == before
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body", "status"),
+    [
+        ("GET", "/api/missions/20200101-000000", None, 404),
+        ("GET", "/api/missions/..%2f..%2fetc/events.jsonl", None, 404),
+        ("POST", "/api/missions/20200101-000000/stop", None, 409),
+        ("POST", "/api/missions", {}, 409),
+        ("POST", "/api/missions", {"program": HELLO, "more": 1}, 422),
+        ("POST", "/api/missions", b"{", 422),
+        ("POST", "/api/missions", {"instruction": "fly", "model": "recorded:nobody"}, 201),
+    ],
+)
+def test_what_is_asked_wrongly_is_said(
+    server: PageServer, method: str, path: str, body: object, status: int
+) -> None:
+    answer = server.call(method, path, body)
+    assert answer.status == status, answer.text
+    if status == 201:
+        assert "no recorded model" in until(server, lambda now: now["is_over"])["trouble"]
+
+
+def test_the_api_is_described(server: PageServer) -> None:
+    described = server.call("GET", "/api/openapi.json").data["paths"]
+    assert {"/api/missions", "/api/missions/{mission}/stop", "/api/check"} <= described.keys()
+    page = server.call("GET", "/api").text
+    assert all(path in page for path in described)
+
+
+def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(tmp_path: Path) -> None:
+    with PageServer(tmp_path) as server:
+        view = begun(server, FAR)
+        server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
+        until(server, lambda now: now["doing"] != "")
+        server.end(signal.SIGINT)
+    (stopped,) = missions(tmp_path / "home")
+    assert (stopped.state, stopped.reason) == ("stopped", "stopped by the end of the page")
+    with PageServer(tmp_path) as server:
+        view = begun(server, FAR)
+        server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
+        until(server, lambda now: now["doing"] != "")
+        server.end(signal.SIGKILL)
+    with PageServer(tmp_path) as server:
+        assert "was interrupted: the tool died during go_to" in server.said
+        assert missions(tmp_path / "home")[-1].state == "interrupted"
+
+
+def test_nothing_of_the_page_is_loaded_for_other_commands() -> None:
+    loaded = "print('nicegui' in sys.modules, 'fastapi' in sys.modules)"
+    code = f"import sys, codebotler.cli, codebotler.running; {loaded}"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout.split() == ["False", "False"]

@@ -1,0 +1,277 @@
+"""The desk: the same rules as on the command line, for any number of viewers, and never waiting for one."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from codebotler.archive import missions, summary_of
+from codebotler.mission import Mission, MissionError, State
+from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.prompts import Prompt
+from codebotler.robots.base import Result, Robot
+from codebotler.robots.simulated import Simulated
+from codebotler.web.desk import MOST_PROGRAM, Desk
+from codebotler.web.turn import Order, View, digest
+from codebotler.world import Room, World
+from doubles import Answering
+
+HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
+BAD = "def task_program():\n    go_to('cellar')\n"
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('hall')\n"
+WORLD = World((Room("hall"), Room("kitchen")), "hall")
+
+
+class Author:
+    """A model that says what a test wants, piece by piece, and then waits to be let go on."""
+
+    name = "author"
+
+    def __init__(self, *programs: str, waits: bool = False) -> None:
+        self.programs, self.waits = list(programs), waits
+        self.asked: list[Prompt] = []
+        self.is_closed = False
+
+    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:  # noqa: ARG002 - as models have it
+        self.asked.append(prompt)
+        if not self.programs:
+            raise ModelError("the model is not there", may_pass=False)
+        program = self.programs.pop(0)
+        heard(program[:10])
+        if self.waits:
+            await asyncio.sleep(60)
+        heard(program[10:])
+        return Reply(program, program, Usage(), 0.0, "stop")
+
+    async def close(self) -> None:
+        self.is_closed = True
+
+
+def desk_of(home: Path, robot: Robot | None = None, author: Author | None = None) -> Desk:
+    def model(_name: str) -> Model:
+        assert author is not None
+        return author
+
+    return Desk(robot or Simulated(WORLD, speed=None), home, model, models=("author",), world=WORLD)
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    with desk_of(tmp_path) as desk:
+        yield desk
+
+
+def until(desk: Desk, holds: Callable[[View], bool], seconds: float = 10.0) -> View:
+    """The first view of which something holds."""
+    ends = time.monotonic() + seconds
+    while not holds(desk.view):
+        assert time.monotonic() < ends, desk.view
+        time.sleep(0.005)
+    return desk.view
+
+
+def checked(desk: Desk, program: str = HELLO) -> View:
+    desk.begin(Order(program=program))
+    return until(desk, lambda view: view.found is not None)
+
+
+def approved(desk: Desk, program: str = HELLO) -> None:
+    view = checked(desk, program)
+    turn = desk.turn
+    assert turn is not None
+    turn.approve(view.digest)
+
+
+def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
+    author = Author(HELLO)
+    with desk_of(tmp_path, author=author) as desk:
+        turn = desk.begin(Order("say hello in the kitchen", "author"))
+        view = until(desk, lambda view: view.may_be_approved)
+        assert (view.program, view.problems, view.state) == (HELLO, (), State.CHECKED)
+        assert "kitchen" in author.asked[0].messages[-1].text
+        assert author.is_closed
+        turn.approve(view.digest)
+        view = until(desk, lambda view: view.is_over)
+        assert view.state is State.DONE
+        assert [m.text for m in view.progress.moments if m.kind == "says"] == ["hello"]
+        assert [line["event"] for line in desk.events()][-1] == "state"
+    (summary,) = missions(tmp_path)
+    assert (summary.state, summary.model, summary.instruction) == (
+        "done",
+        "author",
+        "say hello in the kitchen",
+    )
+
+
+def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Path) -> None:
+    author = Author(HELLO, waits=True)
+    with desk_of(tmp_path, author=author) as desk:
+        turn = desk.begin(Order("say hello", "author"))
+        view = until(desk, lambda view: bool(view.program))
+        assert (view.program, view.is_written, view.may_be_edited) == (HELLO[:10], True, False)
+        desk.stop("a test")
+        turn.join(5)
+        assert desk.view.is_over
+        assert (desk.view.state, author.is_closed) == (State.STOPPED, True)
+
+
+def test_problems_need_a_word_about_them(desk: Desk) -> None:
+    view = checked(desk, BAD)
+    turn = desk.turn
+    assert turn is not None
+    assert 'there is no room "cellar"' in view.problems[0]
+    with pytest.raises(MissionError, match="has problems"):
+        turn.approve(view.digest)
+    assert desk.view.state is State.CHECKED
+    turn.approve(view.digest, despite_problems=True)
+    assert until(desk, lambda view: view.is_over).state is State.FAILED
+
+
+def test_only_the_program_that_was_seen_can_be_approved(desk: Desk) -> None:
+    seen = checked(desk)
+    desk.edit(HELLO.replace("hello", "bye"))
+    turn = desk.turn
+    assert turn is not None
+    with pytest.raises(MissionError, match=r"was changed since|not checked yet"):
+        turn.approve(seen.digest)
+    until(desk, lambda view: view.found is not None)
+    with pytest.raises(MissionError, match="was changed since"):
+        turn.approve(seen.digest)
+    assert desk.view.state is State.CHECKED
+
+
+def test_an_edited_program_is_checked_again_and_the_last_one_counts(desk: Desk) -> None:
+    checked(desk)
+    for number in range(5):
+        desk.edit(HELLO + f"    say('{number}')\n")
+    view = until(desk, lambda view: view.found is not None)
+    assert view.program.endswith("say('4')\n")
+    assert not view.busy
+    assert summary_of(desk.home / "missions" / view.id).program == view.program
+
+
+def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path) -> None:
+    author = Author(BAD, HELLO)
+    with desk_of(tmp_path, author=author) as desk:
+        turn = desk.begin(Order("say hello", "author"))
+        until(desk, lambda view: view.may_be_approved)
+        turn.ask_again(repair=True)
+        view = until(desk, lambda view: view.may_be_approved and view.program == HELLO)
+        assert view.problems == ()
+        assert "cellar" in author.asked[1].messages[-1].text
+
+
+def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
+    with desk_of(tmp_path, Simulated(WORLD)) as desk:
+        approved(desk, FAR)
+        view = until(desk, lambda view: bool(view.progress.skill))
+        assert (view.progress.doing, view.progress.line) == ('drives to "kitchen"', 3)
+        with pytest.raises(MissionError, match="stop it first"):
+            desk.begin(Order(program=HELLO))
+        with pytest.raises(MissionError, match="cannot be changed"):
+            desk.edit(HELLO)
+        assert desk.stop("a test")
+        assert until(desk, lambda view: view.is_over).state is State.STOPPED
+        assert not desk.stop("a test")
+
+
+def test_another_instruction_takes_the_place_of_one_that_waits(desk: Desk) -> None:
+    first = checked(desk)
+    desk.begin(Order(program=BAD))
+    until(desk, lambda view: view.found is not None and view.number > first.number)
+    assert [summary.state for summary in missions(desk.home)] == ["stopped", "checked"]
+
+
+def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
+    robot = Simulated(WORLD)
+    with desk_of(tmp_path, robot) as desk:
+        approved(desk, FAR)
+        until(desk, lambda view: bool(view.progress.skill))
+    assert missions(tmp_path)[0].state == "stopped"
+
+
+def test_a_stop_waits_for_no_check(tmp_path: Path) -> None:
+    slow = "def task_program():\n    go_to('kitchen')\n    while True:\n        pass\n"
+    with desk_of(tmp_path) as desk:
+        desk.begin(Order(program=slow))
+        until(desk, lambda view: view.busy == "checking" and bool(view.id))
+        began = time.monotonic()
+        desk.stop("a test")
+        assert desk.view.state is State.STOPPED
+        assert time.monotonic() - began < 0.5
+
+
+def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
+    mission = Mission(tmp_path, "simulated")
+    mission.draft(HELLO)
+    mission._log.close()
+    with desk_of(tmp_path) as desk:
+        assert [summary.id for summary in desk.interrupted] == [mission.id]
+        assert "the tool died" in desk.interrupted[0].reason
+
+
+def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author()) as desk:
+        desk.begin(Order("say hello", "author"))
+        view = until(desk, lambda view: view.is_over)
+        assert (view.trouble, view.state) == ("the model is not there", State.FAILED)
+
+
+@pytest.mark.parametrize(
+    ("order", "told"),
+    [
+        (Order("   ", "author"), "nothing is asked for"),
+        (Order("say hello"), "nothing is asked for"),
+        (Order(program="#" * (MOST_PROGRAM + 1)), "too many"),
+    ],
+)
+def test_what_cannot_be_begun_is_refused(desk: Desk, order: Order, told: str) -> None:
+    with pytest.raises(MissionError, match=told):
+        desk.begin(order)
+    assert missions(desk.home) == []
+
+
+def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> None:
+    with desk_of(tmp_path) as one, desk_of(tmp_path) as other:
+        checked(one)
+        other.begin(Order(program=HELLO))
+        view = until(other, lambda view: view.is_over)
+        assert "uses the robot simulated" in view.trouble
+        assert view.id == ""
+
+
+def test_viewers_are_woken_at_each_change(desk: Desk) -> None:
+    async def watch() -> bool:
+        turn = desk.begin(Order(program=HELLO))
+        return await desk.board.until(lambda: turn.view.found is not None, 10.0)
+
+    assert asyncio.run(watch())
+    assert not asyncio.run(desk.board.until(lambda: False, 0.01))
+
+
+def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
+    """What a viewer does not read does not pile up anywhere: a view is all there is."""
+    go_on = threading.Event()
+
+    def answer(_skill: str, _first: str) -> Result:
+        go_on.wait(5)
+        return None
+
+    robot = Answering(answer)
+    with desk_of(tmp_path, robot) as desk:
+        go_on.set()
+        approved(desk, "def task_program():\n    for n in range(300):\n        say(str(n))\n")
+        view = until(desk, lambda view: view.is_over)
+        assert view.state is State.DONE
+        assert len(view.progress.moments) == 200
+        assert len(desk.events()) > 900
+
+
+def test_a_digest_tells_programs_apart() -> None:
+    assert digest(HELLO) != digest(BAD)
+    assert digest("\ud800")

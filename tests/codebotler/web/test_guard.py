@@ -1,0 +1,305 @@
+"""What keeps others from the robot: each line of it is tried from outside, on the port."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from starlette.types import Message, Receive, Scope, Send
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from codebotler.web.access import TRIES, WINDOW, Access, Role, TooManyTriesError
+from codebotler.web.guard import MOST_BYTES, Guard, Rules, _is_same
+from codebotler.web.place import Place
+from pageserver import PageServer
+
+SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    with PageServer(tmp_path_factory.mktemp("page")) as server:
+        yield server
+
+
+def socket(server: PageServer, **headers: str) -> int:
+    """The status with which a websocket is opened, as a browser opens one; 101 if it is."""
+    given = {name.replace("_", "-"): value for name, value in headers.items()}
+    try:
+        with connect(
+            f"ws://127.0.0.1:{server.port}{SOCKET}", additional_headers=given, proxy=None, open_timeout=5
+        ):
+            return 101
+    except InvalidStatus as error:
+        return error.response.status_code
+
+
+def origin(server: PageServer) -> str:
+    return f"http://127.0.0.1:{server.port}"
+
+
+# --- tokens
+
+
+def test_nothing_is_answered_without_the_token(server: PageServer) -> None:
+    for path in ("/", "/missions", "/api", "/api/robot", "/api/openapi.json", "/static/page.css", "/nothing"):
+        assert server.ask("GET", path).status == 401, path
+    for method, path in (("POST", "/api/missions"), ("POST", "/api/stop"), ("POST", "/api/check")):
+        assert server.ask(method, path, {}).status == 401, path
+    assert socket(server, origin=origin(server)) == 403
+
+
+def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -> None:
+    answer = server.ask("GET", f"/missions?a=b&token={server.token}")
+    assert (answer.status, answer.headers["location"]) == (303, "/missions?a=b")
+    cookie = answer.headers["set-cookie"]
+    assert server.token not in cookie
+    assert {"HttpOnly", "SameSite=Strict", "Path=/"} <= {part.strip() for part in cookie.split(";")}
+    assert server.ask("GET", "/", cookie=cookie.partition(";")[0]).status == 200
+    assert socket(server, cookie=cookie.partition(";")[0], origin=origin(server)) == 101
+
+
+def test_the_link_leads_to_no_other_host(server: PageServer) -> None:
+    answer = server.ask("GET", f"//example.org/?token={server.token}")
+    assert re.match("/[^/]", answer.headers["location"])
+
+
+def test_wrong_tokens_and_cookies_open_nothing(server: PageServer) -> None:
+    assert server.ask("GET", "/?token=wrong").status == 401
+    assert server.ask("GET", "/api/robot", authorization="Bearer wrong").status == 401
+    assert server.ask("GET", "/", cookie=f"codebotler-{server.port}=wrong").status == 401
+    assert server.ask("GET", "/", cookie=f"codebotler-{server.port}={server.token}").status == 401
+    assert server.ask("GET", "/", cookie=f"{server.cookie}x").status == 401
+    assert server.ask("GET", "/", cookie="{=;;=").status == 401
+
+
+def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
+    with PageServer(tmp_path) as server:
+        cookie = server.cookie
+        wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(TRIES + 2)]
+        assert wrong == [401] * TRIES + [429] * 2
+        assert server.call("GET", "/api/robot").status == 429
+        forwarded = server.ask("GET", f"/?token={server.token}", x_forwarded_for="10.9.8.7")
+        assert (forwarded.status, forwarded.headers["retry-after"]) == (429, "60")
+        assert server.ask("GET", "/api/robot", cookie=cookie).status == 200  # who is in stays in
+
+
+def test_tries_are_counted_by_address_and_for_a_while() -> None:
+    now = [0.0]
+    access = Access("a token", "a face", now=lambda: now[0])
+    for _ in range(TRIES):
+        assert access.of_token("wrong", "here") is None
+    with pytest.raises(TooManyTriesError):
+        access.of_token("a token", "here")
+    assert access.of_token("a token", "there") is Role.OPERATOR
+    now[0] = WINDOW
+    assert access.of_token("a token", "here") is Role.OPERATOR
+
+
+def test_a_token_is_made_for_each_start() -> None:
+    tokens = {Access().operator for _ in range(5)} | {Access().face for _ in range(5)}
+    assert len(tokens) == 10
+    assert all(token is not None and len(token) >= 32 for token in tokens)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--no-token", "--host", "0.0.0.0"], "only for this machine"),
+        (["--no-token", "--token", "x" * 20], "only for this machine"),
+        (["--token", "short"], "can be guessed"),
+        (["--host", "999.1.1.1"], "nobody can listen"),
+    ],
+)
+def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
+    (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
+    command = [sys.executable, "-m", "codebotler.cli", "serve", "--world", "world.yaml", *arguments]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
+    assert ended.returncode == 2
+    assert told in ended.stderr
+
+
+def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) -> None:
+    with PageServer(tmp_path, "--no-token") as server:
+        assert "token" not in server.link
+        assert server.ask("GET", "/").status == 200
+        assert server.ask("POST", "/api/stop").status == 202
+        assert server.ask("POST", "/api/stop", origin="http://evil.example").status == 403
+        assert server.ask("GET", "/", host="evil.example").status == 421
+        assert socket(server, origin="http://evil.example") == 403
+
+
+# --- other pages
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "localhost.evil.example", "10.0.0.1", "", "localhost:@evil"]
+)
+def test_only_our_own_names_are_answered_to(server: PageServer, host: str) -> None:
+    """A page whose name was made to lead here (DNS rebinding) still calls us by that name."""
+    cookie = server.cookie
+    assert server.ask("GET", "/api/robot", host=host, cookie=cookie).status == 421
+    assert server.ask("GET", f"/?token={server.token}", host=host).status == 421
+
+
+def test_websockets_are_only_opened_under_our_own_names(server: PageServer) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    headers = {
+        "Host": "evil.example",
+        "Origin": "http://evil.example",
+        "Cookie": server.cookie,
+        "Connection": "Upgrade",
+        "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+    }
+    connection.request("GET", SOCKET, headers=headers)
+    assert connection.getresponse().status == 403
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    "other", ["http://evil.example", "null", "http://127.0.0.1:1", "https://127.0.0.1:{port}", ""]
+)
+def test_other_pages_change_nothing_and_hear_nothing(server: PageServer, other: str) -> None:
+    """Another port of this machine is another page, though browsers send the cookie with its requests."""
+    cookie, from_there = server.cookie, other.format(port=server.port)
+    assert server.ask("POST", "/api/stop", cookie=cookie, origin=from_there).status == 403
+    assert server.ask("GET", "/api/robot", cookie=cookie, origin=from_there).status == 403
+    assert socket(server, cookie=cookie, origin=from_there) == 403
+    assert server.ask("POST", "/api/stop", cookie=cookie, origin=origin(server)).status == 202
+
+
+def test_a_browser_that_says_not_from_where_changes_nothing(server: PageServer) -> None:
+    assert server.ask("POST", "/api/stop", cookie=server.cookie).status == 403
+    assert socket(server, cookie=server.cookie) == 403
+    assert server.call("POST", "/api/stop").status == 202  # a client that shows the token is no browser
+
+
+@pytest.mark.parametrize("site", ["cross-site", "same-site"])
+def test_other_pages_embed_nothing(server: PageServer, site: str) -> None:
+    cookie = server.cookie
+    assert server.ask("GET", "/api/robot", cookie=cookie, sec_fetch_site=site).status == 403
+    assert server.ask("GET", "/", cookie=cookie, sec_fetch_site=site, sec_fetch_mode="navigate").status == 200
+
+
+def test_nobody_is_invited(server: PageServer) -> None:
+    cookie, here = server.cookie, origin(server)
+    for path in ("/", "/api/robot", "/_nicegui_ws/socket.io/?EIO=4&transport=polling"):
+        for answer in (
+            server.ask("GET", path, cookie=cookie, origin=here),
+            server.ask("OPTIONS", path, cookie=cookie, origin=here, access_control_request_method="POST"),
+        ):
+            assert not [name for name in answer.headers if name.startswith("access-control")], path
+
+
+def test_schemes_belong_to_an_origin() -> None:
+    assert _is_same("https://robot:1", "robot:1", {"scheme": "wss"})
+    assert not _is_same("http://robot:1", "robot:1", {"scheme": "https"})
+
+
+# --- headers and sizes
+
+
+def test_scripts_run_only_with_the_nonce_of_the_answer(server: PageServer) -> None:
+    answers = [server.ask("GET", "/", cookie=server.cookie) for _ in range(2)]
+    nonces = []
+    for answer in answers:
+        policy = answer.headers["content-security-policy"]
+        (nonce,) = re.findall(r"'nonce-([\w-]{20,})'", policy)
+        nonces.append(nonce)
+        (scripts,) = re.findall(r"script-src ([^;]*)", policy)
+        assert scripts.split() == ["'self'", f"'nonce-{nonce}'", "'unsafe-eval'"]
+        tags = re.findall(r"<script[^>]*>", answer.text)
+        assert len(tags) > 5
+        assert all(f'nonce="{nonce}"' in tag for tag in tags)
+        for rule in ("default-src 'none'", "base-uri 'none'", "frame-ancestors 'none'", "form-action 'self'"):
+            assert rule in policy
+    assert nonces[0] != nonces[1]
+
+
+def test_every_answer_has_the_headers(server: PageServer) -> None:
+    cookie = server.cookie
+    for answer in (
+        server.ask("GET", "/", cookie=cookie),
+        server.ask("GET", "/api/robot", cookie=cookie),
+        server.ask("GET", "/static/page.css", cookie=cookie),
+        server.ask("GET", "/"),
+        server.ask("GET", "/", accept="text/html"),
+    ):
+        assert answer.headers["x-content-type-options"] == "nosniff"
+        assert answer.headers["x-frame-options"] == "DENY"
+        assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+        assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+        assert "server" not in answer.headers
+
+
+def test_what_is_sent_has_a_limit(server: PageServer) -> None:
+    huge = b'{"program": "' + b"x" * MOST_BYTES + b'"}'
+    assert server.call("POST", "/api/check", huge).status == 413
+    lying = server.ask(
+        "POST", "/api/check", b"{}", authorization=f"Bearer {server.token}", content_length="-1"
+    )
+    assert lying.status in {400, 413}
+    assert server.call("POST", "/api/check", {"program": "x" * 300_000}).status == 422
+
+
+def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
+    pieces = (b'{"program": "' if n == 0 else b"x" * 100_000 for n in range(MOST_BYTES // 100_000 + 3))
+    headers = {"Authorization": f"Bearer {server.token}", "Content-Type": "application/json"}
+    connection.request("POST", "/api/check", pieces, headers, encode_chunked=True)
+    assert connection.getresponse().status in {400, 413}
+    connection.close()
+
+
+# --- roles
+
+
+def role_at(path: str, token: str) -> int:
+    """The status that the guard alone gives to who shows a token; 200 if it lets them through."""
+    sent: list[Message] = []
+
+    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI has it
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def send(message: Message) -> None:
+        sent.append(message)
+
+    async def receive() -> Message:
+        return {"type": "http.request", "body": b""}
+
+    headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
+    scope = {"type": "http", "method": "POST", "path": path, "scheme": "http", "headers": headers}
+    guard = Guard(behind, Rules(Access("an operator's", "a face's")))
+    asyncio.run(guard(scope, receive, send))
+    return int(sent[0]["status"])
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/missions", "/api", "/api/missions", "/api/stop", "/faces", "/api/faces"]
+)
+def test_a_face_cannot_run_programs(path: str) -> None:
+    assert role_at(path, "a face's") == 403
+    assert role_at(path, "an operator's") == 200
+    assert role_at("/face", "a face's") == 200
+    assert role_at("/api/face/said", "a face's") == 200
+
+
+# --- places
+
+
+def test_names_by_which_the_page_may_be_called() -> None:
+    here = Place().rules(Access(), 1)
+    assert (here.any_address, "localhost" in here.hosts) == (False, True)
+    everywhere = Place("0.0.0.0", names=("Robot.Local",)).rules(Access(), 2)
+    assert (everywhere.any_address, "robot.local" in everywhere.hosts) == (True, True)
+    assert here.cookie != everywhere.cookie
