@@ -124,18 +124,21 @@ def preflight(robot: Robot) -> tuple[Plan | None, str]:
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
-    def told(skill: str) -> Result:
-        return answered(robot.skills[skill], robot.perform(skill, ())) if skill in can else None
+    def told(skill: str, what: str) -> Result:
+        if skill not in can:
+            return None
+        try:
+            return answered(robot.skills[skill], robot.perform(skill, ()))
+        except RobotError as error:
+            note(f"the robot does not say {what}: {visible(str(error))}")
+            return None
+        except RobotLostError as error:
+            raise NotReadyError(f"the robot does not say {what}: {error.sentence}") from None
+        except CancelledError:
+            raise NotReadyError(f"the robot does not say {what}: somebody stopped it") from None
 
-    try:
-        rooms, here = told("get_all_rooms"), told("get_current_location")
-    except RobotError as error:
-        note(f"the robot does not say which rooms it knows: {visible(str(error))}")
-        return None, ""
-    except RobotLostError as error:
-        raise NotReadyError(f"the robot does not say which rooms it knows: {error.sentence}") from None
-    except CancelledError:
-        raise NotReadyError("the robot does not say which rooms it knows: somebody stopped it") from None
+    rooms = told("get_all_rooms", "which rooms it knows")
+    here = told("get_current_location", "where it is")
     place = here if isinstance(here, str) else ""
     if not isinstance(rooms, list) or not rooms:
         return None, place

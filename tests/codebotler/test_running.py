@@ -18,6 +18,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.running import Request, preflight, unknown_rooms, written
 from codebotler.running import run as run_mission
+from codebotler.simulator.robot import RobotError
 from codebotler.world import Room, World
 from doubles import Answering, raising
 
@@ -31,17 +32,35 @@ def knowing(rooms: object, here: object = "") -> Callable[[str, str], Result]:
 @pytest.mark.parametrize(
     ("rooms", "here", "sentence"),
     [
-        ([1, None, {}], "hall", r"answers get_all_rooms with \[1, None, {}\], no list\[str\]"),
-        ("hall", "hall", r"answers get_all_rooms with 'hall', no list\[str\]"),
-        (["hall"], ["hall"], r"answers get_current_location with \['hall'\], no str"),
-        (["hall"], None, r"answers get_current_location with None, no str"),
+        (
+            [1, None, {}],
+            "hall",
+            r"which rooms it knows: .* answers get_all_rooms with \[1, None, {}\], no list\[str\]",
+        ),
+        ("hall", "hall", r"which rooms it knows: .* answers get_all_rooms with 'hall', no list\[str\]"),
+        (["hall"], ["hall"], r"where it is: the robot answers get_current_location with \['hall'\], no str"),
+        (["hall"], None, r"where it is: the robot answers get_current_location with None, no str"),
     ],
 )
 def test_answer_that_is_none_is_said_before_the_robot_moves(
     rooms: object, here: object, sentence: str
 ) -> None:
-    with pytest.raises(NotReadyError, match=f"does not say which rooms it knows: the robot {sentence}"):
+    with pytest.raises(NotReadyError, match=f"the robot does not say {sentence}"):
         preflight(Answering(knowing(rooms, here)))
+
+
+def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def answers(skill: str, _first: str) -> Result:
+        if skill == "get_current_location":
+            raise RobotError("GetCurrentLocationFailed", "not localised")
+        return ["hall", "lab"]
+
+    plan, place = preflight(Answering(answers))
+    assert plan is not None
+    assert (plan.rooms, plan.start, place) == (("hall", "lab"), "hall", "")
+    assert capsys.readouterr().err == "the robot does not say where it is: not localised\n"
 
 
 def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
