@@ -99,7 +99,12 @@ def run(robot: Robot, request: Request, home: Path) -> int:
     program = read_program(request.what) if request.is_program else None
     tell_interrupted(home)
     instruction = "" if request.is_program else request.what
-    with Reservation(robot, home) as reserved, Mission(home, robot.name, instruction) as mission:
+    with (
+        _interrupts() as heed,
+        Reservation(robot, home) as reserved,
+        Mission(home, robot.name, instruction) as mission,
+    ):
+        heed()
         plan, place = preflight(robot)
         if program is None:
             model = request.model()
@@ -109,6 +114,7 @@ def run(robot: Robot, request: Request, home: Path) -> int:
             mission.draft(program)
         if not _is_approved(mission, program, robot, plan, request):
             return 1
+        heed()
         return _watched(mission, reserved, place)
 
 
@@ -228,6 +234,33 @@ def _watched(mission: Mission, reserved: Reservation, place: str) -> int:
     if mission.state is State.STOPPED and got:
         return OF_SIGNALS + got[0]
     return 0 if mission.state is State.DONE else 1
+
+
+@contextlib.contextmanager
+def _interrupts() -> Iterator[Callable[[], None]]:
+    """Remember Ctrl-C, which libraries swallow or take for a fault of their own while they are imported.
+
+    Gives what raises it again if it came; an exception that comes after it counts as Ctrl-C itself.
+    """
+    came: list[int] = []
+
+    def obey(number: int, _frame: object) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    def heed() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, obey)
+    try:
+        yield heed
+    except Exception:
+        heed()
+        raise
+    finally:
+        if signal.getsignal(signal.SIGINT) is obey:
+            signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -66,6 +68,27 @@ def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
 def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
     with pytest.raises(NotReadyError, match="does not say which rooms it knows: somebody stopped it"):
         preflight(Answering(raising(CancelledError())))
+
+
+@pytest.mark.parametrize("fault", [None, ImportError("a library failed to import")])
+def test_interrupt_that_a_library_swallows_counts_all_the_same(
+    fault: Exception | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = Answering(knowing(["hall"], "hall"))
+
+    def swallowing() -> None:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        if fault is not None:
+            raise fault
+
+    monkeypatch.setattr(robot, "connect", swallowing)
+    monkeypatch.setattr(robot, "perform", raising(AssertionError("it was asked to do something")))
+    (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        run_mission(robot, Request(str(tmp_path / "go.py"), Writing, yes=True), tmp_path)  # type: ignore[arg-type]
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 # --- rooms
