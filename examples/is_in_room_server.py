@@ -7,6 +7,7 @@ It runs under CodeBotler's Python; what it does on the graph happens in a proces
 
 import argparse
 import base64
+import math
 import queue
 import sys
 import threading
@@ -133,6 +134,8 @@ def main() -> None:
     parser.add_argument("--oldest", type=float, default=5.0, help="seconds since a picture of a camera came")
     parser.add_argument("--ros-python", type=Path, default=PYTHON, help="the Python that has rospy")
     said = parser.parse_args()
+    if not 0 < said.oldest < math.inf:
+        parser.error(f"--oldest is {said.oldest:g}, but must be a number of seconds above 0")
     try:
         settings = replace(LOOKING, base_url=said.base_url)
         detector = open_detector(said.model, settings, least_score=said.least_score)

@@ -52,7 +52,7 @@ def test_every_command_of_a_page_runs(tmp_path: Path, page: str) -> None:
 
 def test_every_command_about_robots_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CODEBOTLER_HOME", str(tmp_path / "state"))
-    (tmp_path / "office.yaml").write_text((DOCS.parent / "examples" / "office.yaml").read_text())
+    (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
     kinds, tea, _, shown = [run(commands, tmp_path, "") for commands in blocks("robots.md", "sh")]
     assert re.search(r"^sim +works", kinds, re.MULTILINE)
     assert 'looks for "ann"\n            → found' in tea

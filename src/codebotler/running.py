@@ -99,7 +99,12 @@ def run(robot: Robot, request: Request, home: Path) -> int:
     program = read_program(request.what) if request.is_program else None
     tell_interrupted(home)
     instruction = "" if request.is_program else request.what
-    with Reservation(robot, home) as reserved, Mission(home, robot.name, instruction) as mission:
+    with (
+        _interrupts() as heed,
+        Reservation(robot, home) as reserved,
+        Mission(home, robot.name, instruction) as mission,
+    ):
+        heed()
         plan, place = preflight(robot)
         if program is None:
             model = request.model()
@@ -109,6 +114,7 @@ def run(robot: Robot, request: Request, home: Path) -> int:
             mission.draft(program)
         if not _is_approved(mission, program, robot, plan, request):
             return 1
+        heed()
         return _watched(mission, reserved, place)
 
 
@@ -124,18 +130,21 @@ def preflight(robot: Robot) -> tuple[Plan | None, str]:
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
-    def told(skill: str) -> Result:
-        return answered(robot.skills[skill], robot.perform(skill, ())) if skill in can else None
+    def told(skill: str, what: str) -> Result:
+        if skill not in can:
+            return None
+        try:
+            return answered(robot.skills[skill], robot.perform(skill, ()))
+        except RobotError as error:
+            note(f"the robot does not say {what}: {visible(str(error))}")
+            return None
+        except RobotLostError as error:
+            raise NotReadyError(f"the robot does not say {what}: {error.sentence}") from None
+        except CancelledError:
+            raise NotReadyError(f"the robot does not say {what}: somebody stopped it") from None
 
-    try:
-        rooms, here = told("get_all_rooms"), told("get_current_location")
-    except RobotError as error:
-        note(f"the robot does not say which rooms it knows: {visible(str(error))}")
-        return None, ""
-    except RobotLostError as error:
-        raise NotReadyError(f"the robot does not say which rooms it knows: {error.sentence}") from None
-    except CancelledError:
-        raise NotReadyError("the robot does not say which rooms it knows: somebody stopped it") from None
+    rooms = told("get_all_rooms", "which rooms it knows")
+    here = told("get_current_location", "where it is")
     place = here if isinstance(here, str) else ""
     if not isinstance(rooms, list) or not rooms:
         return None, place
@@ -225,6 +234,33 @@ def _watched(mission: Mission, reserved: Reservation, place: str) -> int:
     if mission.state is State.STOPPED and got:
         return OF_SIGNALS + got[0]
     return 0 if mission.state is State.DONE else 1
+
+
+@contextlib.contextmanager
+def _interrupts() -> Iterator[Callable[[], None]]:
+    """Remember Ctrl-C, which libraries swallow or take for a fault of their own while they are imported.
+
+    Gives what raises it again if it came; an exception that comes after it counts as Ctrl-C itself.
+    """
+    came: list[int] = []
+
+    def obey(number: int, _frame: object) -> None:
+        came.append(number)
+        raise KeyboardInterrupt
+
+    def heed() -> None:
+        if came:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGINT, obey)
+    try:
+        yield heed
+    except Exception:
+        heed()
+        raise
+    finally:
+        if signal.getsignal(signal.SIGINT) is obey:
+            signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager

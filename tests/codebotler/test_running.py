@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.running import Request, preflight, unknown_rooms, written
 from codebotler.running import run as run_mission
+from codebotler.simulator.robot import RobotError
 from codebotler.world import Room, World
 from doubles import Answering, raising
 
@@ -31,22 +34,61 @@ def knowing(rooms: object, here: object = "") -> Callable[[str, str], Result]:
 @pytest.mark.parametrize(
     ("rooms", "here", "sentence"),
     [
-        ([1, None, {}], "hall", r"answers get_all_rooms with \[1, None, {}\], no list\[str\]"),
-        ("hall", "hall", r"answers get_all_rooms with 'hall', no list\[str\]"),
-        (["hall"], ["hall"], r"answers get_current_location with \['hall'\], no str"),
-        (["hall"], None, r"answers get_current_location with None, no str"),
+        (
+            [1, None, {}],
+            "hall",
+            r"which rooms it knows: .* answers get_all_rooms with \[1, None, {}\], no list\[str\]",
+        ),
+        ("hall", "hall", r"which rooms it knows: .* answers get_all_rooms with 'hall', no list\[str\]"),
+        (["hall"], ["hall"], r"where it is: the robot answers get_current_location with \['hall'\], no str"),
+        (["hall"], None, r"where it is: the robot answers get_current_location with None, no str"),
     ],
 )
 def test_answer_that_is_none_is_said_before_the_robot_moves(
     rooms: object, here: object, sentence: str
 ) -> None:
-    with pytest.raises(NotReadyError, match=f"does not say which rooms it knows: the robot {sentence}"):
+    with pytest.raises(NotReadyError, match=f"the robot does not say {sentence}"):
         preflight(Answering(knowing(rooms, here)))
+
+
+def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def answers(skill: str, _first: str) -> Result:
+        if skill == "get_current_location":
+            raise RobotError("GetCurrentLocationFailed", "not localised")
+        return ["hall", "lab"]
+
+    plan, place = preflight(Answering(answers))
+    assert plan is not None
+    assert (plan.rooms, plan.start, place) == (("hall", "lab"), "hall", "")
+    assert capsys.readouterr().err == "the robot does not say where it is: not localised\n"
 
 
 def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
     with pytest.raises(NotReadyError, match="does not say which rooms it knows: somebody stopped it"):
         preflight(Answering(raising(CancelledError())))
+
+
+@pytest.mark.parametrize("fault", [None, ImportError("a library failed to import")])
+def test_interrupt_that_a_library_swallows_counts_all_the_same(
+    fault: Exception | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = Answering(knowing(["hall"], "hall"))
+
+    def swallowing() -> None:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        if fault is not None:
+            raise fault
+
+    monkeypatch.setattr(robot, "connect", swallowing)
+    monkeypatch.setattr(robot, "perform", raising(AssertionError("it was asked to do something")))
+    (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        run_mission(robot, Request(str(tmp_path / "go.py"), Writing, yes=True), tmp_path)  # type: ignore[arg-type]
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 # --- rooms

@@ -284,14 +284,16 @@ def test_look_that_is_cancelled_ends_at_once(graph: Graph, model: Server) -> Non
 
 
 @pytest.mark.parametrize(
-    ("model", "sentence"),
+    ("arguments", "sentence"),
     [
-        ("recorded", "error: recorded sees no pictures; name a chat model that does, or hf:PATH"),
-        ("openai-chat:eyes", "error: no ROS master answers at http://localhost:"),
+        (["recorded"], "error: recorded sees no pictures; name a chat model that does, or hf:PATH"),
+        (["openai-chat:eyes"], "error: no ROS master answers at http://localhost:"),
+        (["openai-chat:eyes", "--oldest", "nan"], "error: --oldest is nan, but must be a number of seconds"),
+        (["openai-chat:eyes", "--oldest", "0"], "error: --oldest is 0, but must be a number of seconds"),
     ],
 )
-def test_what_keeps_it_from_serving_is_said(model: str, sentence: str) -> None:
-    command = [sys.executable, str(EXAMPLE), "--model", model, "--base-url", "http://localhost:1/v1"]
+def test_what_keeps_it_from_serving_is_said(arguments: list[str], sentence: str) -> None:
+    command = [sys.executable, str(EXAMPLE), "--base-url", "http://localhost:1/v1", "--model", *arguments]
     master = f"http://localhost:{free_port()}"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "ROS_MASTER_URI": master}
     done = subprocess.run(

@@ -6,6 +6,7 @@ import base64
 import io
 import warnings
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
@@ -91,10 +92,18 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
     """
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:
-            data, is_big = base64.b64decode(str(message["data"])), bool(message["is_bigendian"])
+            data, is_big = _bytes_in(message, name), bool(message.get("is_bigendian"))
             return _raw(encoding, (width, height), step, data, is_big=is_big, name=name)
-        case {"data": str(data)}:
-            return image_of(base64.b64decode(data), name)
+        case {"data": _}:
+            return image_of(_bytes_in(message, name), name)
+    raise BadInput(f"{name} is no message with a picture")
+
+
+def _bytes_in(message: Mapping[str, object], name: str) -> bytes:
+    data = message.get("data")
+    with suppress(ValueError):  # it is no base64
+        if isinstance(data, str):
+            return base64.b64decode(data, validate=True)
     raise BadInput(f"{name} is no message with a picture")
 
 

@@ -38,6 +38,10 @@ def endpoint(address: str) -> str:
 
 def _machine(host: str) -> str:
     """A machine by one of its names; `host` is in small letters."""
+    if host in {"localhost", socket.gethostname().lower()}:
+        return HERE
     with suppress(ValueError):  # it is a name
-        host = ip_address(host).compressed
-    return HERE if host in {HERE, "::1", "localhost", socket.gethostname().lower()} else host
+        number = ip_address(host)
+        number = getattr(number, "ipv4_mapped", None) or number
+        return HERE if number.is_loopback or number.is_unspecified else number.compressed
+    return host

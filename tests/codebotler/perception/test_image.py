@@ -176,6 +176,8 @@ def test_compressed_picture_of_a_camera() -> None:
         (message("rgb8", b"\0\0\0", step=2**31), "is cut off"),
         ({"format": "jpeg", "data": ""}, "is empty"),
         ({"format": "jpeg", "data": "AAAA"}, "is no JPEG, PNG or WebP file"),
+        *(({"data": data}, "is no message with a picture") for data in ("a", "!!", "é", None, 5)),
+        (message("rgb8", b"\0\0\0", data="AAAAA"), "is no message with a picture"),
         ({"ranges": []}, "is no message with a picture"),
     ],
 )

@@ -35,7 +35,11 @@ def test_addresses_of_one_robot_are_one(address: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "host", ["localhost", "LOCALHOST", "127.0.0.1", "[::1]", "[0:0:0:0:0:0:0:1]", socket.gethostname()]
+    "host",
+    [
+        *("localhost", "LOCALHOST", "127.0.0.1", "127.0.1.1", "0.0.0.0"),
+        *("[::1]", "[0:0:0:0:0:0:0:1]", "[::]", "[::ffff:127.0.0.1]", socket.gethostname()),
+    ],
 )
 def test_names_of_this_machine_are_one(host: str) -> None:
     assert Ros1(f"http://{host}:11311/").address == "http://127.0.0.1:11311"
@@ -57,6 +61,7 @@ def test_addresses_of_other_robots_stay_apart() -> None:
         "ws://a:1/x",
         "ws://a:1/x?y",
         "ws://[fe80::1]:1",
+        "ws://10.0.0.1:1",
     )
     assert len({endpoint(address) for address in others}) == len(others)
 
