@@ -38,6 +38,7 @@ class Instruct:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._number = -1
+        self._asked = ""
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
             Words("h2", "Instruct").props("id=h-instruct")
             self._text = (
@@ -70,8 +71,9 @@ class Instruct:
         """Show what is at hand."""
         if view.number != self._number:
             self._number = view.number
-            if view.order.instruction:
+            if (self._text.value or "").strip() in {"", self._asked}:  # nobody is writing another one here
                 self._text.value = view.order.instruction
+            self._asked = view.order.instruction
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
         self._trouble.say(view.trouble)

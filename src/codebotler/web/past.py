@@ -63,13 +63,13 @@ def _read(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:
 def _row(summary: Summary) -> None:
     with ui.element("li"), html.a(href=f"/missions/{summary.id}"):
         Words("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
-        Words("span", shortened(summary.instruction or "a program of one's own", 160), "text")
+        Words("span", shortened(summary.instruction or "a program written by hand", 160), "text")
         Words("small", summary.state, f"state state-{summary.state}")
 
 
 def _show(summary: Summary, events: list[Line]) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
-    Words("h1", shortened(summary.instruction, 300) or "A program of one's own")
+    Words("h1", shortened(summary.instruction, 300) or "A program written by hand")
     with ui.element("p").classes("facts"):
         Words("small", summary.state, f"state state-{summary.state}")
         by = f", written by {summary.model}" if summary.model else ""

@@ -13,9 +13,11 @@ import pytest
 from codebotler.archive import missions, summary_of
 from codebotler.mission import Mission, MissionError, State
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
+from codebotler.problems import Check
 from codebotler.prompts import Prompt
 from codebotler.robots.base import Result, Robot
 from codebotler.robots.simulated import Simulated
+from codebotler.simulator.imagined import Plan
 from codebotler.web.desk import MOST_PROGRAM, Desk
 from codebotler.web.turn import Order, View, digest
 from codebotler.world import Room, World
@@ -195,15 +197,22 @@ def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
     assert missions(tmp_path)[0].state == "stopped"
 
 
-def test_a_stop_waits_for_no_check(tmp_path: Path) -> None:
-    slow = "def task_program():\n    go_to('kitchen')\n    while True:\n        pass\n"
+def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    go_on, check = threading.Event(), Desk.check
+
+    def slow(desk: Desk, program: str, plan: Plan | None = None) -> Check:
+        go_on.wait(20)
+        return check(desk, program, plan)
+
+    monkeypatch.setattr(Desk, "check", slow)
     with desk_of(tmp_path) as desk:
-        desk.begin(Order(program=slow))
+        turn = desk.begin(Order(program=HELLO))
         until(desk, lambda view: view.busy == "checking" and bool(view.id))
-        began = time.monotonic()
         desk.stop("a test")
-        assert desk.view.state is State.STOPPED
-        assert time.monotonic() - began < 0.5
+        assert (desk.view.state, desk.view.found) == (State.STOPPED, None)
+        go_on.set()
+        turn.join(10)
+        assert (desk.view.state, desk.view.found, desk.view.is_over) == (State.STOPPED, None, True)
 
 
 def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
