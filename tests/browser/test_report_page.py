@@ -82,7 +82,7 @@ def opened(chromium: str, page: Path, folder: Path, *options: str) -> str:
         [
             chromium,
             *("--headless=new", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=3000"),
-            *(f"--user-data-dir={folder / 'profile'}", "--window-size=1200,900", *options),
+            *(f"--user-data-dir={folder / 'profile'}", "--window-size=500,900", *options),
             *("--dump-dom", page.as_uri()),
         ],
         capture_output=True,

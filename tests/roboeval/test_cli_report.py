@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -35,9 +36,39 @@ def test_a_report_of_two_runs(runs: Path) -> None:
     for kind in ("png", "pdf"):
         names = {path.stem for path in (runs / "report" / "figures").glob(f"*.{kind}")}
         assert names == {"tasks", "thresholds", "causes", "rejection-sampling", "accepted"}
-    again = roboeval("report", "hasty", "careful", "--out", "report2", cwd=runs)
+    (runs / "first").mkdir()
+    (runs / "report").rename(runs / "first" / "report")
+    again = roboeval("report", "hasty", "careful", "--out", "report", cwd=runs)
     assert again.status == 0
-    assert (runs / "report2" / "index.html").read_text().replace("report2", "report") == text
+    files = [path.relative_to(runs / "first") for path in (runs / "first").rglob("*") if path.is_file()]
+    assert len(files) > 20
+    for file in files:
+        assert (runs / file).read_bytes() == (runs / "first" / file).read_bytes(), file
+
+
+def test_an_unfinished_run_is_reported_as_far_as_it_goes(runs: Path) -> None:
+    shutil.copytree(runs / "careful", runs / "part")
+    rows = runs / "part" / "evaluations" / "paper.jsonl"
+    lines = rows.read_text().splitlines(keepends=True)
+    rows.write_text("".join(lines[:-3]))
+    made = roboeval("report", "part", "--out", "partly", "--no-check", cwd=runs)
+    assert made.status == 0, made
+    assert "37 of 40 completions judged, and only these count" in made.err
+    assert "only 37 of 40 completions are judged" in (runs / "partly" / "index.html").read_text()
+    rows.write_text("")
+    nothing = roboeval("report", "part", "--out", "none", "--no-check", cwd=runs)
+    assert nothing.status == 2
+    assert "no completion has been judged" in nothing.err
+
+
+def test_prices(runs: Path) -> None:
+    price = ("--price", "recorded:careful=1/2", "--no-check")
+    made = roboeval("report", "careful", "--out", "paid", *price, cwd=runs)
+    assert made.status == 0, made
+    text = (runs / "paid" / "index.html").read_text()
+    assert "roboeval report careful --out paid --no-check --price recorded:careful=1/2" in text
+    said = refused("report", runs / "careful", "--out", runs / "x", "--price", "careful", "--no-check")
+    assert said.startswith('"careful" is no price; write MODEL=INPUT/OUTPUT')
 
 
 def test_without_a_check_no_program_runs(runs: Path) -> None:

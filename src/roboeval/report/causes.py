@@ -104,8 +104,23 @@ def causes_sheet(causes: Sequence[Causes]) -> Sheet:
                 [one.name, name, kind, None if one.counts is None else one.counts[name, kind], part]
                 for kind, part in one.kinds.get(name, {}).items()
             ]
-    notes = [paper.TWO_SUMS] if any(one.counts is None for one in causes) else []
-    return sheet("causes", "Causes of failures", columns, rows, about=ABOUT, notes=notes)
+    return sheet("causes", "Causes of failures", columns, rows, about=ABOUT)
+
+
+def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
+    """What a reader must know where published causes stand beside ours."""
+    known = [run for run in runs if paper.model_of(run) is not None]
+    if not known:
+        return ["None of these runs names a model of the paper, so no published causes stand beside them."]
+    all_tasks = set(paper.published()["pass_at_1"])
+    parts = [run.name for run in known if set(run.by_task) != all_tasks]
+    notes = [paper.TWO_SUMS]
+    if parts:
+        notes.append(
+            f"Published causes are of all {len(all_tasks)} tasks of the paper, which is more than "
+            f"{', '.join(parts)} did."
+        )
+    return notes
 
 
 def _count(one: Causes, failure_class: str) -> int | None:

@@ -168,7 +168,11 @@ def _causes(runs: Sequence[JudgedRun], *, published: bool) -> Section:
         "class, the share of each kind in percent, by model; a model without such failures is left out.",
         lambda look: heat.causes_figure(found, look),
     )
-    return Section("causes", "Why programs fail", (picture, causes.causes_sheet(found)))
+    table = causes.causes_sheet(found)
+    notes = causes.beside_notes(runs) if published else []
+    return Section(
+        "causes", "Why programs fail", _parts(picture, Prose(tuple(notes)) if notes else None, table)
+    )
 
 
 def _retries(runs: Sequence[JudgedRun]) -> Section:
@@ -210,7 +214,14 @@ def _differences(runs: Sequence[JudgedRun]) -> Section:
 
 def _failures(runs: Sequence[JudgedRun], suite: Suite) -> Section:
     found = failures.failures(runs, suite)
-    parts = (Prose((failures.ABOUT,)), found, failures.failures_sheet(found)) if found.shown else ()
+    if not found.shown:
+        return Section("failures", "What went wrong")
+    parts = _parts(
+        Prose((failures.ABOUT,)),
+        found,
+        Prose(found.notes) if found.notes else None,
+        failures.failures_sheet(found),
+    )
     return Section("failures", "What went wrong", parts)
 
 

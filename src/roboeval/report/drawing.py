@@ -15,6 +15,8 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from codebotler.terminal import visible
+
 WIDE, NARROW = 7.16, 3.5  # inches: both columns of a paper, and one
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000", "#F0E442")
@@ -126,8 +128,9 @@ def _slim(svg: bytes) -> bytes:
 
 
 def brief(name: str, most: int = LONGEST_NAME) -> str:
-    """A name that fits into a figure."""
-    return name if len(name) <= most else f"{name[: most - 1]}…"
+    """A name that fits into a figure: its beginning and its end, by which names are told apart."""
+    name, end = visible(name), (most - 1) // 2
+    return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"
 
 
 def share_axis(axes: Axes, *, along: str = "y") -> None:

@@ -98,4 +98,4 @@ def failures_sheet(found: Failures) -> Sheet:
         ]
         for one in found.shown
     ]
-    return sheet("failures", "The same as a table", columns, rows, notes=found.notes)
+    return sheet("failures", "The same as a table", columns, rows)

@@ -90,7 +90,10 @@ def causes_figure(causes: Sequence[Causes], look: Look) -> Figure:
     heights = _heights(len(causes), tallest, many=many)
     figure = new_figure(WIDE, sum(heights))
     above, below = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
-    _classes(above.add_subplot(), causes, look)
+    axes = above.add_subplot()
+    _classes(axes, causes, look)
+    handles, labels = axes.get_legend_handles_labels()
+    above.legend(handles, labels, loc="outside lower center", ncols=4, handlelength=1.4)
     panels = below.subplots(1, 3, squeeze=False, sharey=many)[0]
     for axes, (name, title), those in zip(panels, PANELS, kinds, strict=True):
         axes.set_title(title, loc="left")
@@ -99,7 +102,7 @@ def causes_figure(causes: Sequence[Causes], look: Look) -> Figure:
 
 
 def _heights(models: int, tallest: int, *, many: bool) -> list[float]:
-    return [0.95 + 0.2 * models, 0.95 + (0.13 * models if many else 0.155 * tallest)]
+    return [1.05 + 0.2 * models, 0.95 + (0.13 * models if many else 0.155 * tallest)]
 
 
 def _classes(axes: Axes, causes: Sequence[Causes], look: Look) -> None:
@@ -126,7 +129,6 @@ def _classes(axes: Axes, causes: Sequence[Causes], look: Look) -> None:
     axes.invert_yaxis()
     axes.tick_params(axis="y", length=0)
     share_axis(axes, along="x")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.02, 0.97), ncols=4, handlelength=1.4, columnspacing=1.2)
 
 
 def _kinds(

@@ -9,7 +9,7 @@ import pytest
 from made_up_runs import HOSTILE, SUITE, made_up, usual
 from roboeval.evaluation import Evaluation
 from roboeval.report import paper
-from roboeval.report.causes import all_causes, causes_of, causes_sheet, kinds_in_order
+from roboeval.report.causes import all_causes, beside_notes, causes_of, causes_sheet, kinds_in_order
 from roboeval.report.reading import JudgedRun, Written, named_apart, read_run
 from roboeval.report.retries import accepted, retries_sheet, steps_sheet
 from roboeval.report.scores import (
@@ -141,7 +141,11 @@ def test_published_causes_only_where_asked_for() -> None:
     assert [one.name for one in all_causes(runs, published=False)] == ["gpt-4", "mine"]
     assert [one.name for one in all_causes(runs, published=True)] == ["gpt-4", "gpt-4, published", "mine"]
     table = causes_sheet(all_causes(runs, published=True))
-    assert paper.TWO_SUMS in table.notes
+    assert beside_notes(runs) == [
+        paper.TWO_SUMS,
+        "Published causes are of all 16 tasks of the paper, which is more than gpt-4 did.",
+    ]
+    assert "None of these runs" in beside_notes(runs[1:])[0]
     shares = {row[2]: row[4] for row in table.rows if row[:2] == ("gpt-4, published", "TaskCompletionError")}
     assert shares["SayAtLocation"] == pytest.approx(0.682)
     assert shares["InitialTerminal"] == pytest.approx(0.317)
