@@ -50,7 +50,7 @@ test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
 
 test-browser: $(VENV)/tested
-	$(BIN)/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
+	$(BIN)/python -m pytest --no-skips --numprocesses 2 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py \
