@@ -26,7 +26,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot,
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.robot import RobotError
-from codebotler.terminal import note, print_rich, says_yes, shortened, visible
+from codebotler.terminal import busy, note, print_rich, says_yes, shortened, visible
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",
@@ -101,9 +101,11 @@ def run(robot: Robot, request: Request, home: Path) -> int:
     instruction = "" if request.is_program else request.what
     with (
         _interrupts() as heed,
-        Reservation(robot, home) as reserved,
-        Mission(home, robot.name, instruction) as mission,
+        contextlib.ExitStack() as held,
     ):
+        with busy(f"connecting the robot {robot.name}"):
+            reserved = held.enter_context(Reservation(robot, home))
+        mission = held.enter_context(Mission(home, robot.name, instruction))
         heed()
         plan, place = preflight(robot)
         if program is None:

@@ -45,6 +45,8 @@ class ZeroShot:
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
             raise BadInput(f"{self.name} cannot be loaded as a zero-shot detector: {brief(error)}") from None
         guard_logs()
+        if not all(bool(torch.isfinite(weight).all()) for weight in self._pipeline.model.parameters()):
+            raise BadInput(f"{self.name} has weights that are no numbers, so that it would find nothing")
 
     def look(self, image: Image, label: str) -> Sighting:
         """Look for the label's words; the clearest place counts.

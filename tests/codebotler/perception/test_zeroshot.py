@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -99,6 +100,15 @@ def test_model_that_fails_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch)
         detector.look(PICTURE, "mug")
     assert error.value.sentence.startswith(f"hf:{folder}: ")
     detector.close()
+
+
+def test_broken_weights_are_refused(tmp_path: Path, folder: Path) -> None:
+    broken = shutil.copytree(folder, tmp_path / "broken")
+    model = transformers.OwlViTForObjectDetection.from_pretrained(folder)
+    model.class_head.dense0.weight.data[0, 0] = math.nan
+    model.save_pretrained(broken)
+    with pytest.raises(BadInput, match="has weights that are no numbers"):
+        open_detector(f"hf:{broken}")
 
 
 def test_what_is_no_detector_is_refused(tmp_path: Path, folder: Path) -> None:
