@@ -85,3 +85,9 @@ def test_what_is_left_out_of_a_difference_is_marked() -> None:
     assert fix is not None
     assert fix.changes[0] == (" ", "...")
     assert [sign for sign, _ in fix.changes] == [" ", " ", " ", "-", "+"]
+
+
+def test_the_same_lines_in_another_order_may_be_further_than_other_lines() -> None:
+    fix = shortest_fix("a\nb\nc\n", passing([("turned", "c\nb\na\n"), ("other", "a\nb\nd\n")]))
+    assert fix is not None
+    assert (fix.name, fix.changed) == ("other", 2)

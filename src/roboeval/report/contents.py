@@ -226,7 +226,9 @@ def _failures(runs: Sequence[JudgedRun], suite: Suite) -> Section:
 
 
 def _strengths(runs: Sequence[JudgedRun], suite: Suite) -> Section:
-    parts = _parts(strengths.ability_sheet(runs, suite), strengths.coming_back_sheet(runs, suite))
+    back = strengths.coming_back_sheet(runs, suite)
+    said = Prose(tuple(strengths.coming_back_said(back))) if back is not None else None
+    parts = _parts(strengths.ability_sheet(runs, suite), said, back)
     return Section("abilities", "Which ability is missing", parts)
 
 

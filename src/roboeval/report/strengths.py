@@ -15,6 +15,8 @@ from roboeval.taxonomy import PYTHON, ROBOT, TASK
 
 REPORTS = "report-back"
 LOST = "GoToInvalidLocation"
+WITH_REPORT = "come back and report"
+MOST_SENTENCES = 20
 ABILITIES = (
     "A task takes several abilities, so a completion counts in several rows. pass@1 is the mean over "
     "prompts, with the 95 % interval over tasks; the rest are shares of completions that fail by each class."
@@ -61,7 +63,7 @@ def coming_back_sheet(runs: Sequence[JudgedRun], suite: Suite) -> Sheet | None:
     back = {name for name, task in suite.tasks.items() if REPORTS in task.abilities}
     rows: list[list[Cell]] = []
     for run in runs:
-        for what, is_back in (("come back and report", True), ("others", False)):
+        for what, is_back in ((WITH_REPORT, True), ("others", False)):
             those = [row for row in run.rows if (row["task"] in back) == is_back]
             if those:
                 rows.append([run.name, what, *_coming_back(those, run, suite)])
@@ -88,6 +90,23 @@ def _coming_back(rows: Sequence[Row], run: JudgedRun, suite: Suite) -> list[Cell
     lost = sum(row["failure"]["kind"] == LOST for row in failed)
     shares = [count / len(failed) if failed else None for count in (away, lost)]
     return [len(rows), sum(values) / len(values), len(failed), away, shares[0], lost, shares[1]]
+
+
+def coming_back_said(table: Sheet) -> list[str]:
+    """The same in sentences, for tasks that end with a report.
+
+    Args:
+        table: as `coming_back_sheet` makes it.
+    """
+    heads = [column.head for column in table.columns]
+    found = [dict(zip(heads, row, strict=True)) for row in table.rows]
+    return [
+        f"Of {row['failed']:,} failures of {row['model']} in tasks that end with a report, "
+        f"{row['never returned']:,} left and never came back, and {row['no such room']:,} went to a room "
+        "that does not exist."
+        for row in found[:MOST_SENTENCES]
+        if row["tasks"] == WITH_REPORT and row["failed"]
+    ]
 
 
 def never_returned(row: Row, suite: Suite) -> bool:

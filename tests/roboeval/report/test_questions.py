@@ -24,7 +24,7 @@ from roboeval.report.origin import about_suite, origin_sheet
 from roboeval.report.reading import JudgedRun, Written, _written
 from roboeval.report.robustness import only, phrasing_sheet, spread_sheet
 from roboeval.report.sheets import Sheet
-from roboeval.report.strengths import ability_sheet, coming_back_sheet, never_returned
+from roboeval.report.strengths import ability_sheet, coming_back_said, coming_back_sheet, never_returned
 from roboeval.resampling import Prompt, Trial
 from roboeval.suite import Scenario, Suite
 
@@ -102,6 +102,11 @@ def test_coming_back_by_hand() -> None:
     assert len(found) == 1
     assert (found[0]["failed"], found[0]["never returned"], found[0]["no such room"]) == (3, 1, 1)
     assert found[0]["share never returned"] == pytest.approx(1 / 3)
+    table = coming_back_sheet([replace(run, rows=rows)], ABLE)
+    assert table is not None
+    (said,) = coming_back_said(table)
+    assert said.startswith("Of 3 failures of a in tasks that end with a report, 1 left and never came back")
+    assert said.endswith("and 1 went to a room that does not exist.")
     assert coming_back_sheet([run], SUITE) is None
 
 
