@@ -29,8 +29,6 @@ NAMED = """
 """
 """What people need who see no screen, or use no mouse, and CodeMirror does not offer."""
 
-SHOWN = "getElement({}).editor.state.doc.toString()"
-
 MOST_MARKS = 400
 MOST_PROBLEMS = 20
 SPOKEN = frozenset({"say", "ask", "answer"})
@@ -74,8 +72,6 @@ class ProgramPane:
         if await ui.run_javascript("matchMedia('(prefers-color-scheme: dark)').matches", timeout=5.0):
             self._editor.theme = DARK
         ui.run_javascript(NAMED)
-        self._drawn = ()  # what was marked before the browser had the editor is not there
-        self.show(self._desk.view)
 
     def show(self, view: View) -> None:
         """Show the program that is at hand."""
@@ -163,21 +159,12 @@ class ProgramPane:
             self._try(lambda: self._desk.edit(view.program))
         elif self._typed_at is not None:
             ui.notify("The program was just changed; wait for its check.", position="top")
-        elif turn is not None and await self._is_seen(view):
+        elif turn is not None:
             try:
                 despite = bool(self._despite.value)
                 await asyncio.to_thread(turn.approve, view.digest, despite_problems=despite)
             except MissionError as error:
                 ui.notify(error.sentence, type="warning", position="top")
-
-    async def _is_seen(self, view: View) -> bool:
-        """Whether this browser shows the very program; two people may type at the same time."""
-        shown = await ui.run_javascript(SHOWN.format(self._editor.id), timeout=5.0)
-        if shown == _for_editor(view.program):
-            return True
-        self._editor.update()
-        ui.notify("The program was changed meanwhile; look at it again.", type="warning", position="top")
-        return False
 
     def _again(self, *, repair: bool) -> None:
         turn = self._desk.turn
@@ -193,8 +180,7 @@ class ProgramPane:
     # --- what was found
 
     def _draw(self, view: View, shown: str) -> None:
-        # Not by the element's own property: its update would bring the text along, over what is being typed.
-        self._editor.run_method("setDecorations", [*_skills(shown), *_marks(view.found, shown)])
+        self._editor.decorations = [*_skills(shown), *_marks(view.found, shown)]
         self._problems.clear()
         with self._problems:
             for sentence in (*view.problems, *view.unknown)[:MOST_PROBLEMS]:

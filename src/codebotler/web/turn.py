@@ -104,10 +104,8 @@ class View:
     @property
     def may_be_edited(self) -> bool:
         """Whether another program can take the place of this one."""
-        if self.is_over or self.is_written:
-            return self.is_over
-        waits = self.state is None and bool(self.order.program)  # for the robot; who types on loses nothing
-        return waits or self.state in {State.DRAFTING, State.CHECKED}
+        drafting = self.state in {State.DRAFTING, State.CHECKED}
+        return self.is_over or (drafting and not self.is_written)
 
 
 def digest(program: str) -> str:
