@@ -87,7 +87,7 @@ def test_interrupt_that_a_library_swallows_counts_all_the_same(
     (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        run_mission(robot, Request(str(tmp_path / "go.py"), Writing, yes=True), tmp_path)  # type: ignore[arg-type]
+        run_mission(robot, Request(str(tmp_path / "go.py"), lambda: Writing(""), yes=True), tmp_path)
     assert signal.getsignal(signal.SIGINT) is before
 
 
