@@ -16,17 +16,27 @@ from codebotler.badinput import Place, YamlFile
 Point: TypeAlias = tuple[float, float]
 
 
+Answer: TypeAlias = str | int
+"""A regex for the option that is chosen, or its position: 1 is the first, -1 the last."""
+
+
 @dataclass(frozen=True)
 class Person:
     """Somebody in a room who answers questions.
 
     Args:
         name: a regex for the names they answer to.
-        answers: a regex per answer, in order; the last one stays for ever. Without any, every question fails.
+        answers: one per question, in order; the last one stays for ever. Without any, every question fails.
+        topics: regexes, and what is answered to a question in which one is found, instead of the next answer.
+        after_looks: how often the robot looks into the room in vain before they come; 0 if they are there.
+        leaves: whether they go when they have given their last answer.
     """
 
     name: str
-    answers: tuple[str, ...] = ()
+    answers: tuple[Answer, ...] = ()
+    topics: tuple[tuple[str, Answer], ...] = ()
+    after_looks: int = 0
+    leaves: bool = False
 
 
 @dataclass(frozen=True)
@@ -85,7 +95,7 @@ class World:
             data["objects"] = {room.name: list(room.objects) for room in self.rooms if room.objects}
         if any(room.people for room in self.rooms):
             data["people"] = {
-                room.name: [{"name": p.name, "answers": list(p.answers)} for p in room.people]
+                room.name: [_person_data(person) for person in room.people]
                 for room in self.rooms
                 if room.people
             }
@@ -131,11 +141,33 @@ class _Form(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class OptionFile(_Form):
+    """An answer as a world file writes it where it is a position among the options."""
+
+    option: Annotated[int, Field(strict=True, ge=-100, le=100)]
+
+
+AnswerFile: TypeAlias = Text | OptionFile
+
+
 class PersonFile(_Form):
     """A person as a world file writes them."""
 
     name: Name
-    answers: list[Text] = []
+    answers: list[AnswerFile] = []
+    topics: dict[Name, AnswerFile] = {}
+    after_looks: Annotated[int, Field(strict=True, ge=0, le=1_000)] = 0
+    leaves: Annotated[bool, Field(strict=True)] = False
+
+    def person(self) -> Person:
+        """The person it describes."""
+        topics = tuple((topic, _answer(answer)) for topic, answer in self.topics.items())
+        answers = tuple(map(_answer, self.answers))
+        return Person(self.name, answers, topics, self.after_looks, self.leaves)
+
+
+def _answer(form: AnswerFile) -> Answer:
+    return form.option if isinstance(form, OptionFile) else form
 
 
 class RoomFile(_Form):
@@ -187,7 +219,7 @@ class WorldFile(_Form):
                 Room(
                     name=room.name,
                     objects=tuple(self.objects.get(room.name, ())),
-                    people=tuple(Person(p.name, tuple(p.answers)) for p in self.people.get(room.name, ())),
+                    people=tuple(person.person() for person in self.people.get(room.name, ())),
                     footprint=None if room.footprint is None else tuple(room.footprint),
                     stand_at=room.stand_at,
                 )
@@ -219,6 +251,9 @@ class WorldFile(_Form):
                 _regex(person.name, file, (*here, "name"))
                 for number, answer in enumerate(person.answers):
                     _regex(answer, file, (*here, "answers", number))
+                for topic, answer in person.topics.items():
+                    _regex(topic, file, (*here, "topics", topic))
+                    _regex(answer, file, (*here, "topics", topic))
 
 
 _ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
@@ -246,7 +281,11 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
-def _regex(text: str, file: YamlFile, place: Place) -> None:
+def _regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
+    if isinstance(text, OptionFile):
+        if text.option == 0:
+            raise file.wrong("there is no option 0; 1 is the first, and -1 the last", *place)
+        return
     try:
         re.compile(text)
     except (re.error, RecursionError, OverflowError) as error:
@@ -263,6 +302,21 @@ def _written_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 _Dumper.add_representer(str, _written_text)
+
+
+def _person_data(person: Person) -> dict[str, object]:
+    data: dict[str, object] = {"name": person.name, "answers": list(map(_answer_data, person.answers))}
+    if person.topics:
+        data["topics"] = {topic: _answer_data(answer) for topic, answer in person.topics}
+    if person.after_looks:
+        data["after_looks"] = person.after_looks
+    if person.leaves:
+        data["leaves"] = True
+    return data
+
+
+def _answer_data(answer: Answer) -> object:
+    return {"option": answer} if isinstance(answer, int) else answer
 
 
 def _room_data(room: Room) -> object:

@@ -11,6 +11,7 @@ from codebotler import __version__
 from codebotler.rtl import CannotJudge, holds
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
 from codebotler.world import World
@@ -122,6 +123,8 @@ def head(suite: Suite) -> dict[str, Any]:
             "literals": rules.literals,
             "matching": rules.matching,
             "people": rules.people,
+            **({"words_for_people": list(rules.words_for_people)} if rules.words_for_people else {}),
+            **({"events": rules.events} if rules.events != PAPER.events else {}),
             "limits": {
                 "seconds": rules.limits.seconds,
                 "calls": rules.limits.calls,

@@ -102,8 +102,10 @@ class RulesFile(_Form):
     """The rules as a suite file writes them."""
 
     literals: Literal["lowercase", "as-written"] = "lowercase"
-    matching: Literal["label-in-request"] = "label-in-request"
-    people: Literal["answer-to-any-name"] = "answer-to-any-name"
+    matching: Literal["label-in-request", "whole-words"] = "label-in-request"
+    people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
+    words_for_people: list[Name] = []
+    events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0
     clock_starts: Annotated[datetime, BeforeValidator(_moment)] = Rules().clock_starts
@@ -111,7 +113,15 @@ class RulesFile(_Form):
     def rules(self) -> Rules:
         """The rules it describes."""
         limits = Limits(self.limits.seconds, self.limits.calls, self.limits.ticks)
-        return Rules(self.literals, self.matching, self.people, limits, self.clock_starts)
+        return Rules(
+            self.literals,
+            self.matching,
+            self.people,
+            tuple(self.words_for_people),
+            self.events,
+            limits,
+            self.clock_starts,
+        )
 
 
 class SuiteFile(_Form):

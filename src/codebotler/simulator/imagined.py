@@ -161,7 +161,7 @@ class ImaginedRobot(SimulatedRobot):
         if does.get("go_to") is drive:
             self.surely = tuple(("go_to", room) for room in plan.sure)
         self.things = defaultdict(list)
-        self.answers = defaultdict(list)  # of nobody whom a world file would name
+        self.people = defaultdict(list)  # of nobody whom a world file would name
         self.scenes: defaultdict[str, Scene] = defaultdict(Scene)
         self.told: dict[tuple[str, ...], str] = {}
         self.facts: list[Fact] = []

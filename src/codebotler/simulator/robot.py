@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
 
-from codebotler.simulator.rules import PAPER, Rules
+from codebotler.simulator.rules import PAPER, Matching, Rules
 from codebotler.skills import SKILLS, SkillTable
 from codebotler.trace import Event, Option, Trace
-from codebotler.world import World
+from codebotler.world import Answer, Person, World
 
 
 class RobotError(Exception):
@@ -39,11 +39,44 @@ class Thing:
     label: str
     is_pattern: bool = True
 
-    def is_meant_by(self, request: str) -> bool:
+    def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
         """Whether a request finds it."""
         if self.is_pattern:
-            return found_in(self.label, request)
+            return finds(request, self.label, matching)
         return self.label.lower() in request.lower()  # a regex would take minutes for names that are long
+
+
+class Somebody:
+    """A person in a room, what they have yet to answer, and when they come.
+
+    Args:
+        person: as the world describes them.
+    """
+
+    def __init__(self, person: Person) -> None:
+        self.person = person
+        self.answers = [*person.answers]
+        self.looks_before = person.after_looks
+        self.is_gone = False
+
+    @property
+    def is_here(self) -> bool:
+        """Whether they are in the room now."""
+        return self.looks_before == 0 and not self.is_gone
+
+    def answer(self, question: str, rules: Rules) -> Answer | None:
+        """What they answer; None if nothing."""
+        for topic, answer in self.person.topics:
+            if finds(question, topic, rules.matching):
+                return answer
+        if not self.answers:
+            return None
+        answer = self.answers[0]
+        if len(self.answers) > 1:  # the last answer stays for ever
+            del self.answers[0]
+        else:
+            self.is_gone = self.person.leaves
+        return answer
 
 
 class SimulatedRobot:
@@ -71,8 +104,11 @@ class SimulatedRobot:
         self.surely = sure_drives(self.rooms) if self.behaviours.get("go_to") is go_to else ()
         self.room = world.robot
         self.things = {room.name: [Thing(label) for label in room.objects] for room in world.rooms}
-        self.answers = {room.name: [list(person.answers) for person in room.people] for room in world.rooms}
+        self.people = {room.name: [Somebody(person) for person in room.people] for room in world.rooms}
+        if any(somebody.looks_before for here in self.people.values() for somebody in here):
+            self.only_looks -= {name for name, does in self.behaviours.items() if does is is_in_room}
         self.held: str | None = None
+        self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
         self.events: list[Event] = []
 
@@ -116,9 +152,33 @@ def found_in(label: str, request: str) -> bool:
     return _pattern(label).search(request) is not None
 
 
+def finds(request: str, label: str, matching: Matching) -> bool:
+    """Whether what the program asked for finds a label of the world, a regex.
+
+    Args:
+        request: what the program asked for.
+        label: what the world calls it.
+        matching: how labels are looked for.
+    """
+    return found_in(label if matching == "label-in-request" else whole_words(label), request)
+
+
+@lru_cache(maxsize=4096)
+def whole_words(label: str) -> str:
+    """A regex that finds another one as whole words, in the singular or the plural."""
+    return rf"(?<!\w)(?:{label})(?:e?s)?(?!\w)"
+
+
 @lru_cache(maxsize=4096)
 def _pattern(label: str) -> re.Pattern[str]:
     return re.compile(label, re.IGNORECASE | re.DOTALL)
+
+
+def is_called(person: Person, request: str, rules: Rules) -> bool:
+    """Whether a request means a person: by no name, their own, or a word for people."""
+    if rules.people == "answer-to-any-name" or not request.strip():
+        return True
+    return any(finds(request, name, rules.matching) for name in (person.name, *rules.words_for_people))
 
 
 def get_current_location(robot: SimulatedRobot) -> str:
@@ -133,8 +193,11 @@ def get_all_rooms(robot: SimulatedRobot) -> list[str]:
 
 def go_to(robot: SimulatedRobot, location: str) -> None:
     """Drive to the first room whose name is found in the request."""
-    robot.record("goto", location)
-    room = resolve_room(robot.rooms, location)
+    room = resolve_room(robot.rooms, location, robot.rules.matching)
+    if robot.rules.events == "as-requested":
+        robot.record("goto", location)
+    elif room is not None:
+        robot.record("goto", room)
     if room is None:
         raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
     robot.room = room
@@ -154,16 +217,21 @@ def is_found_by_itself(room: str) -> bool:
         return False
 
 
-def resolve_room(rooms: Sequence[str], request: str) -> str | None:
-    """The first room whose name is found in a request."""
-    return next((room for room in rooms if found_in(room, request)), None)
+def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
+    """The first room whose name is found in a request; by whole words, the room of just that name if there is one."""
+    if matching == "whole-words" and request in rooms:
+        return request
+    return next((room for room in rooms if finds(request, room, matching)), None)
 
 
 def is_in_room(robot: SimulatedRobot, entity: str) -> bool:
-    """Look for an object, else for a person; in the paper's suite people answer to any name."""
-    seen = any(thing.is_meant_by(entity) for thing in robot.things[robot.room])
-    seen = seen or bool(robot.answers[robot.room])
+    """Look for an object, else for a person; who was not there may come after looks in vain."""
+    rules, here = robot.rules, robot.people[robot.room]
+    seen = any(thing.is_meant_by(entity, rules.matching) for thing in robot.things[robot.room])
+    seen = seen or any(one.is_here and is_called(one.person, entity, rules) for one in here)
     robot.record("check", entity, found=seen)
+    if not any(one.is_here for one in here) and (coming := next((o for o in here if not o.is_gone), None)):
+        coming.looks_before -= 1
     return seen
 
 
@@ -172,17 +240,17 @@ def say(robot: SimulatedRobot, message: str) -> None:
     robot.record("say", message)
 
 
-def ask(robot: SimulatedRobot, _person: str, question: str, options: tuple[Option, ...]) -> int:
-    """Ask somebody here, whoever was meant, and return the position of the option they choose."""
+def ask(robot: SimulatedRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
+    """Ask the first person here who is meant, and return the position of the option they choose."""
     robot.record("ask", question, options)
     if not options:
         raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
-    if not robot.answers[robot.room]:
+    here = (one for one in robot.people[robot.room] if one.is_here)
+    asked = next((one for one in here if is_called(one.person, person, robot.rules)), None)
+    if asked is None:
         raise RobotError("AskNoPerson", f'nobody is in "{robot.room}" to be asked "{question}"')
-    answers = robot.answers[robot.room][0]
-    chosen = choose(answers[0], question, options) if answers else None
-    if len(answers) > 1:  # the last answer stays for ever
-        del answers[0]
+    answer = asked.answer(question, robot.rules)
+    chosen = None if answer is None else choose(answer, question, options, robot.rules.matching)
     if chosen is None:
         offered = ", ".join(option.text for option in options)
         raise RobotError(
@@ -192,19 +260,24 @@ def ask(robot: SimulatedRobot, _person: str, question: str, options: tuple[Optio
     return chosen
 
 
-def choose(answer: str, question: str, options: tuple[Option, ...]) -> int | None:
+def choose(
+    answer: Answer, question: str, options: tuple[Option, ...], matching: Matching = "label-in-request"
+) -> int | None:
     """The position of the option that an answer means.
 
-    The answer is looked for in the options; failing that it is a yes or a no to the question.
+    The answer is looked for in the options; failing that it is a yes or a no to the question. One that is a
+    position means the nearest option that there is.
     """
 
     def first(pattern: str) -> int | None:
-        return next((i for i, option in enumerate(options) if found_in(pattern, option.text)), None)
+        return next((i for i, option in enumerate(options) if finds(option.text, pattern, matching)), None)
 
+    if isinstance(answer, int):
+        return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
     direct = first(answer)
     if direct is not None:
         return direct
-    return first("yes" if found_in(answer, question) else "no")
+    return first("yes" if finds(question, answer, matching) else "no")
 
 
 def pick(robot: SimulatedRobot, obj: str) -> None:
@@ -214,22 +287,27 @@ def pick(robot: SimulatedRobot, obj: str) -> None:
             "PickWhileHolding", f'the robot holds "{robot.held}" and cannot pick up "{obj}" as well'
         )
     here = robot.things[robot.room]
-    thing = next((thing for thing in here if thing.is_meant_by(obj)), None)
+    thing = next((thing for thing in here if thing.is_meant_by(obj, robot.rules.matching)), None)
     if thing is None:
         raise RobotError("PickInvalidObject", f'there is no "{obj}" in "{robot.room}"')
     here.remove(thing)
-    robot.held = obj
-    robot.record("pick", obj)
+    robot.held, robot.taken = obj, thing
+    robot.record("pick", obj if robot.rules.events == "as-requested" else thing.label)
 
 
 def place(robot: SimulatedRobot, obj: str) -> None:
-    """Put down what the robot holds, which must be named exactly as it was picked up."""
-    if robot.held is None or robot.held != obj:
+    """Put down what the robot holds, which must be named as it was picked up.
+
+    Where events are recorded as they happened, another name for what it holds will do, and it is the same thing.
+    """
+    taken = robot.taken if robot.rules.events == "as-happened" else None
+    is_meant = taken is not None and taken.is_meant_by(obj, robot.rules.matching)
+    if robot.held is None or (robot.held != obj and not is_meant):
         holds = "nothing" if robot.held is None else f'"{robot.held}"'
         raise RobotError("PlaceNoObject", f'the robot cannot place "{obj}": it holds {holds}')
-    robot.things[robot.room].append(Thing(obj, is_pattern=False))
-    robot.held = None
-    robot.record("place", obj)
+    robot.things[robot.room].append(taken or Thing(obj, is_pattern=False))
+    robot.held = robot.taken = None
+    robot.record("place", taken.label if taken else obj)
 
 
 BEHAVIOURS: Mapping[str, Behaviour] = {

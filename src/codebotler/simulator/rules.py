@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Literal
+from typing import Literal, TypeAlias
+
+Matching: TypeAlias = Literal["label-in-request", "whole-words"]
+"""How a label of the world is looked for in what a program asks for."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +36,23 @@ class Rules:
     Args:
         literals: `lowercase` lowers the string literals of a program before the run, as the authors of the
             paper did; `as-written` is what a robot does.
-        matching: how a request finds a room, an object or a person.
-        people: who answers to which name.
+        matching: how a request finds a room, an object or a person: if the label is found anywhere in it
+            (`label-in-request`), or as whole words, in the singular or the plural (`whole-words`).
+        people: who answers to which name: everybody to any (`answer-to-any-name`), or each to their own and to
+            a word for people, as well as to no name at all (`own-name-or-word`).
+        words_for_people: regexes of the words for people, for `own-name-or-word`.
+        events: whether drives, picks and places are recorded by the words of the request (`as-requested`), or by
+            the room that was reached and the thing that was moved (`as-happened`). A drive that reaches no room
+            is then no event.
         limits: what a run may spend.
         clock_starts: what the program's clock shows when the run starts.
     """
 
     literals: Literal["lowercase", "as-written"] = "lowercase"
-    matching: Literal["label-in-request"] = "label-in-request"
-    people: Literal["answer-to-any-name"] = "answer-to-any-name"
+    matching: Matching = "label-in-request"
+    people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
+    words_for_people: tuple[str, ...] = ()
+    events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)
     clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)
 
