@@ -18,7 +18,8 @@ from codebotler.rtl.wording import listed
 from codebotler.simulator.robot import resolve_room
 from roboeval.findings import Finding, Kind
 from roboeval.names import absent_names
-from roboeval.satisfiability import Reasoner, Undecided, elements
+from roboeval.representatives import elements
+from roboeval.satisfiability import Reasoner, Undecided
 from roboeval.suite import Check, Requirement, Scenario, Task
 from roboeval.trials import Verdicts
 from roboeval.witnesses import can_match, representative_texts, samples
@@ -209,7 +210,8 @@ class _Place:
 
     @cached_property
     def plain_moves(self) -> Reasoner:
-        return Reasoner((r.formula for r in self.scenario.require), self.requests)
+        moves = {request: resolve_room(self.rooms, request) or request for request in self.requests}
+        return Reasoner((r.formula for r in self.scenario.require), moves, self.scenario.world.robot)
 
     @cached_property
     def requests(self) -> list[str]:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from codebotler.rtl import Element
 from codebotler.world import Room
-from roboeval.satisfiability import elements
+from roboeval.representatives import elements
 from roboeval.suite import Requirement, Scenario, Task
 from roboeval.witnesses import alternatives, is_among, patterns, spelled_out
 

@@ -28,11 +28,10 @@ from codebotler.rtl import (
     Not,
     Or,
     Test,
-    Text,
     holds,
 )
-from codebotler.trace import Event, Option, Trace
-from roboeval.witnesses import representative_texts
+from codebotler.trace import Event, Trace
+from roboeval.representatives import elements, fits, representative_events
 
 MOST_STATES = 1_000
 """How many states one automaton may have before it is made as small as can be."""
@@ -54,15 +53,23 @@ class Reasoner:
 
     Args:
         formulas: all that will be asked about; their regexes make the representative events.
-        moves: the requests by which the robot moves; by default any text, which may name several rooms at
-            once, or none that there is.
+        moves: the requests by which the robot moves, and where each leads; by default any text, which may
+            name several rooms at once, or none that there is, and may lead anywhere.
+        start: the room in which the robot starts, where moves are given.
     """
 
-    def __init__(self, formulas: Iterable[Formula], moves: Iterable[str] | None = None) -> None:
-        self.events = representative_events(chain.from_iterable(map(elements, formulas)))
+    def __init__(
+        self, formulas: Iterable[Formula], moves: Mapping[str, str] | None = None, start: str = ""
+    ) -> None:
+        rooms = None if moves is None else [*dict.fromkeys([start, *moves.values()])]
+        wanted = [*chain.from_iterable(map(elements, formulas))]
+        self.events = representative_events(wanted, rooms)
         if moves is not None:
             self.events = [event for event in self.events if event.kind != "goto"]
             self.events += [Event("goto", move) for move in moves]
+        self._driving = None
+        if moves is not None and rooms is not None and any(e.place is not None for e in wanted):
+            self._driving = _driving(self.events, rooms, moves)
         self._readings: dict[Formula, tuple[Automaton, tuple[int, ...]]] = {}
 
     def clash(self, formulas: Sequence[Formula], denied: Formula | None = None) -> tuple[Formula, ...] | None:
@@ -108,6 +115,8 @@ class Reasoner:
         if denied is not None:
             automaton, letters = self._reading(denied)
             readings.append((automaton.complement, letters))
+        if self._driving is not None:
+            readings.append(self._driving)
         # Events that no automaton tells apart are one letter of their product.
         alphabet: dict[tuple[int, ...], Event] = {}
         for event, *letters_of_event in zip(self.events, *(letters for _, letters in readings), strict=True):
@@ -118,11 +127,30 @@ class Reasoner:
         """The formula's automaton, and which of its letters each representative event is."""
         if formula not in self._readings:
             seen = [*dict.fromkeys(elements(formula))]
-            letters = [frozenset(e for e in seen if _fits(e, event)) for event in self.events]
+            letters = [frozenset(e for e in seen if fits(e, event)) for event in self.events]
             number = {letter: index for index, letter in enumerate(dict.fromkeys(letters))}
             automaton = Automaton.of(_machine(formula), tuple(number))
             self._readings[formula] = automaton, tuple(number[letter] for letter in letters)
         return self._readings[formula]
+
+
+def _driving(
+    events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]
+) -> tuple[Automaton, tuple[int, ...]]:
+    """What accepts the traces in which each event happens where the robot is, and how it reads the events."""
+    lost = len(rooms)
+    letters: dict[tuple[str, str], int] = {}
+    kinds = [(event.text if event.kind == "goto" else "", event.place) for event in events]
+    reading = tuple(letters.setdefault(kind, len(letters)) for kind in kinds)
+
+    def after(here: int, move: str, place: str) -> int:
+        if move:
+            return rooms.index(moves[move])
+        return here if rooms[here] == place else lost
+
+    rows = [tuple(after(here, *kind) for kind in letters) for here in range(lost)]
+    rows.append((lost,) * len(letters))
+    return Automaton(tuple(rows), (*(True for _ in rooms), False)), reading
 
 
 def _path(automata: Sequence[Automaton], alphabet: Mapping[tuple[int, ...], Event]) -> Trace | None:
@@ -344,57 +372,3 @@ def _behind(cut: Cut, inner: _Machine) -> _Machine:
                 inner.accepts,
             )
     assert_never(cut.name)
-
-
-# --- representative events
-
-
-def elements(formula: Formula) -> Iterator[Element]:
-    """Everything that a formula looks for, in the order of its text; for a stay, the moves that bound it."""
-    match formula:
-        case And(parts) | Or(parts):
-            for part in parts:
-                yield from elements(part)
-        case Not(part):
-            yield from elements(part)
-        case _:
-            yield from (cut.element for cut in formula.cuts)
-            if isinstance(formula, ActAtFirst | ActAtSome):
-                yield from (formula.stay.arrival, formula.stay.departure)
-            yield formula.element
-
-
-def representative_events(wanted: Iterable[Element]) -> list[Event]:
-    """Events that match the elements in all combinations for which texts were found.
-
-    Args:
-        wanted: what the events are to be told apart by.
-    """
-    kinds: dict[str, list[Element]] = {}
-    for element in dict.fromkeys(wanted):
-        kinds.setdefault(element.kind, []).append(element)
-    events = []
-    for kind, alike in kinds.items():
-        texts = representative_texts(tuple(dict.fromkeys(element.text for element in alike)))
-        options = (element.options for element in alike if element.options is not None)
-        choices = _choices(tuple(dict.fromkeys(options)))
-        events += [Event(kind, text, choice) for text in texts for choice in choices]
-    return events
-
-
-def _choices(wanted: tuple[Text, ...]) -> Iterable[tuple[Option, ...]]:
-    """Options of which some match, in all combinations; one may match what another cannot match as well."""
-    found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
-    for text in representative_texts(wanted, outer=True):
-        matched = frozenset(one for one in wanted if one.matches(text))
-        for already, choice in tuple(found.items()):
-            found.setdefault(already | matched, (*choice, Option(text)))
-    return found.values()
-
-
-def _fits(element: Element, event: Event) -> bool:
-    return (
-        element.kind == event.kind
-        and element.text.matches(event.text)
-        and (element.options is None or any(element.options.matches(o.text) for o in event.options))
-    )

@@ -15,7 +15,7 @@ from itertools import chain, combinations, islice, permutations, product, zip_lo
 from random import Random
 from typing import Any
 
-from codebotler.rtl import Regex, Text, Without, Words
+from codebotler.rtl import Claim, Number, Regex, Text, Time, Without, Words
 from codebotler.simulator.robot import found_in
 
 _MOST_SAMPLES = 4
@@ -56,7 +56,8 @@ def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
         for group in (samples(pattern, outer=outer), _forbidden(pattern))
         if group
     ]
-    words = [*dict.fromkeys(chain.from_iterable(groups))]
+    claims = [*dict.fromkeys(chain.from_iterable(map(claimed, texts)))]
+    words = [*dict.fromkeys([*chain.from_iterable(groups), *claims])]
     whole = [word for word in words if word]
     hidden = [f"x{word}x" for word in whole]
     pairs = (f"{one} {other}" for one, other in product([*whole, *hidden], repeat=2))
@@ -94,8 +95,29 @@ def patterns(text: Text) -> Iterator[str]:
         case Words(parts):
             for part in parts:
                 yield from patterns(part)
-        case Regex(pattern) | Without(pattern):
+        case Regex(pattern) | Without(pattern) | Claim(pattern):
             yield pattern
+        case Number(_, thing, others):
+            yield from (thing, *others)
+        case Time():
+            return
+
+
+def claimed(text: Text) -> Iterator[str]:
+    """Texts that claim what a text of RTL is about, rightly or wrongly."""
+    match text:
+        case Words(parts):
+            yield from chain.from_iterable(map(claimed, parts))
+        case Number(number, thing, _):
+            for one, how_many in product(samples(thing), (number, number + 1)):
+                yield f"{how_many} {one}"
+        case Time(start, end):
+            yield from (start, end, "03:07", f"{start} or 03:07")
+        case Claim(pattern):
+            for one in samples(pattern):
+                yield from (f"there is {one}", f"there is no {one}")
+        case Regex() | Without():
+            return
 
 
 def alternatives(pattern: str) -> list[str]:

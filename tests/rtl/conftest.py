@@ -1,5 +1,7 @@
 """Random traces and formulas, small enough to meet each other."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
@@ -9,16 +11,19 @@ from codebotler.rtl import (
     ActAtSome,
     And,
     AtLeast,
+    Claim,
     Count,
     Cut,
     Element,
     Exists,
     Formula,
     Not,
+    Number,
     Or,
     Regex,
     Test,
     Text,
+    Time,
     Without,
     Words,
 )
@@ -39,9 +44,23 @@ def texts_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
 
 
 def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[Element]:
-    texts = texts_from(patterns)
+    texts = texts_from(patterns) | claims_from(patterns)
     plain = st.builds(Element, st.sampled_from(PLAIN), texts)
-    return plain | st.builds(Element, st.just("ask"), texts, texts)
+    asked = st.builds(Element, st.just("ask"), texts, texts)
+    mentioned = st.builds(Element, st.just("ask"), texts, st.none(), st.just(value=True))
+    anywhere = plain | asked | mentioned
+    return anywhere | st.builds(lambda element, p: replace(element, place=p), anywhere, patterns)
+
+
+def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
+    others = st.lists(patterns, max_size=2).map(tuple)
+    return st.one_of(
+        st.builds(Number, st.integers(0, 3), patterns, others, st.booleans()),
+        st.builds(
+            Time, st.sampled_from(["0:30", "11:00"]), st.sampled_from(["12:00", "13:30"]), st.booleans()
+        ),
+        st.builds(Claim, patterns, st.booleans()),
+    )
 
 
 def tests_from(patterns: SearchStrategy[str]) -> SearchStrategy[Test]:
@@ -69,8 +88,9 @@ def formulas_from(patterns: SearchStrategy[str]) -> SearchStrategy[Formula]:
 
 
 def traces_from(options: SearchStrategy[Option]) -> SearchStrategy[Trace]:
-    plain = st.builds(Event, st.sampled_from(PLAIN), NAMES)
-    asked = st.builds(Event, st.just("ask"), NAMES, st.lists(options, max_size=2).map(tuple))
+    texts = NAMES | st.sampled_from(["2 a", "no b", "11:00", "3 a and 2 b"])
+    plain = st.builds(Event, st.sampled_from(PLAIN), texts, place=NAMES)
+    asked = st.builds(Event, st.just("ask"), texts, st.lists(options, max_size=2).map(tuple), place=NAMES)
     return st.lists(plain | asked, max_size=8).map(tuple)
 
 

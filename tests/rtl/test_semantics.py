@@ -16,16 +16,19 @@ from codebotler.rtl import (
     And,
     AtLeast,
     CannotJudge,
+    Claim,
     Count,
     Cut,
     Element,
     Exists,
     Formula,
     Not,
+    Number,
     Or,
     Regex,
     Test,
     Text,
+    Time,
     Without,
     Words,
     holds,
@@ -61,9 +64,15 @@ def pattern(text: Text) -> str:
             return rf"^(?!.*\b(?:{regex})\b).*$"
         case Words(parts):
             return "^" + "".join(f"(?=.*(?:{pattern(part)}))" for part in parts) + ".*$"
+        case Number() | Time() | Claim():
+            raise AssertionError("what a text claims is no regex; test_claims.py is about it")
 
 
 def found(text: Text, actual: str) -> bool:
+    if isinstance(text, Number | Time | Claim):
+        return text.matches(actual)
+    if isinstance(text, Words):
+        return all(found(part, actual) for part in text.parts)
     return re.search(pattern(text), actual, re.IGNORECASE | re.DOTALL) is not None
 
 
@@ -71,6 +80,10 @@ def same(element: Element, placed: tuple[int, Event]) -> bool:
     at, event = placed
     if event.kind != element.kind:
         return False
+    if element.place is not None and not found(Regex(rf"\b(?:{element.place})\b"), event.place):
+        return False
+    if element.mention:
+        return any(found(element.text, text) for text in (event.text, *(o.text for o in event.options)))
     if element.options is None:
         return found(element.text, event.text)
     offered = False

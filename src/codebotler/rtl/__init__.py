@@ -1,5 +1,6 @@
 """The Robot Temporal Logic of the paper: parse a formula, test it on a trace, and say why it fails."""
 
+from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.explain import Explanation, explain
 from codebotler.rtl.formula import (
     ActAtFirst,
@@ -28,6 +29,7 @@ __all__ = [
     "And",
     "AtLeast",
     "CannotJudge",
+    "Claim",
     "Count",
     "Cut",
     "Element",
@@ -35,11 +37,13 @@ __all__ = [
     "Explanation",
     "Formula",
     "Not",
+    "Number",
     "Or",
     "Regex",
     "RtlSyntaxError",
     "Test",
     "Text",
+    "Time",
     "Without",
     "Words",
     "explain",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, TypeAlias
+
+from codebotler.rtl.claims import Claim, Number, Time
+from codebotler.rtl.pattern import compile_regex, quote, whole_word
 
 CutName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
 
@@ -47,7 +49,7 @@ class Without:
     @cached_property
     def compiled(self) -> re.Pattern[str]:
         """The regex between word boundaries, ready to search with."""
-        return compile_regex(rf"\b(?:{self.pattern})\b")
+        return whole_word(self.pattern)
 
     def matches(self, text: str) -> bool:
         """Whether the regex is nowhere in a text, or only inside words."""
@@ -75,7 +77,7 @@ class Words:
         return f"words({', '.join(map(str, self.parts))})"
 
 
-Text: TypeAlias = Regex | Words | Without
+Text: TypeAlias = Regex | Words | Without | Number | Time | Claim
 
 
 @dataclass(frozen=True)
@@ -84,17 +86,31 @@ class Element:
 
     Args:
         kind: the kind of the event, such as `goto`.
-        text: what the event's text must match.
-        options: what at least one option must match; None for kinds without options.
+        text: what the event's text must match; for a mention, the question or one of its options.
+        options: what at least one option must match; None for kinds without options, and for a mention.
+        mention: whether it is a question that has the text anywhere, also among its options.
+        place: a regex for the room in which it must happen, found there as a whole word; None for anywhere.
     """
 
     kind: str
     text: Text
     options: Text | None = None
+    mention: bool = False
+    place: str | None = None
+
+    @cached_property
+    def is_place(self) -> re.Pattern[str] | None:
+        """The regex for the room, ready to search with."""
+        return None if self.place is None else whole_word(self.place)
+
+    def happens_at(self, room: str) -> bool:
+        """Whether what happens in a room may be meant."""
+        return self.is_place is None or self.is_place.search(room) is not None
 
     def __str__(self) -> str:
         texts = [self.text] if self.options is None else [self.text, self.options]
-        return f"{self.kind}({', '.join(map(str, texts))})"
+        told = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
+        return told if self.place is None else f"at({quote(self.place)}, {told})"
 
 
 @dataclass(frozen=True)
@@ -276,36 +292,6 @@ class Stay:
     def at(cls, place: str) -> Stay:
         """A stay at the place that a regex names."""
         return cls(Element("goto", Regex(place)), Element("goto", Without(place)))
-
-
-def compile_regex(pattern: str) -> re.Pattern[str]:
-    """A regex as RTL understands it.
-
-    Args:
-        pattern: the regex.
-
-    Raises:
-        re.error: it is none.
-    """
-    with warnings.catch_warnings():
-        # `[[` and the like may mean something else in a later Python; in this one they are plain.
-        warnings.simplefilter("ignore", FutureWarning)
-        return re.compile(pattern, re.IGNORECASE | re.DOTALL)
-
-
-def quote(text: str) -> str:
-    """A regex as RTL writes it: in double quotes, raw where it holds backslashes, if that is possible.
-
-    Args:
-        text: the regex.
-    """
-    if "\\" in text and '"' not in text and text.isprintable():
-        # No regex ends with a single backslash, so the closing quote is safe.
-        return f'r"{text}"'
-    if '"' in text:
-        return repr(text)
-    # A single quote makes `repr` choose double ones.
-    return '"' + repr("'" + text)[2:]
 
 
 def _cut_trace(cuts: Cuts) -> str:

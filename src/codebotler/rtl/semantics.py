@@ -103,8 +103,10 @@ def matches(element: Element, trace: Trace, at: int) -> bool:
             matches; whether the question's text matches plays no part.
     """
     event = trace[at]
-    if event.kind != element.kind:
+    if event.kind != element.kind or not element.happens_at(event.place):
         return False
+    if element.mention and any(element.text.matches(option.text) for option in event.options):
+        return True
     if element.options is not None and not _offers(element, event, at):
         return False
     return element.text.matches(event.text)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import ast
 import re
 import warnings
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, get_args
 
+from codebotler.rtl.claims import Claim, Number, Time, minutes
 from codebotler.rtl.formula import (
     ActAtFirst,
     ActAtSome,
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
 CUTS: dict[str, CutName] = {name: name for name in get_args(CutName)}
 TESTS = {"Exists": 1, "ActAtFirst": 2, "ActAtSome": 2, "Count": 2, "AtLeast": 2}
 """How many arguments each test takes."""
+
+CLAIMS = ("number", "othernumber", "time", "othertime", "affirms", "denies")
+"""What a text may claim."""
 
 DEEPEST = 50
 """How deep a formula may be nested, and how many cuts may stand in a row; few enough for Python's stack."""
@@ -165,14 +170,25 @@ class _Parser:
 
     def element(self, node: ast.expr) -> Element:
         match node:
-            case ast.Call(ast.Name(kind), arguments, keywords):
-                if kind not in self.recordings:
-                    raise self.unknown(node, f"element {kind}", kind, self.recordings)
+            case ast.Call(ast.Name("at"), arguments, keywords):
                 self.no_keywords(keywords)
-                asks = self.recordings[kind].options is not None
+                self.count_arguments(node, "at", arguments, 2)
+                inner = self.element(arguments[1])
+                if inner.place is not None:
+                    raise self.error(arguments[1], "at cannot stand in another at")
+                return replace(inner, place=self.without(arguments[0]).pattern)
+            case ast.Call(ast.Name(kind), arguments, keywords):
+                asking = next((k for k, row in self.recordings.items() if row.options is not None), None)
+                is_mention = kind == "mention" and asking is not None and kind not in self.recordings
+                if not is_mention and kind not in self.recordings:
+                    raise self.unknown(node, f"element {kind}", kind, [*self.recordings, "mention", "at"])
+                self.no_keywords(keywords)
+                asks = not is_mention and self.recordings[kind].options is not None
                 self.count_arguments(node, kind, arguments, 2 if asks else 1)
                 texts = [self.matched(argument, 0) for argument in arguments]
-                return Element(kind, *texts)
+                return (
+                    Element(asking, *texts, mention=True) if is_mention and asking else Element(kind, *texts)
+                )
         raise self.expected('an element such as goto("lobby")', node)
 
     def matched(self, node: ast.expr, depth: int) -> Text:
@@ -189,9 +205,37 @@ class _Parser:
                 self.no_keywords(keywords)
                 self.count_arguments(node, "without", arguments, 1)
                 return self.without(arguments[0])
+            case ast.Call(ast.Name(name), arguments, keywords) if name in CLAIMS:
+                self.no_keywords(keywords)
+                return self.claim(node, name, arguments)
             case ast.Call(ast.Name(name)):
-                raise self.unknown(node, f"text helper {name}", name, ["words", "without"])
+                raise self.unknown(node, f"text helper {name}", name, ["words", "without", *CLAIMS])
         raise self.expected("a string, words(...) or without(...)", node)
+
+    def claim(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Text:
+        match name:
+            case "affirms" | "denies":
+                self.count_arguments(node, name, arguments, 1)
+                return Claim(self.without(arguments[0]).pattern, name == "denies")
+            case "time" | "othertime":
+                self.count_arguments(node, name, arguments, 2)
+                start, end = (self.time(argument) for argument in arguments)
+                return Time(start, end, name == "othertime")
+        if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
+            raise self.error(node, f"{name} takes a number, a thing and perhaps other things")
+        number, (thing, *others) = (
+            self.number(arguments[0]),
+            [self.without(one).pattern for one in arguments[1:]],
+        )
+        return Number(number, thing, tuple(others), name == "othernumber")
+
+    def time(self, node: ast.expr) -> str:
+        text = self.regex(node)
+        try:
+            minutes(text)
+        except ValueError as error:
+            raise self.error(node, str(error)) from None
+        return text
 
     def without(self, node: ast.expr) -> Without:
         text = Without(self.regex(node))

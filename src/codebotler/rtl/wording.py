@@ -6,7 +6,9 @@ import re
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from codebotler.rtl.choice import PLAIN, choices
-from codebotler.rtl.formula import Element, Regex, Text, Without, Words, compile_regex
+from codebotler.rtl.claims import Claim, Number, Time
+from codebotler.rtl.formula import Element, Regex, Text, Without, Words
+from codebotler.rtl.pattern import compile_regex
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -40,7 +42,7 @@ _SHOWN = 70
 _MOST = 5
 
 
-def did(deed: Deed, form: Form, *, never: bool = False) -> str:  # noqa: PLR0911 - one for each kind
+def did(deed: Deed, form: Form, *, never: bool = False) -> str:
     """A deed as a verb and its object, such as `asked about lunch`.
 
     Args:
@@ -48,9 +50,14 @@ def did(deed: Deed, form: Form, *, never: bool = False) -> str:  # noqa: PLR0911
         form: of the verb.
         never: whether `never` or `not` stands before it, so that it is `anything` rather than `something`.
     """
+    done, place = _did(deed, form, never=never), deed[0].place
+    return done if place is None else f"{done} in {room(place)}"
+
+
+def _did(deed: Deed, form: Form, *, never: bool) -> str:  # noqa: PLR0911 - one for each kind
     element = deed[0]
     verb = _VERBS.get(element.kind, _OTHER_VERB)[form]
-    if len(deed) > 1:
+    if len(deed) > 1 or (element.mention and not is_any(element.text)):
         return _mentioned(deed, form, verb)
     if element.kind == "check" and is_any(element.text):
         return f"{verb.removesuffix(' for')} around"
@@ -150,6 +157,27 @@ def lacks(text: Text, actual: str) -> list[str]:
             if (start := _forbidden_start(pattern)) and (found := compile_regex(start).match(actual)):
                 return [f"starts with {quoted(found[0])}"]
             return [f"lacks {named}" if (named := _named(pattern)) else f"does not match {_pattern(pattern)}"]
+        case Number() | Time() | Claim():
+            return [] if text.matches(actual) else [f"does not {_claimed(text, does=True)}"]
+
+
+def _claimed(text: Number | Time | Claim, *, does: bool) -> str:
+    """What a text claims, after `does not` or after `that`."""
+    ending = "" if does else "s"
+    match text:
+        case Number(number, thing, _, other):
+            given = f"another number than {number} for" if other else f"{number} as the number of"
+            return f"give{ending} {given} {_plainly(thing)}"
+        case Time(start, end, other):
+            return f"name{ending} a time {'not ' * other}from {start} to {end}"
+        case Claim(pattern, denied):
+            verb = ("deny" if does else "denies") if denied else f"affirm{ending}"
+            return f"{verb} something of {_plainly(pattern)}"
+
+
+def _plainly(pattern: str) -> str:
+    names = literals(pattern)
+    return f'"{_either(names)}"' if names else _pattern(pattern)
 
 
 def missing(text: Text, actual: str) -> int:
@@ -249,7 +277,7 @@ def is_any(text: Text) -> bool:
             return all(map(is_any, parts))
         case Regex(pattern):
             return pattern in {"", ".*", "^.*$"}
-        case Without():
+        case Without() | Number() | Time() | Claim():
             return False
 
 
@@ -277,6 +305,8 @@ def _qualities(text: Text) -> list[str]:
             return [
                 f"with {named}" if (named := _named(pattern)) else f"matching the pattern {_pattern(pattern)}"
             ]
+        case Number() | Time() | Claim():
+            return [f"that {_claimed(text, does=False)}"]
 
 
 def _named(pattern: str) -> str:
@@ -322,7 +352,7 @@ def _destination(text: Text, anywhere: str) -> str:
                 if anywhere == "anywhere"
                 else f"elsewhere than to {room(pattern)}"
             )
-        case Words():
+        case _:
             return f"to a room {with_texts(text)}"
 
 

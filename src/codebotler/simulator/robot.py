@@ -218,7 +218,7 @@ def is_found_by_itself(room: str) -> bool:
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
-    """The first room whose name is found in a request; by whole words, the room of just that name if there is one."""
+    """The first room whose name is found in a request; by whole words, one of just that name before it."""
     if matching == "whole-words" and request in rooms:
         return request
     return next((room for room in rooms if finds(request, room, matching)), None)
@@ -298,7 +298,7 @@ def pick(robot: SimulatedRobot, obj: str) -> None:
 def place(robot: SimulatedRobot, obj: str) -> None:
     """Put down what the robot holds, which must be named as it was picked up.
 
-    Where events are recorded as they happened, another name for what it holds will do, and it is the same thing.
+    Where events are recorded as they happened, another name for what it holds will do, and it stays the same.
     """
     taken = robot.taken if robot.rules.events == "as-happened" else None
     is_meant = taken is not None and taken.is_meant_by(obj, robot.rules.matching)

@@ -38,12 +38,12 @@ class Rules:
             paper did; `as-written` is what a robot does.
         matching: how a request finds a room, an object or a person: if the label is found anywhere in it
             (`label-in-request`), or as whole words, in the singular or the plural (`whole-words`).
-        people: who answers to which name: everybody to any (`answer-to-any-name`), or each to their own and to
-            a word for people, as well as to no name at all (`own-name-or-word`).
+        people: who answers to which name: everybody to any (`answer-to-any-name`), or each to their own and
+            to a word for people, as well as to no name at all (`own-name-or-word`).
         words_for_people: regexes of the words for people, for `own-name-or-word`.
-        events: whether drives, picks and places are recorded by the words of the request (`as-requested`), or by
-            the room that was reached and the thing that was moved (`as-happened`). A drive that reaches no room
-            is then no event.
+        events: whether drives, picks and places are recorded by the words of the request (`as-requested`), or
+            by the room that was reached and the thing that was moved (`as-happened`). A drive that reaches no
+            room is then no event.
         limits: what a run may spend.
         clock_starts: what the program's clock shows when the run starts.
     """

@@ -1,0 +1,176 @@
+"""What a text claims: how many there are of a thing, a time of day, and what it affirms or denies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from codebotler.rtl.clauses import clauses, denies_something, sentences
+from codebotler.rtl.clock import TimeOfDay, times_in
+from codebotler.rtl.numerals import numerals
+from codebotler.rtl.pattern import compile_regex, quote, whole_word
+
+
+@dataclass(frozen=True)
+class Number:
+    """A text that gives a number of a thing.
+
+    Args:
+        number: how many.
+        thing: a regex for it, found as a whole word; in the plural, too.
+        others: regexes for other things, whose numbers are not meant.
+        other: whether the text must give another number of the thing instead.
+    """
+
+    number: int
+    thing: str
+    others: tuple[str, ...] = ()
+    other: bool = False
+
+    def matches(self, text: str) -> bool:
+        """Whether the text gives just this number of the thing; or, if that is wanted, another."""
+        given = self.given(text)
+        return bool(given) and (given != {self.number}) == self.other
+
+    def given(self, text: str) -> set[float]:
+        """All numbers that a text gives of the thing.
+
+        In each clause a number belongs to the thing next to it: the one that follows, or, where things come
+        first, the one before. A text that does not name the thing gives all numbers that belong to no other.
+        """
+        kinds = self._kinds
+        parts = [[*_marks(clause, kinds)] for sentence in sentences(text) for clause in clauses(sentence)]
+        named = any(kind == 0 for part in parts for kind, _ in part)
+        if not named:
+            return {n for part in parts if not any(kind for kind, _ in part) for _, ns in part for n in ns}
+        found = {n for part in parts for n in _paired(part)}
+        return found or {n for sentence in sentences(text) for n in _paired([*_marks(sentence, kinds)])}
+
+    @cached_property
+    def _kinds(self) -> tuple[re.Pattern[str], ...]:
+        return tuple(map(_word, (self.thing, *self.others)))
+
+    def __str__(self) -> str:
+        head = "othernumber" if self.other else "number"
+        return f"{head}({', '.join([str(self.number), *map(quote, (self.thing, *self.others))])})"
+
+
+def _word(pattern: str) -> re.Pattern[str]:
+    """A regex as a whole word, in the singular or the plural; what is no word, such as `%`, may touch one."""
+    return compile_regex(rf"(?:\b|(?=\W))(?:{pattern})(?:e?s)?(?:\b|(?<=\W))")
+
+
+Mark = tuple[int | None, tuple[float, ...]]
+"""A thing, by its number, with no numbers; or None with the numbers that stand together."""
+
+
+def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
+    """The things and numbers in a text, in their order; no number is part of the name of a thing."""
+    things = [
+        (match.start(), match.end(), kind)
+        for kind, regex in enumerate(kinds)
+        for match in regex.finditer(text)
+    ]
+    things = [one for one in things if not any(_covers(other, one) for other in things)]
+    found: list[tuple[int, Mark]] = [(start, (kind, ())) for start, _, kind in things]
+    for start, end, numbers in numerals(text):
+        if not any(begin < end and start < stop for begin, stop, _ in things):
+            found.append((start, (None, numbers)))
+    yield from (mark for _, mark in sorted(found, key=lambda one: one[0]))
+
+
+def _covers(one: tuple[int, int, int], other: tuple[int, int, int]) -> bool:
+    """Whether the name of one thing holds that of another in it, or is the same and stands first."""
+    holds = one[0] <= other[0] and other[1] <= one[1]
+    return holds and (one[:2] != other[:2] or one[2] < other[2])
+
+
+def _paired(marks: list[Mark]) -> Iterator[float]:
+    """The numbers that belong to the thing: numbers before things, or after, whichever comes first."""
+    ordered = marks if marks and marks[0][0] is None else marks[::-1]
+    numbers: tuple[float, ...] = ()
+    for kind, given in ordered:
+        if kind is None:
+            numbers = given
+        else:
+            yield from numbers if kind == 0 else ()
+            numbers = ()
+
+
+@dataclass(frozen=True)
+class Time:
+    """A text that names times of day.
+
+    Args:
+        start: the earliest, as `11:00`.
+        end: the latest.
+        other: whether some time that is named must lie outside instead; else all lie between the two.
+    """
+
+    start: str
+    end: str
+    other: bool = False
+
+    def matches(self, text: str) -> bool:
+        """Whether times are named, and lie between the two; or, if that is wanted, some do not.
+
+        A time that may be in the morning or in the afternoon is the one that lies between the two.
+        """
+        named = times_in(text)
+        inside = [
+            any(self._minutes[0] <= time <= self._minutes[1] for time in readings) for readings in named
+        ]
+        return not all(inside) if self.other else bool(inside) and all(inside)
+
+    @cached_property
+    def _minutes(self) -> tuple[TimeOfDay, TimeOfDay]:
+        return minutes(self.start), minutes(self.end)
+
+    def __str__(self) -> str:
+        return f"{'othertime' if self.other else 'time'}({quote(self.start)}, {quote(self.end)})"
+
+
+def minutes(time: str) -> TimeOfDay:
+    """A time such as `11:30` in minutes since midnight.
+
+    Args:
+        time: hours and minutes.
+
+    Raises:
+        ValueError: it is none.
+    """
+    match = re.fullmatch(r"(\d\d?):(\d\d)", time)
+    if match is None or int(match[1]) > 24 or int(match[2]) > 59:  # noqa: PLR2004 - hours and minutes
+        raise ValueError(f'"{time}" is no time of day such as "11:30"')
+    return int(match[1]) * 60 + int(match[2])
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A text in which something is named in a clause that denies nothing, or in one that denies something.
+
+    Args:
+        pattern: a regex for what is named, found as a whole word.
+        denied: whether it must be denied.
+    """
+
+    pattern: str
+    denied: bool = False
+
+    @cached_property
+    def compiled(self) -> re.Pattern[str]:
+        """The regex between word boundaries, ready to search with."""
+        return whole_word(self.pattern)
+
+    def matches(self, text: str) -> bool:
+        """Whether some clause names it and denies something, or not, as is wanted."""
+        return any(
+            self.compiled.search(clause) is not None and denies_something(clause) == self.denied
+            for sentence in sentences(text)
+            for clause in clauses(sentence, lists=True)
+        )
+
+    def __str__(self) -> str:
+        return f"{'denies' if self.denied else 'affirms'}({quote(self.pattern)})"

@@ -1,0 +1,77 @@
+"""The times of day that a text names."""
+
+from __future__ import annotations
+
+import re
+from typing import TypeAlias
+
+from codebotler.rtl.clauses import sentences
+
+TimeOfDay: TypeAlias = int
+"""Minutes since midnight."""
+
+_NAMES = ["one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
+_HOURS = {word: number for number, word in enumerate(_NAMES, start=1)}
+
+
+def _hour(kind: str) -> str:
+    return rf"(?P<hour{kind}>\d{{1,2}}|{'|'.join(_NAMES)})"
+
+
+def _half(kind: str) -> str:
+    return rf"(?:\s*(?P<half{kind}>[ap])m\b)"
+
+
+_START = r"(?<![\w:.])"
+_CLOCK = re.compile(
+    rf"{_START}{_hour('')}[:.](?P<minute>[0-5]\d)(?!\d|:\d){_half('')}?"
+    rf"|{_START}(?P<past>half|(?:a )?quarter) (?P<side>past|to) {_hour('1')}\b{_half('1')}?"
+    rf"|{_START}{_hour('2')}[ -](?P<word>thirty|fifteen|forty-five)\b{_half('2')}?"
+    rf"|{_START}{_hour('3')}(?:{_half('3')}|\s*o['\u2019]?\s?clock\b{_half('4')}?)"
+    r"|\b(?P<noon>noon|mid-?day)\b|\b(?P<midnight>midnight)\b",
+    re.IGNORECASE,
+)
+_ALONE = re.compile(rf"\s*(?:(?:at|around|about)\s+)?{_hour('')}\s*", re.IGNORECASE)
+_DAY = 24 * 60
+
+
+def times_in(text: str) -> list[tuple[TimeOfDay, ...]]:
+    """The times of day in a text; of each both readings where it may be in the morning or the afternoon.
+
+    `12 pm`, `12:00`, `noon`, `twelve o'clock` and `half past twelve` are times, and so is a text that is no
+    more than an hour.
+
+    Args:
+        text: any text.
+    """
+    told = ". ".join(sentences(text))
+    if alone := _ALONE.fullmatch(told):
+        return _readings(alone["hour"], 0, None)
+    return [time for match in _CLOCK.finditer(told) for time in _of(match)]
+
+
+def _of(match: re.Match[str]) -> list[tuple[TimeOfDay, ...]]:
+    if match["noon"]:
+        return [(_DAY // 2,)]
+    if match["midnight"]:
+        return [(0, _DAY)]
+    hour = next(match[name] for name in ("hour", "hour1", "hour2", "hour3") if match[name])
+    half = next((match[name] for name in ("half", "half1", "half2", "half3", "half4") if match[name]), None)
+    minute = int(match["minute"] or 0)
+    if match["past"]:
+        minute = 30 if match["past"].lower() == "half" else 15
+        minute = -minute if match["side"].lower() == "to" else minute
+    if match["word"]:
+        minute = {"thirty": 30, "fifteen": 15}.get(match["word"].lower(), 45)
+    return _readings(hour, minute, half)
+
+
+def _readings(hour: str, minute: int, half: str | None) -> list[tuple[TimeOfDay, ...]]:
+    number = _HOURS.get(hour.lower()) or int(hour)
+    if number > 24:  # noqa: PLR2004 - hours of a day
+        return []
+    if half is not None:
+        return [((number % 12 + (12 if half.lower() == "p" else 0)) * 60 + minute,)]
+    told_exactly = number > 12 or number == 0 or hour.startswith("0")  # noqa: PLR2004 - half a day
+    readings = (number,) if told_exactly else (number % 12, number % 12 + 12)
+    return [tuple(reading * 60 + minute for reading in readings)]

@@ -1,0 +1,72 @@
+"""The numbers in a text, in digits or in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+_ONES = [
+    *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven"),
+    *("twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen"),
+]
+_TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
+_WORDS = {word: n for n, word in enumerate(_ONES)} | {word: 20 + 10 * n for n, word in enumerate(_TENS)}
+_NOTHING = r"no one|no-one|noone|nobody|nothing|none|neither|no"
+
+_UNITS = "|".join(_ONES[1:10])
+_NUMBER = re.compile(
+    rf"(?P<digits>(?<![\w.,:/-])-?\d+(?:\.\d+)?(?![\w:]|\.\d))"
+    rf"|\b(?P<tens>{'|'.join(_TENS)})(?:[ -](?P<units>{_UNITS}))?\b"
+    rf"|\b(?P<hundred>(?:(?:a|one) )?hundred)\b"
+    rf"|\b(?P<nothing>{_NOTHING})\b"
+    rf"|(?P<negated>(?:\bnot|n['\u2019]t)\b[^.,;!?]*?\bany(?:body|one|thing)?\b)"
+    rf"|\b(?P<word>{'|'.join(_ONES)})\b",
+    re.IGNORECASE,
+)
+_PRONOUN = re.compile(
+    r"\b(?:any|some|every|each|which|this|that|the|another|other|sweet|savory|savoury|right|last|first)[ -]$",
+    re.IGNORECASE,
+)
+_OF = re.compile(r"(?:\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$", re.IGNORECASE)
+_TOGETHER = re.compile(r"\s*(?:or|to|-|\u2013|,|/|maybe|perhaps)?\s*(?:or|maybe|perhaps)?\s*", re.IGNORECASE)
+
+
+def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
+    """The numbers in a text, as positions and values; those between which it leaves the choice are together.
+
+    `no`, `nobody` and the like are 0. Of `2 of 4` only 2 is told; `one` in `the one` is no number.
+
+    Args:
+        text: any text.
+    """
+    together: list[re.Match[str]] = []
+    for match in _NUMBER.finditer(text):
+        if _is_none(match, text):
+            continue
+        if together and not _TOGETHER.fullmatch(text, together[-1].end(), match.start()):
+            yield _told(together)
+            together = []
+        together.append(match)
+    if together:
+        yield _told(together)
+
+
+def _told(matches: list[re.Match[str]]) -> tuple[int, int, tuple[float, ...]]:
+    return matches[0].start(), matches[-1].end(), tuple(map(_value, matches))
+
+
+def _is_none(match: re.Match[str], text: str) -> bool:
+    before = text[: match.start()]
+    if match["word"] and match["word"].lower() == "one" and _PRONOUN.search(before):
+        return True
+    return _OF.search(before) is not None and not match["nothing"]
+
+
+def _value(match: re.Match[str]) -> float:
+    if match["digits"]:
+        return float(match["digits"])
+    if match["tens"]:
+        return _WORDS[match["tens"].lower()] + _WORDS.get((match["units"] or "").lower(), 0)
+    if match["hundred"]:
+        return 100.0
+    return 0.0 if match["nothing"] or match["negated"] else float(_WORDS[match["word"].lower()])

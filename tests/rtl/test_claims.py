@@ -1,0 +1,202 @@
+"""What texts claim: numbers with their things, times of day, and what is affirmed or denied."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from codebotler.rtl import Claim, Element, Number, RtlSyntaxError, Time, explain, holds, parse
+from codebotler.rtl.clock import times_in
+from codebotler.trace import Event, Option
+
+SAVORY = [
+    ("2 people chose savory snacks", {2}),
+    ("Of the 4 people asked, 2 chose savory snacks.", {2}),
+    ("2 out of 4 people chose savory", {2}),
+    ("I met 3 people, and the number of savory choices was 2.", {2}),
+    ("Savory choices: 2", {2}),
+    ("Number of savory choices in total, 2", {2}),
+    ("2 people chose a savory one", {2}),
+    ("Nobody chose savory", {0}),
+    ("No one picked a savory snack", {0}),
+    ("People did not pick any savory snack", {0}),
+    ("There are twenty-two savory and 1 sweet", {22}),
+    ("1 savory or 2 savory", {1, 2}),
+    ("0", {0}),
+    ("10 people", {10}),
+    ("0 1 2 3", {0, 1, 2, 3}),
+    ("I looked into 4 offices", set()),
+    ("someone", set()),
+    ("", set()),
+]
+
+
+@pytest.mark.parametrize(("text", "given"), SAVORY)
+def test_a_number_stands_with_its_thing(text: str, given: set[int]) -> None:
+    assert Number(0, "savory", ("sweet", "office")).given(text) == given
+    for number in range(5):
+        assert Number(number, "savory", ("sweet", "office")).matches(text) == (given == {number})
+        is_other = bool(given) and given != {number}
+        assert Number(number, "savory", ("sweet", "office"), other=True).matches(text) == is_other
+
+
+@pytest.mark.parametrize(
+    ("text", "given"),
+    [
+        ("60% said yes", {60}),
+        ("60.0 percent", {60}),
+        ("6 of 10 people, so 60%", {60}),
+        ("40%, 60%", {40, 60}),
+    ],
+)
+def test_a_percentage_stands_with_its_sign(text: str, given: set[int]) -> None:
+    assert Number(0, "%|percent").given(text) == given
+
+
+THINGS = ["apple", "pear", "plum"]
+COUNTS = st.lists(st.integers(0, 30), min_size=3, max_size=3)
+
+
+@given(
+    COUNTS,
+    st.permutations(range(3)),
+    st.sampled_from(["{n} {t}s", "{t}s: {n}", "{n} people want a {t}", "the {t}s needed are {n}"]),
+    st.sampled_from([", ", " and ", "; ", ". ", ", and "]),
+    st.sampled_from(["", "Please buy: ", "We need ", "Hello! "]),
+)
+def test_of_several_things_each_has_its_own_number(
+    counts: list[int], order: list[int], form: str, joint: str, start: str
+) -> None:
+    text = start + joint.join(form.format(n=counts[at], t=THINGS[at]) for at in order)
+    for at, thing in enumerate(THINGS):
+        others = tuple(other for other in THINGS if other != thing)
+        assert Number(0, thing, others).given(text) == {counts[at]}, text
+
+
+TIMES = [
+    ("12:00", [(0, 720)]),
+    ("12 pm", [(720,)]),
+    ("lunch at noon", [(720,)]),
+    ("1", [(60, 780)]),
+    ("around one", [(60, 780)]),
+    ("13:00", [(780,)]),
+    ("1:30 p.m.", [(810,)]),
+    ("half past twelve", [(30, 750)]),
+    ("quarter to 12 pm", [(705,)]),
+    ("twelve o'clock", [(0, 720)]),
+    ("12:00 - 13:00", [(0, 720), (780,)]),
+    ("midnight", [(0, 1440)]),
+    ("in 5 minutes", []),
+    ("room 12 or 1?", []),
+    ("99:00", []),
+]
+
+
+@pytest.mark.parametrize(("text", "times"), TIMES)
+def test_times_of_day(text: str, times: list[tuple[int, ...]]) -> None:
+    assert times_in(text) == times
+
+
+def test_a_time_lies_between_two_others_or_not() -> None:
+    lunch, odd = Time("11:00", "14:30"), Time("11:00", "14:30", other=True)
+    for text, is_lunch, is_odd in [
+        ("1 pm", True, False),
+        ("1:00", True, False),
+        ("17:00", False, True),
+        ("12:00 or 18:00", False, True),
+        ("soon", False, False),
+    ]:
+        assert (lunch.matches(text), odd.matches(text)) == (is_lunch, is_odd), text
+
+
+@pytest.mark.parametrize(
+    ("text", "affirmed", "denied"),
+    [
+        ("Alice and Bob are joining", "alice bob", ""),
+        ("Alice and Bob are not joining", "", "alice bob"),
+        ("Joining: Alice. Declined: Bob", "alice", "bob"),
+        ("Alice is joining but Bob isn't", "alice", "bob"),
+        ("Neither Alice nor Bob is coming", "", "alice bob"),
+        ("Not joining: Alice, Bob", "", "alice bob"),
+        ("Alice said yes and Bob said no", "alice", "bob"),
+        ("Alice, Bob", "alice bob", ""),
+        ("Nobody is coming", "", ""),
+        ("I know Alice and another Alice", "alice", ""),
+        ("malice", "", ""),
+    ],
+)
+def test_what_is_affirmed_and_what_denied(text: str, affirmed: str, denied: str) -> None:
+    for name in ("alice", "bob"):
+        assert Claim(name).matches(text) == (name in affirmed.split()), name
+        assert Claim(name, denied=True).matches(text) == (name in denied.split()), name
+
+
+def test_a_mention_is_in_the_question_or_its_options_whatever_these_are() -> None:
+    options = (Option("1", is_text=False), Option("tea"))
+    asks = (Event("ask", "Which drink?", options),)
+    assert holds(parse('tr.Exists(mention("tea"))'), asks)
+    assert holds(parse('tr.Exists(mention("drink"))'), asks)
+    assert not holds(parse('tr.Exists(mention("water"))'), asks)
+
+
+def test_what_happens_at_a_place_happens_where_the_robot_is() -> None:
+    formula = parse('tr.Exists(at("lab 1", say("hello")))')
+    assert holds(formula, (Event("say", "hello", place="lab 1"),))
+    assert not holds(formula, (Event("say", "hello", place="lab 12"),))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('tr.Exists(say(number(2, "mug")))', 'never said anything that gives 2 as the number of "mug"'),
+        (
+            'tr.Exists(at("lab", mention("tea")))',
+            'never mentioned "tea" in a question or its options in the lab',
+        ),
+        ('tr.Exists(say(denies("bob")))', 'never said anything that denies something of "bob"'),
+    ],
+)
+def test_what_is_missing_is_told(text: str, told: str) -> None:
+    why = explain(parse(text), (Event("goto", "lab"),))
+    assert why is not None
+    assert told in why.sentence
+
+
+def test_what_must_not_be_said_is_told_with_its_place() -> None:
+    formula = parse('not tr.Exists(at("hall", say(othernumber(2, "mug"))))')
+    why = explain(formula, (Event("say", "3 mugs", place="hall"),))
+    assert why is not None
+    assert 'it said "3 mugs"' in why.sentence
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ('tr.Exists(say(number("2", "mug")))', "expected a whole number"),
+        ("tr.Exists(say(number(2)))", "number takes a number, a thing and perhaps other things"),
+        ('tr.Exists(say(time("noon", "14:00")))', '"noon" is no time of day such as "11:30"'),
+        ('tr.Exists(at("a", at("b", say("c"))))', "at cannot stand in another at"),
+        ('tr.Exists(say(affirm("a")))', "did you mean affirms?"),
+        ('tr.Exists(mention("a", "b"))', "mention takes 1 argument, not 2"),
+    ],
+)
+def test_mistakes_are_told(text: str, problem: str) -> None:
+    with pytest.raises(RtlSyntaxError, match=None) as error:
+        parse(text)
+    assert problem in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'tr.Exists(at("lab", mention("tea")))',
+        r'tr.Exists(say(othernumber(2, r"mugs\b", "cup")))',
+        'tr.Exists(say(words(time("11:00", "14:30"), denies("bob"))))',
+    ],
+)
+def test_what_is_printed_is_rtl_again(text: str) -> None:
+    assert str(parse(text)) == text.replace('r"mugs\\b"', 'r"mugs\\b"')
+    assert parse(str(parse(text))) == parse(text)
+
+
+def test_an_element_without_a_place_happens_anywhere() -> None:
+    assert Element("say", Claim("a")).happens_at("wherever")
