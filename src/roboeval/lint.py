@@ -211,7 +211,8 @@ class _Place:
     @cached_property
     def plain_moves(self) -> Reasoner:
         moves = {request: resolve_room(self.rooms, request) or request for request in self.requests}
-        return Reasoner((r.formula for r in self.scenario.require), moves, self.scenario.world.robot)
+        formulas = (r.formula for r in self.scenario.require)
+        return Reasoner(formulas, self.requests, moves, self.scenario.world.robot)
 
     @cached_property
     def requests(self) -> list[str]:

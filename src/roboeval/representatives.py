@@ -42,7 +42,16 @@ def representative_events(wanted: Iterable[Element], rooms: Sequence[str] | None
         options += [element.text for element in alike if element.mention]
         choices = _choices(tuple(dict.fromkeys(options)))
         here = places if kind != "goto" else [""]
-        events += [Event(kind, t, choice, place=p) for t in texts for choice in choices for p in here]
+        answers: list[str | None] = [None]
+        answered = dict.fromkeys(element.answer for element in alike if element.answer is not None)
+        answers += representative_texts(tuple(answered), outer=True) if answered else ()
+        events += [
+            Event(kind, text, choice, answer, place=place)
+            for text in texts
+            for choice in choices
+            for answer in answers
+            for place in here
+        ]
     return events
 
 
@@ -67,6 +76,8 @@ def _choices(wanted: tuple[Text, ...]) -> Iterable[tuple[Option, ...]]:
 def fits(element: Element, event: Event) -> bool:
     """Whether an event is of a kind; its options are texts."""
     if element.kind != event.kind or not element.happens_at(event.place):
+        return False
+    if element.answer is not None and (event.answer is None or not element.answer.matches(event.answer)):
         return False
     if element.mention and any(element.text.matches(option.text) for option in event.options):
         return True

@@ -53,23 +53,30 @@ class Reasoner:
 
     Args:
         formulas: all that will be asked about; their regexes make the representative events.
-        moves: the requests by which the robot moves, and where each leads; by default any text, which may
-            name several rooms at once, or none that there is, and may lead anywhere.
+        moves: the requests by which the robot moves; by default any text, which may name several rooms at
+            once, or none that there is, and may lead anywhere.
+        leads: where each of these moves leads; by default to a room of its own.
         start: the room in which the robot starts, where moves are given.
     """
 
     def __init__(
-        self, formulas: Iterable[Formula], moves: Mapping[str, str] | None = None, start: str = ""
+        self,
+        formulas: Iterable[Formula],
+        moves: Iterable[str] | None = None,
+        leads: Mapping[str, str] | None = None,
+        start: str = "",
     ) -> None:
-        rooms = None if moves is None else [*dict.fromkeys([start, *moves.values()])]
         wanted = [*chain.from_iterable(map(elements, formulas))]
-        self.events = representative_events(wanted, rooms)
-        if moves is not None:
-            self.events = [event for event in self.events if event.kind != "goto"]
-            self.events += [Event("goto", move) for move in moves]
         self._driving = None
-        if moves is not None and rooms is not None and any(e.place is not None for e in wanted):
-            self._driving = _driving(self.events, rooms, moves)
+        if moves is None:
+            self.events = representative_events(wanted)
+        else:
+            to = {move: (leads or {}).get(move, move) for move in moves}
+            rooms = [*dict.fromkeys([start, *to.values()])]
+            self.events = [e for e in representative_events(wanted, rooms) if e.kind != "goto"]
+            self.events += [Event("goto", move) for move in to]
+            if any(element.place is not None for element in wanted):
+                self._driving = _driving(self.events, rooms, to)
         self._readings: dict[Formula, tuple[Automaton, tuple[int, ...]]] = {}
 
     def clash(self, formulas: Sequence[Formula], denied: Formula | None = None) -> tuple[Formula, ...] | None:

@@ -7,7 +7,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
@@ -16,7 +16,8 @@ from codebotler.rtl import Formula, RtlSyntaxError, parse
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS, SkillTable
 from codebotler.world import World
-from roboeval.suitefile import Ability, Category, ScenarioFile, SuiteFile, TaskFile
+from roboeval.suitefile import Ability, Category, DrawnTaskFile, ScenarioFile, SuiteFile, TaskFile
+from roboeval.worlds import Description
 
 ABLATED = "-ablation"  # at the end of the name of an evaluation's files, and so of no suite's
 SUITES = Path(__file__).with_name("suites")
@@ -108,6 +109,8 @@ class Task:
         ablation: the same with the requirements of common sense only; None where the task has none.
         accepted: findings of the linter that are there on purpose.
         path: the file it was read from.
+        borrows: whether its instruction is that of a task that ships with the package.
+        drawn: whether its worlds are drawn from a description.
     """
 
     name: str
@@ -120,6 +123,8 @@ class Task:
     ablation: tuple[Scenario, ...] | None
     accepted: tuple[Accepted, ...]
     path: Path
+    borrows: bool = False
+    drawn: bool = False
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
         """The worlds and requirements by which programs are judged; none if there is no ablation."""
@@ -137,6 +142,9 @@ class Suite:
         rules: how worlds are simulated.
         tasks: by name, sorted.
         digest: a hash of all that verdicts and prompts depend on.
+        folder: where it was read from.
+        worlds: how many worlds a task has at least, where they are drawn; None where they are written by hand.
+        seed: from which they are drawn.
     """
 
     name: str
@@ -145,6 +153,23 @@ class Suite:
     rules: Rules
     tasks: Mapping[str, Task]
     digest: str
+    folder: Path | None = None
+    worlds: int | None = None
+    seed: int | None = None
+
+    def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
+        """The same suite with other worlds, drawn from the same descriptions.
+
+        Args:
+            count: how many a task; as many as now by default.
+            seed: from which to draw them; the same as now by default.
+
+        Raises:
+            BadInput: its worlds are written by hand.
+        """
+        if self.worlds is None or self.folder is None:
+            raise BadInput(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
+        return _read_suite(self.folder, SKILLS, count or self.worlds, self.seed if seed is None else seed)
 
     def task(self, name: str) -> Task:
         """A task by name.
@@ -179,7 +204,7 @@ def load_suite(name: str = "paper", *, skills: SkillTable = SKILLS) -> Suite:
 
 
 @cache
-def _read_suite(folder: Path, skills: SkillTable) -> Suite:
+def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
     file = YamlFile.read(folder / "suite.yaml")
     head = file.validate(SuiteFile)
     if head.name.endswith(ABLATED):
@@ -189,8 +214,22 @@ def _read_suite(folder: Path, skills: SkillTable) -> Suite:
     if not paths:
         raise BadInput("the suite has no tasks; put one file a task there", file=folder / "tasks")
     documents = [YamlFile.read(path) for path in paths]
-    tasks = [read_task(document, path, skills) for document, path in zip(documents, paths, strict=True)]
+    lot = Lot(count or head.worlds, head.seed if seed is None else seed)
+    lenders = [
+        None if head.instructions is None else _lender(file, head.instructions, path) for path in paths
+    ]
+    tasks = [
+        read_task(document, path, skills, lender=lender, lot=lot)
+        for document, path, lender in zip(documents, paths, lenders, strict=True)
+    ]
     content = [file.data, *(document.data for document in documents)]
+    content += [lender.data for lender in lenders if lender is not None]
+    drawn = [task for task in tasks if task.drawn]
+    content += [
+        [scenario.world.to_yaml(), *(requirement.text for requirement in scenario.require)]
+        for task in drawn
+        for scenario in task.scenarios
+    ]
     canonical = json.dumps(content, sort_keys=True, default=str)
     return Suite(
         name=head.name,
@@ -199,24 +238,78 @@ def _read_suite(folder: Path, skills: SkillTable) -> Suite:
         rules=head.rules.rules(),
         tasks={task.name: task for task in tasks},
         digest=hashlib.sha256(canonical.encode()).hexdigest(),
+        folder=folder,
+        worlds=lot.count if drawn else None,
+        seed=lot.seed if drawn else None,
     )
 
 
-def read_task(file: YamlFile, path: Path, skills: SkillTable = SKILLS) -> Task:
+@dataclass(frozen=True)
+class Lot:
+    """How worlds are drawn.
+
+    Args:
+        count: how many a task at least.
+        seed: any whole number from 0 on.
+    """
+
+    count: int = 30
+    seed: int = 1
+
+
+def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
+    """The task file of another suite from which a task has its instruction."""
+    lender = SUITES / suite / "tasks" / path.name
+    if not lender.is_file():
+        raise file.wrong(
+            f'the suite "{suite}" has no task "{path.stem}" to take instructions from', "instructions"
+        )
+    return YamlFile.read(lender)
+
+
+LENT = ("summary", "abilities", "prompts")
+
+
+def _borrowed(file: YamlFile, lender: YamlFile | None) -> object:
+    """What a task file says, with the instruction of another one where it has none of its own."""
+    if lender is None or not isinstance(file.data, dict) or not isinstance(lender.data, dict):
+        return file.data
+    lent = {name: lender.data[name] for name in LENT if name in lender.data}
+    facts = [*lender.data.get("facts", []), *file.data.get("facts", [])]
+    return {**lent, **file.data, "facts": facts}
+
+
+def read_task(
+    file: YamlFile,
+    path: Path,
+    skills: SkillTable = SKILLS,
+    *,
+    lender: YamlFile | None = None,
+    lot: Lot = Lot(),
+) -> Task:
     """Turn a task file into a task.
+
+    Args:
+        file: the task file.
+        path: where it lies.
+        skills: what can stand in formulas.
+        lender: the file from which it takes the instruction, if it has none of its own.
+        lot: how worlds are drawn, if it describes them.
 
     Raises:
         BadInput: it is wrong; the sentence names the line and the mend.
     """
-    form = file.validate(TaskFile)
+    data = _borrowed(file, lender)
+    drawn = isinstance(data, dict) and isinstance(data.get("worlds"), dict)
+    form: TaskFile | DrawnTaskFile = file.validate(DrawnTaskFile if drawn else TaskFile, data)
     if form.name != path.stem:
         raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"', "name")
-    _expect_different_worlds(form, file)
     checks = {check.name: check for check in _checks(form, file)}
     reader = _Reader(file, checks, skills)
-    ablated = [world for world in form.worlds if world.ablation is not None]
-    if ablated and len(ablated) != len(form.worlds):
-        raise file.wrong("some worlds have an ablation and some have none", "worlds")
+    if isinstance(form, DrawnTaskFile):
+        scenarios, ablation = reader.drawn(Description(form, file), lot), None
+    else:
+        scenarios, ablation = reader.written(form)
     return Task(
         name=form.name,
         summary=form.summary,
@@ -224,12 +317,12 @@ def read_task(file: YamlFile, path: Path, skills: SkillTable = SKILLS) -> Task:
         prompts=tuple(prompt.strip() for prompt in form.prompts),
         facts=tuple(Fact(f.fact, tuple(f.words), f.commonsense) for f in form.facts),
         checks=tuple(checks.values()),
-        scenarios=tuple(reader.scenario(world, ("worlds", i)) for i, world in enumerate(form.worlds)),
-        ablation=tuple(reader.ablation(world, ("worlds", i)) for i, world in enumerate(form.worlds))
-        if ablated
-        else None,
+        scenarios=scenarios,
+        ablation=ablation,
         accepted=tuple(Accepted(a.finding, a.because) for a in form.accepted),
         path=path,
+        borrows=lender is not None,
+        drawn=isinstance(form, DrawnTaskFile),
     )
 
 
@@ -245,7 +338,7 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
 _PARAMETER = r" *[^\W\d]\w* *"
 
 
-def _checks(form: TaskFile, file: YamlFile) -> list[Check]:
+def _checks(form: TaskFile | DrawnTaskFile, file: YamlFile) -> list[Check]:
     checks = []
     for head, body in form.checks.items():
         match = re.fullmatch(rf"(\w+)(?:\(({_PARAMETER}(?:,{_PARAMETER})*)\))?", head)
@@ -276,6 +369,30 @@ class _Reader:
     file: YamlFile
     checks: Mapping[str, Check]
     skills: SkillTable
+    known: dict[tuple[str, Place], Requirement] = field(default_factory=dict)
+
+    def written(self, form: TaskFile) -> tuple[tuple[Scenario, ...], tuple[Scenario, ...] | None]:
+        """The worlds that a task lists, and those of its ablation."""
+        _expect_different_worlds(form, self.file)
+        ablated = [world for world in form.worlds if world.ablation is not None]
+        if ablated and len(ablated) != len(form.worlds):
+            raise self.file.wrong("some worlds have an ablation and some have none", "worlds")
+        worlds = [*enumerate(form.worlds)]
+        scenarios = tuple(self.scenario(world, ("worlds", i)) for i, world in worlds)
+        return scenarios, tuple(self.ablation(w, ("worlds", i)) for i, w in worlds) if ablated else None
+
+    def drawn(self, description: Description, lot: Lot) -> tuple[Scenario, ...]:
+        """The worlds that are drawn from a task's description."""
+        scenarios = []
+        for setting in description.settings(lot.count, lot.seed):
+            require = []
+            for text, number in description.requirements(setting):
+                known = text, ("require", number)
+                if known not in self.known:
+                    self.known[known] = self.requirement(*known)
+                require.append(self.known[known])
+            scenarios.append(Scenario(description.world(setting), tuple(require)))
+        return tuple(scenarios)
 
     def scenario(self, form: ScenarioFile, at: Place) -> Scenario:
         world = form.world(self.file, at)

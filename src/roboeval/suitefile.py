@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.world import Name, PersonFile, Text, WorldFile
+from codebotler.world import AnswerFile, Name, PersonFile, Text, WorldFile
 
 Category = Literal[
     "SayAtLocation",
@@ -69,6 +69,54 @@ class ScenarioFile(WorldFile):
     ablation_people: dict[str, list[PersonFile]] | None = None
 
 
+Levels = Annotated[list[Text], Field(min_length=1)] | Text
+"""What may be the case, or what always is."""
+
+NOWHERE = "nowhere"
+
+
+class DrawnPersonFile(_Form):
+    """Who may be in the worlds of a task.
+
+    Wherever there is a choice, it is drawn for each world: where they are, what they answer, when they come.
+    """
+
+    name: Name | None = None
+    where: Levels = Field(alias="in")
+    answers: list[AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]] = []
+    topics: dict[Name, AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]] = {}
+    after_looks: (
+        Annotated[int, Field(strict=True, ge=0, le=1_000)]
+        | list[Annotated[int, Field(strict=True, ge=0, le=1_000)]]
+    ) = 0
+    leaves: Annotated[bool, Field(strict=True)] = False
+
+
+class DrawnThingFile(_Form):
+    """What may lie in the worlds of a task."""
+
+    label: Name | None = None
+    where: Levels = Field(alias="in")
+
+
+class CornerFile(_Form):
+    """A world that a task sets by hand; what it does not set is the first of what there is to choose from."""
+
+    about: Name
+    set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
+
+
+class DrawnWorldsFile(_Form):
+    """What the worlds of a task have in common, and what may be different in each."""
+
+    robot: Name
+    rooms: Annotated[list[Name], Field(min_length=1)]
+    people: dict[Name, DrawnPersonFile] = {}
+    things: dict[Name, DrawnThingFile] = {}
+    may_wait_forever: Text | Annotated[bool, Field(strict=True)] = False
+    corners: list[CornerFile] = []
+
+
 class TaskFile(_Form):
     """A task file."""
 
@@ -79,6 +127,21 @@ class TaskFile(_Form):
     facts: list[FactFile] = []
     checks: dict[str, CheckFile]
     worlds: Annotated[list[ScenarioFile], Field(min_length=1)]
+    accepted: list[AcceptedFile] = []
+
+
+class DrawnTaskFile(_Form):
+    """A task file that describes its worlds instead of listing them."""
+
+    name: Name
+    summary: Name
+    abilities: list[Ability] = []
+    prompts: Annotated[list[Name], Field(min_length=1)]
+    facts: list[FactFile] = []
+    checks: dict[str, CheckFile]
+    worlds: DrawnWorldsFile
+    let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
+    require: Annotated[list[Text], Field(min_length=1)]
     accepted: list[AcceptedFile] = []
 
 
@@ -130,4 +193,7 @@ class SuiteFile(_Form):
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")]
     version: Annotated[int, Field(strict=True, ge=0)]
     about: Text = ""
+    instructions: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")] | None = None
+    worlds: Annotated[int, Field(strict=True, ge=1, le=100_000)] = 30
+    seed: Annotated[int, Field(strict=True, ge=0)] = 1
     rules: RulesFile = RulesFile()

@@ -40,7 +40,8 @@ def tried(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
 def recorded_programs(task: Task) -> list[str]:
     """The programs that somebody wrote for the task's prompts, right and wrong ones.
 
-    They stand in `recorded/*/TASK.yaml` of the suite's folder; where it has no such folder, in the package.
+    They stand in `recorded/*/TASK.yaml` of the suite's folder; where it has no such folder, or the task takes
+    its instruction from a suite that ships, in the package.
 
     Args:
         task: the task.
@@ -49,9 +50,8 @@ def recorded_programs(task: Task) -> list[str]:
         BadInput: a file of recorded programs is wrong.
     """
     folder = task.path.parents[1] / "recorded"
-    if folder.is_dir():
-        written = [read_replies(path) for path in sorted(folder.glob(f"*/{task.path.name}"))]
-    else:
-        written = [recorded_model(name).replies for name in NAMES]
+    written = [read_replies(path) for path in sorted(folder.glob(f"*/{task.path.name}"))]
+    if task.borrows or not folder.is_dir():
+        written += [recorded_model(name).replies for name in NAMES]
     replies = (reply for one in written for prompt in task.prompts for reply in one.get(prompt, ()))
     return [*dict.fromkeys(reply.program for reply in replies)]

@@ -48,7 +48,8 @@ def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[Element]:
     plain = st.builds(Element, st.sampled_from(PLAIN), texts)
     asked = st.builds(Element, st.just("ask"), texts, texts)
     mentioned = st.builds(Element, st.just("ask"), texts, st.none(), st.just(value=True))
-    anywhere = plain | asked | mentioned
+    answered = st.builds(lambda text: Element("ask", Regex(".*"), answer=text), texts)
+    anywhere = plain | asked | mentioned | answered
     return anywhere | st.builds(lambda element, p: replace(element, place=p), anywhere, patterns)
 
 
@@ -90,7 +91,8 @@ def formulas_from(patterns: SearchStrategy[str]) -> SearchStrategy[Formula]:
 def traces_from(options: SearchStrategy[Option]) -> SearchStrategy[Trace]:
     texts = NAMES | st.sampled_from(["2 a", "no b", "11:00", "3 a and 2 b"])
     plain = st.builds(Event, st.sampled_from(PLAIN), texts, place=NAMES)
-    asked = st.builds(Event, st.just("ask"), texts, st.lists(options, max_size=2).map(tuple), place=NAMES)
+    offered = st.lists(options, max_size=2).map(tuple)
+    asked = st.builds(Event, st.just("ask"), texts, offered, st.none() | texts, place=NAMES)
     return st.lists(plain | asked, max_size=8).map(tuple)
 
 

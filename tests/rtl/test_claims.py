@@ -138,6 +138,17 @@ def test_a_mention_is_in_the_question_or_its_options_whatever_these_are() -> Non
     assert not holds(parse('tr.Exists(mention("water"))'), asks)
 
 
+def test_an_answer_is_what_was_chosen() -> None:
+    formula = parse('tr.Exists(answered(time("12:00", "12:00")))')
+    options = (Option("11:00"), Option("noon"))
+    assert holds(formula, (Event("ask", "When?", options, "noon"),))
+    assert not holds(formula, (Event("ask", "When?", options, "11:00"),))
+    assert not holds(formula, (Event("ask", "When?", options),))
+    why = explain(formula, ())
+    assert why is not None
+    assert "it never got an answer that names a time from 12:00 to 12:00" in why.sentence
+
+
 def test_what_happens_at_a_place_happens_where_the_robot_is() -> None:
     formula = parse('tr.Exists(at("lab 1", say("hello")))')
     assert holds(formula, (Event("say", "hello", place="lab 1"),))
@@ -189,6 +200,7 @@ def test_mistakes_are_told(text: str, problem: str) -> None:
     "text",
     [
         'tr.Exists(at("lab", mention("tea")))',
+        'tr.Exists(at("lab", answered("tea")))',
         r'tr.Exists(say(othernumber(2, r"mugs\b", "cup")))',
         'tr.Exists(say(words(time("11:00", "14:30"), denies("bob"))))',
     ],

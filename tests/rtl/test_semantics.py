@@ -82,6 +82,12 @@ def same(element: Element, placed: tuple[int, Event]) -> bool:
         return False
     if element.place is not None and not found(Regex(rf"\b(?:{element.place})\b"), event.place):
         return False
+    if element.answer is not None:
+        return (
+            event.answer is not None
+            and found(element.answer, event.answer)
+            and found(element.text, event.text)
+        )
     if element.mention:
         return any(found(element.text, text) for text in (event.text, *(o.text for o in event.options)))
     if element.options is None:

@@ -90,6 +90,7 @@ class Element:
         options: what at least one option must match; None for kinds without options, and for a mention.
         mention: whether it is a question that has the text anywhere, also among its options.
         place: a regex for the room in which it must happen, found there as a whole word; None for anywhere.
+        answer: what the option that was chosen must match; None where no answer is meant.
     """
 
     kind: str
@@ -97,6 +98,7 @@ class Element:
     options: Text | None = None
     mention: bool = False
     place: str | None = None
+    answer: Text | None = None
 
     @cached_property
     def is_place(self) -> re.Pattern[str] | None:
@@ -110,6 +112,8 @@ class Element:
     def __str__(self) -> str:
         texts = [self.text] if self.options is None else [self.text, self.options]
         told = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
+        if self.answer is not None:
+            told = f"answered({self.answer})"
         return told if self.place is None else f"at({quote(self.place)}, {told})"
 
 

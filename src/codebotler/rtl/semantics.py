@@ -105,6 +105,8 @@ def matches(element: Element, trace: Trace, at: int) -> bool:
     event = trace[at]
     if event.kind != element.kind or not element.happens_at(event.place):
         return False
+    if element.answer is not None and (event.answer is None or not element.answer.matches(event.answer)):
+        return False
     if element.mention and any(element.text.matches(option.text) for option in event.options):
         return True
     if element.options is not None and not _offers(element, event, at):

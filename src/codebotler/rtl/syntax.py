@@ -43,6 +43,9 @@ TESTS = {"Exists": 1, "ActAtFirst": 2, "ActAtSome": 2, "Count": 2, "AtLeast": 2}
 CLAIMS = ("number", "othernumber", "time", "othertime", "affirms", "denies")
 """What a text may claim."""
 
+ABOUT_QUESTIONS = ("mention", "answered")
+"""Elements that are questions: by a text anywhere in them, and by what was answered."""
+
 DEEPEST = 50
 """How deep a formula may be nested, and how many cuts may stand in a row; few enough for Python's stack."""
 
@@ -179,16 +182,20 @@ class _Parser:
                 return replace(inner, place=self.without(arguments[0]).pattern)
             case ast.Call(ast.Name(kind), arguments, keywords):
                 asking = next((k for k, row in self.recordings.items() if row.options is not None), None)
-                is_mention = kind == "mention" and asking is not None and kind not in self.recordings
-                if not is_mention and kind not in self.recordings:
-                    raise self.unknown(node, f"element {kind}", kind, [*self.recordings, "mention", "at"])
+                about = kind if kind in ABOUT_QUESTIONS and kind not in self.recordings else ""
+                if (not about or asking is None) and kind not in self.recordings:
+                    raise self.unknown(
+                        node, f"element {kind}", kind, [*self.recordings, *ABOUT_QUESTIONS, "at"]
+                    )
                 self.no_keywords(keywords)
-                asks = not is_mention and self.recordings[kind].options is not None
+                asks = not about and self.recordings[kind].options is not None
                 self.count_arguments(node, kind, arguments, 2 if asks else 1)
                 texts = [self.matched(argument, 0) for argument in arguments]
-                return (
-                    Element(asking, *texts, mention=True) if is_mention and asking else Element(kind, *texts)
-                )
+                if about == "mention" and asking is not None:
+                    return Element(asking, texts[0], mention=True)
+                if about and asking is not None:
+                    return Element(asking, Regex(".*"), answer=texts[0])
+                return Element(kind, *texts)
         raise self.expected('an element such as goto("lobby")', node)
 
     def matched(self, node: ast.expr, depth: int) -> Text:

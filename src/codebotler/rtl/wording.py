@@ -57,6 +57,9 @@ def did(deed: Deed, form: Form, *, never: bool = False) -> str:
 def _did(deed: Deed, form: Form, *, never: bool) -> str:  # noqa: PLR0911 - one for each kind
     element = deed[0]
     verb = _VERBS.get(element.kind, _OTHER_VERB)[form]
+    if element.answer is not None:
+        got = {"base": "get", "past": "got", "ing": "getting"}[form]
+        return f"{got} an answer {with_texts(element.answer)}".rstrip()
     if len(deed) > 1 or (element.mention and not is_any(element.text)):
         return _mentioned(deed, form, verb)
     if element.kind == "check" and is_any(element.text):

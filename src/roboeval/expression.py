@@ -1,0 +1,175 @@
+"""Computes what a task says of its worlds: a small part of Python's expressions, read and never run."""
+
+from __future__ import annotations
+
+import ast
+import operator
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from itertools import pairwise
+from typing import Any
+
+Names = Mapping[str, Any]
+"""What an expression may name, and what it stands for."""
+
+
+class ExpressionError(ValueError):
+    """A text is no expression, or names what there is not; the message is one sentence."""
+
+
+@dataclass(frozen=True)
+class PersonFact:
+    """A person as expressions know them.
+
+    Args:
+        name: how the task calls them.
+        room: where they are; empty if nowhere.
+        answers: what they answer, in order; a position among the options as a number.
+        topics: what they answer to questions about something.
+        after_looks: how often the robot looks in vain before they come.
+    """
+
+    name: str
+    room: str
+    answers: tuple[str | int, ...]
+    topics: Mapping[str, str | int]
+    after_looks: int
+
+
+@dataclass(frozen=True)
+class ThingFact:
+    """A thing as expressions know it.
+
+    Args:
+        name: how the task calls it.
+        label: how the world does.
+        room: where it lies; empty if nowhere.
+    """
+
+    name: str
+    label: str
+    room: str
+
+
+def parsed(text: str) -> ast.expr:
+    """The expression that a text is.
+
+    Raises:
+        ExpressionError: it is none.
+    """
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ExpressionError(f'"{text}" cannot be read as an expression') from None
+
+
+def value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
+    """What an expression stands for.
+
+    Args:
+        node: the expression.
+        names: what it may name.
+
+    Raises:
+        ExpressionError: it names what there is not, or is more than an expression may be.
+    """
+    try:
+        return _value(node, names)
+    except ExpressionError:
+        raise
+    except (TypeError, KeyError, IndexError, ZeroDivisionError, ValueError, OverflowError) as error:
+        raise ExpressionError(f'"{ast.unparse(node)}" cannot be computed ({error})') from None
+
+
+_COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.In: lambda one, other: one in other,
+    ast.NotIn: lambda one, other: one not in other,
+}
+_COMPUTE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.FloorDiv: operator.floordiv,
+}
+_FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "count": lambda items: len([*items]),
+    "number": lambda text: int(re.match(r"\d+", text)[0]),
+    "sum": sum,
+    "any": any,
+    "all": all,
+    "max": max,
+    "min": min,
+}
+
+
+def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911, PLR0912 - one for each node
+    match node:
+        case ast.Constant(str() | int() as constant):
+            return constant
+        case ast.Name(name):
+            if name not in names:
+                raise ExpressionError(f'nothing is called "{name}"; there is {", ".join(names)}')
+            return names[name]
+        case ast.Attribute(inner, name):
+            return _part(_value(inner, names), name)
+        case ast.Subscript(inner, key):
+            return _value(inner, names)[_value(key, names)]
+        case ast.List(items) | ast.Tuple(items):
+            return [_value(item, names) for item in items]
+        case ast.JoinedStr(parts):
+            return "".join(str(_value(part, names)) for part in parts)
+        case ast.FormattedValue(inner, -1, None):
+            return _value(inner, names)
+        case ast.BoolOp(op, parts):
+            each = (bool(_value(part, names)) for part in parts)
+            return all(each) if isinstance(op, ast.And) else any(each)
+        case ast.UnaryOp(ast.Not(), inner):
+            return not _value(inner, names)
+        case ast.BinOp(left, op, right) if type(op) in _COMPUTE:
+            return _COMPUTE[type(op)](_value(left, names), _value(right, names))
+        case ast.Compare(left, ops, others):
+            each_value = [_value(one, names) for one in (left, *others)]
+            return all(_COMPARE[type(op)](*two) for op, two in zip(ops, pairwise(each_value), strict=True))
+        case ast.IfExp(test, body, orelse):
+            return _value(body if _value(test, names) else orelse, names)
+        case ast.ListComp(element, [loop]) | ast.GeneratorExp(element, [loop]):
+            return [_value(element, each) for each in each_of(loop, names)]
+        case ast.Call(ast.Name(name), [argument], []) if name in _FUNCTIONS:
+            return _FUNCTIONS[name](_value(argument, names))
+    raise ExpressionError(f'"{ast.unparse(node)}" is more than an expression may be here')
+
+
+def _part(whole: Any, name: str) -> Any:  # noqa: ANN401 - of a fact
+    if isinstance(whole, PersonFact | ThingFact) and name in {field.name for field in fields(whole)}:
+        return getattr(whole, name)
+    raise ExpressionError(
+        f'".{name}" is nothing that can be known; of people and things it is their name or room'
+    )
+
+
+def each_of(loop: ast.comprehension, names: Names) -> Iterator[Names]:
+    """The names for each turn of a loop such as `for person in people if person.room`.
+
+    Args:
+        loop: the loop.
+        names: what there is outside of it.
+
+    Raises:
+        ExpressionError: it is no such loop.
+    """
+    if not isinstance(loop.target, ast.Name) or loop.is_async:
+        raise ExpressionError(f'"{ast.unparse(loop.target)}" is no single name; write for NAME in ...')
+    items = _value(loop.iter, names)
+    if isinstance(items, str) or not isinstance(items, Iterable):
+        raise ExpressionError(f'"{ast.unparse(loop.iter)}" is no list')
+    for item in items:
+        each = {**names, loop.target.id: item}
+        if all(_value(test, each) for test in loop.ifs):
+            yield each

@@ -1,0 +1,91 @@
+"""Covering arrays: few rows in which every two values of any two factors meet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations, product
+from random import Random
+from typing import TypeAlias
+
+Row: TypeAlias = dict[str, int]
+"""For each factor the position of its value."""
+
+Pair: TypeAlias = tuple[tuple[str, int], tuple[str, int]]
+
+_TRIES = 12  # rows that are made up for each that is taken
+
+
+def pairs(sizes: Mapping[str, int]) -> set[Pair]:
+    """All pairs of values of two factors.
+
+    Args:
+        sizes: how many values each factor has.
+    """
+    return {
+        ((one, i), (other, j))
+        for one, other in combinations(sorted(sizes), 2)
+        for i, j in product(range(sizes[one]), range(sizes[other]))
+    }
+
+
+def met(row: Row) -> set[Pair]:
+    """The pairs that meet in a row."""
+    return set(combinations(sorted(row.items()), 2))
+
+
+def covering(sizes: Mapping[str, int], random: Random) -> list[Row]:
+    """Rows in which every pair of values meets; greedy, so that they are few but not the fewest.
+
+    Args:
+        sizes: how many values each factor has.
+        random: where draws come from.
+    """
+    if len(sizes) == 1:
+        return [{factor: value} for factor, size in sizes.items() for value in range(size)]
+    left = pairs(sizes)
+    rows: list[Row] = []
+    while left:
+        seeds = random.sample(sorted(left), min(_TRIES, len(left)))
+        best = max(
+            (_row(sizes, dict(seed), left, random) for seed in seeds), key=lambda row: len(met(row) & left)
+        )
+        rows.append(best)
+        left -= met(best)
+    return rows
+
+
+def _row(sizes: Mapping[str, int], start: Row, left: set[Pair], random: Random) -> Row:
+    row = dict(start)
+    factors = [factor for factor in sorted(sizes) if factor not in row]
+    random.shuffle(factors)
+    for factor in factors:
+        values = random.sample(range(sizes[factor]), sizes[factor])
+        row[factor] = max(values, key=lambda value: _gained(row, factor, value, left))
+    return {factor: row[factor] for factor in sizes}
+
+
+def _gained(row: Row, factor: str, value: int, left: set[Pair]) -> int:
+    new = (factor, value)
+    return sum((min(new, old), max(new, old)) in left for old in row.items())
+
+
+def drawn(sizes: Mapping[str, int], random: Random) -> Row:
+    """A row of values drawn by chance.
+
+    Args:
+        sizes: how many values each factor has.
+        random: where draws come from.
+    """
+    return {factor: random.randrange(size) for factor, size in sizes.items()}
+
+
+def spread(sizes: Mapping[str, int], count: int, random: Random) -> Sequence[Row]:
+    """A covering array, with rows drawn by chance behind it up to a number.
+
+    Args:
+        sizes: how many values each factor has.
+        count: how many rows at least.
+        random: where draws come from.
+    """
+    rows = covering(sizes, random)
+    return [*rows, *(drawn(sizes, random) for _ in range(count - len(rows)))]
