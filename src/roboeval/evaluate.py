@@ -119,6 +119,7 @@ def head(suite: Suite) -> dict[str, Any]:
         "suite": suite.name,
         "version": suite.version,
         "digest": suite.digest,
+        **({} if suite.worlds is None else {"worlds": suite.worlds, "seed": suite.seed}),
         "rules": {
             "literals": rules.literals,
             "matching": rules.matching,

@@ -225,7 +225,7 @@ def _owner(factor: str) -> str:
 
 
 def _required(text: str, names: Names) -> Iterator[str]:
-    """The requirements that an entry stands for: `check(x)`, `check(x) if ...`, `check(x) for x in ... if ...`."""
+    """The requirements that an entry stands for: `check(x)`, `... if CONDITION`, `... for NAME in LIST`."""
     try:
         node = parsed(f"({text})")
     except ExpressionError:

@@ -120,6 +120,8 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("Alice said yes and Bob said no", "alice", "bob"),
         ("Alice, Bob", "alice bob", ""),
         ("Nobody is coming", "", ""),
+        ("Here we lack: sliced bread, old Alice, Bob", "", "alice bob"),
+        ("He saw Alice, Bob, he did not see Carl", "alice bob", ""),
         ("I know Alice and another Alice", "alice", ""),
         ("malice", "", ""),
     ],
@@ -208,6 +210,12 @@ def test_mistakes_are_told(text: str, problem: str) -> None:
 def test_what_is_printed_is_rtl_again(text: str) -> None:
     assert str(parse(text)) == text.replace('r"mugs\\b"', 'r"mugs\\b"')
     assert parse(str(parse(text))) == parse(text)
+
+
+def test_what_happened_in_another_room_is_told_so() -> None:
+    why = explain(parse('tr.Exists(at("hall", say("hello")))'), (Event("say", "hello", place="lab"),))
+    assert why is not None
+    assert why.sentence.endswith('in the hall: it said "hello" at step 1, which was in the lab')
 
 
 def test_an_element_without_a_place_happens_anywhere() -> None:

@@ -14,9 +14,13 @@ _DENIAL = re.compile(
 _HALF_DAY = re.compile(r"\b([ap])\.\s?m\.?", re.IGNORECASE)
 _END = re.compile(r"[!?;\n]+|\.(?!\d)")
 _JOINT = re.compile(r",(?!\d)|(?<!\d),|\b(?:and|but|while|whereas|however|although|though)\b", re.IGNORECASE)
-_ITEM = re.compile(
-    r"(?:\W|\b(?:the|and|or|both|only|rooms?|printer|offices?)\b)*(?:\w[\w']*\W*)?", re.IGNORECASE
+_ITEM = re.compile(r"\W*(?:\w[\w']*\W+){0,2}(?:\w[\w']*\W*)?")
+_VERB = re.compile(
+    r"\b(?:is|are|was|were|am|be|has|have|had|will|would|can|could|should|does|do|did|says?|said|wants?|yes"
+    r"|accept\w*|agree\w*|join\w*|com(?:es?|ing)|lik(?:es?|ing)|needs?|buy|gave|gives?|please)\b|['\u2019]",
+    re.IGNORECASE,
 )
+_SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 
 def sentences(text: str) -> list[str]:
@@ -33,7 +37,7 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
 
     Args:
         sentence: a sentence.
-        lists: whether a clause that is one name, or one number, belongs to the next one that is more, or else
+        lists: whether a clause of a few words and without a verb belongs to the next one that is more, or else
             to the one before: `Alice and Bob are in` says of both the same.
     """
     parts = [part for part in _JOINT.split(sentence) if part.strip()]
@@ -44,14 +48,24 @@ def _gathered(parts: list[str]) -> Iterator[str]:
     waiting: list[str] = []
     done: list[str] = []
     for part in parts:
-        if _ITEM.fullmatch(part) and not denies_something(part):
+        if _is_item(part):
             waiting.append(part)
+            continue
+        if done and _SUBJECT.match(part):  # the names before it belong to what was said before
+            done[-1] = " ".join([done[-1], *waiting])
+            done.append(part)
         else:
             done.append(" ".join([*waiting, part]))
-            waiting = []
+        waiting = []
     if done:
         done[-1] = " ".join([done[-1], *waiting])
     yield from done or [" ".join(waiting)]
+
+
+def _is_item(part: str) -> bool:
+    """Whether it is a few words that say nothing by themselves, such as a name."""
+    says_something = _SUBJECT.match(part) or _VERB.search(part) or denies_something(part)
+    return _ITEM.fullmatch(part) is not None and not says_something
 
 
 def denies_something(clause: str) -> bool:

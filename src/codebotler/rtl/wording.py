@@ -122,6 +122,12 @@ def lacking(deed: Deed, event: Event) -> str:
         deed: what was wanted.
         event: what happened instead.
     """
+    if not deed[0].happens_at(event.place):
+        return f"which was in {room_name(event.place)}"
+    if deed[0].answer is not None:
+        return (
+            "which nobody answered" if event.answer is None else f"and the answer was {quoted(event.answer)}"
+        )
     absent = next((lack for element in deed if (lack := lacks(element.text, event.text))), [])
     named = len(absent) > 1 or not absent or not absent[0].startswith("does not match")
     reasons = [f"which {listed(absent) if named else 'does not match'}"] if absent else []

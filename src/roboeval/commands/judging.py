@@ -15,6 +15,7 @@ from roboeval.commands.options import (
     RunArgument,
     SuiteOption,
     TasksOption,
+    as_judged,
     command,
     cores,
     load,
@@ -44,7 +45,12 @@ def evaluate(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
     ] = None,
-    worlds: Annotated[int | None, typer.Option(help="Judge in this many generated worlds.")] = None,
+    worlds: Annotated[
+        int | None, typer.Option(min=1, help="Draw so many worlds a task, where the suite draws them.")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
+    ] = None,
     engine: Annotated[str, typer.Option(help="local or ray.")] = "local",
     require_isolation: Annotated[
         bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
@@ -57,8 +63,10 @@ def evaluate(
     from roboeval.resume import evaluate_run
     from roboeval.run import Run, open_source, tasks_to_judge
 
-    refuse_what_comes_later(worlds, engine)
+    refuse_what_comes_later(engine)
     judged_by = load(suite)
+    if worlds is not None or seed is not None:
+        judged_by = judged_by.with_worlds(worlds, seed)
     wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
     if left:
         note(f"without ablation, and so not judged: {', '.join(left)}")
@@ -101,7 +109,7 @@ def show(
     from roboeval.show import view, view_data
     from roboeval.tables import parse_selection
 
-    judged_by = load(suite)
+    judged_by = as_judged(run, load(suite), ablated=ablation)
     evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
     selection = parse_selection(what, judged_by)
     if selection.task is None:
@@ -152,7 +160,7 @@ def export(
     from roboeval.run import Run, evaluation_key
 
     kind = format or kind_of(out)
-    judged_by = load(suite)
+    judged_by = as_judged(run, load(suite), ablated=ablation)
     evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
     frame = table(watched(evaluation.rows(), "reading", evaluation.scope.total), evaluation.judged())
     again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite, ablated=ablation)
@@ -181,13 +189,12 @@ def import_(
     note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
 
 
-def refuse_what_comes_later(worlds: int | None, engine: str) -> None:
+def refuse_what_comes_later(engine: str) -> None:
     """End with a sentence about options that are promised and not there yet, or never were."""
     if engine not in {"local", "ray"}:
         fail(f'there is no engine "{engine}"; there is local, and ray is not there yet')
-    if worlds is not None or engine != "local":
-        asked = f"--engine {engine}" if worlds is None else "--worlds"
-        fail(f"{asked} is not there yet; leave it out to judge in the suite's own worlds, on this machine")
+    if engine != "local":
+        fail(f"--engine {engine} is not there yet; leave it out to judge on this machine")
 
 
 class How(TypedDict):

@@ -36,9 +36,20 @@ def load(suite: str) -> Suite:
     """Read a suite by name or folder."""
     from roboeval.suite import load_suite
 
-    if suite == "plus" and not Path(suite).exists():
-        fail('the suite "plus" is not there yet; leave --suite out to judge by the suite of the paper')
     return load_suite(suite)
+
+
+def as_judged(run: Path, suite: Suite, *, ablated: bool) -> Suite:
+    """The suite with the worlds in which a run was judged, if they were drawn otherwise than now."""
+    from roboeval.run import Run, evaluation_key, load_head
+
+    path = Run(run).head(evaluation_key(suite, ablated=ablated))
+    if suite.worlds is None or not path.is_file():
+        return suite
+    match load_head(path):
+        case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0:
+            return suite.with_worlds(worlds, seed)
+    return suite
 
 
 def command(verb: str, *arguments: object, suite: str, ablated: bool = False) -> str:
@@ -55,9 +66,12 @@ def options_of(evaluation: Evaluation, suite: Suite) -> list[str]:
     from roboeval.run import tasks_to_judge
 
     tasks = evaluation.scope.tasks
+    drawn = [("--worlds", suite.worlds), ("--seed", suite.seed)] if suite.folder else []
+    own = suite.with_own_worlds() if suite.worlds is not None else suite
+    worlds = [text for name, number in drawn if own.digest != suite.digest for text in (name, str(number))]
     if tasks in {None, tasks_to_judge(suite, None, ablated=bool(evaluation.head.get("ablation")))[0]}:
-        return []
-    return ["--tasks", ",".join(sorted(tasks or ()))]
+        return worlds
+    return ["--tasks", ",".join(sorted(tasks or ())), *worlds]
 
 
 def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) -> Evaluation:
