@@ -32,7 +32,7 @@ TABLE = SKILLS.with_skill(
 
 def wave(robot: SimulatedRobot, person: str) -> None:
     robot.record("wave", person)
-    if not robot.answers[robot.room]:
+    if not robot.people[robot.room]:
         raise RobotError("WaveNoPerson", f'nobody is here to be waved at as "{person}"')
 
 

@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.badinput import BadInput
-from codebotler.world import World
+from codebotler.world import Answer, Person, World
 from roboeval.run import write_whole
 from roboeval.suite import Scenario, Suite, Task
 
@@ -92,9 +92,23 @@ def _world_lines(scenario: Scenario) -> list[RenderableType]:
 
 def _room(world: World, index: int) -> Text:
     room = world.rooms[index]
-    who = [f"{p.name} (answers {', then '.join(p.answers) or 'nothing'})" for p in room.people]
+    who = [_person(person) for person in room.people]
     there = [*room.objects, *who, *(["the robot"] if room.name == world.robot else [])]
     return Text(f"{room.name}: {', '.join(there) or 'nobody and nothing'}")
+
+
+def _person(person: Person) -> str:
+    told = [f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]
+    told += [f"{topic}: {_answer(answer)}" for topic, answer in person.topics]
+    if person.after_looks:
+        told.append(f"comes after {person.after_looks} looks in vain")
+    if person.leaves:
+        told.append("then goes")
+    return f"{person.name} ({'; '.join(told)})"
+
+
+def _answer(answer: Answer) -> str:
+    return answer if isinstance(answer, str) else f"option {answer}"
 
 
 def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:

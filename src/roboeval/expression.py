@@ -100,7 +100,7 @@ _COMPUTE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "count": lambda items: len([*items]),
-    "number": lambda text: int(re.match(r"\d+", text)[0]),
+    "number": lambda text: int(re.findall(r"\A\d+", text)[0]),
     "sum": sum,
     "any": any,
     "all": all,

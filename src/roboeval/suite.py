@@ -47,7 +47,7 @@ class Suite:
         tasks: by name, sorted.
         digest: a hash of all that verdicts and prompts depend on.
         folder: where it was read from.
-        worlds: how many worlds a task has at least, where they are drawn; None where they are written by hand.
+        worlds: how many worlds a task has at least, where they are drawn; None if they are written by hand.
         seed: from which they are drawn.
     """
 

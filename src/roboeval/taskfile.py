@@ -63,7 +63,7 @@ def read_task(
     """
     data = _borrowed(file, lender)
     drawn = isinstance(data, dict) and isinstance(data.get("worlds"), dict)
-    form: TaskFile | DrawnTaskFile = file.validate(DrawnTaskFile if drawn else TaskFile, data)
+    form = file.validate(DrawnTaskFile, data) if drawn else file.validate(TaskFile, data)
     if form.name != path.stem:
         raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"', "name")
     checks = {check.name: check for check in _checks(form, file)}

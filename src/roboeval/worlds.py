@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import fnmatch
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from random import Random
@@ -15,7 +15,14 @@ from codebotler.badinput import Place, YamlFile
 from codebotler.world import OptionFile, Person, Room, World
 from roboeval.expression import ExpressionError, Names, PersonFact, ThingFact, each_of, parsed, value
 from roboeval.pairwise import Row, spread
-from roboeval.suitefile import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile
+from roboeval.suitefile import (
+    NOWHERE,
+    CornerFile,
+    DrawnPersonFile,
+    DrawnTaskFile,
+    DrawnThingFile,
+    DrawnWorldsFile,
+)
 
 Level: TypeAlias = str | int
 """Something that may be the case: a room, an answer, a position among the options, a number of looks."""
@@ -68,7 +75,7 @@ class Description:
             found[f"{name}.in"] = self._rooms(thing.where, ("things", name, "in"))
         return found
 
-    def _rooms(self, where: object, place: Place) -> tuple[Level, ...]:
+    def _rooms(self, where: str | list[str], place: Place) -> tuple[Level, ...]:
         levels = _levels(where)
         for level in levels:
             if level != NOWHERE and level not in self.worlds.rooms:
@@ -122,7 +129,8 @@ class Description:
     def _told(self, chosen: Mapping[str, Level]) -> str:
         """What is the case, in a few words: who and what is where, and what people answer."""
         parts = []
-        for name, thing in {**self.worlds.people, **self.worlds.things}.items():
+        everything: dict[str, DrawnPersonFile | DrawnThingFile] = {**self.worlds.people, **self.worlds.things}
+        for name, thing in everything.items():
             room = chosen[f"{name}.in"]
             places = [level for level in _levels(thing.where) if level != NOWHERE]
             told = [f"in {room}"] if len(places) > 1 and room != NOWHERE else []
@@ -205,11 +213,14 @@ class Description:
                 raise self.file.wrong(str(error), "require", number) from None
 
 
-_TRIES = 50
+_TRIES = 50  # draws for a world that is not there yet
+
+Form: TypeAlias = str | int | OptionFile
+"""A level as a task file writes it."""
 
 
-def _levels(form: object) -> tuple[Level, ...]:
-    items = form if isinstance(form, list) else [form]
+def _levels(form: Form | Sequence[Form]) -> tuple[Level, ...]:
+    items: Sequence[Form] = [form] if isinstance(form, str | int | OptionFile) else form
     return tuple(item.option if isinstance(item, OptionFile) else item for item in items)
 
 

@@ -37,8 +37,8 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
 
     Args:
         sentence: a sentence.
-        lists: whether a clause of a few words and without a verb belongs to the next one that is more, or else
-            to the one before: `Alice and Bob are in` says of both the same.
+        lists: whether a clause of a few words and without a verb belongs to the next one that is more, or
+            else to the one before: `Alice and Bob are in` says of both the same.
     """
     parts = [part for part in _JOINT.split(sentence) if part.strip()]
     return [*_gathered(parts)] if lists else parts

@@ -195,7 +195,7 @@ class _Parser:
                     return Element(asking, texts[0], mention=True)
                 if about and asking is not None:
                     return Element(asking, Regex(".*"), answer=texts[0])
-                return Element(kind, *texts)
+                return Element(kind, texts[0], texts[1] if asks else None)
         raise self.expected('an element such as goto("lobby")', node)
 
     def matched(self, node: ast.expr, depth: int) -> Text:
