@@ -33,16 +33,44 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
         verdicts: on programs that are meant to be right or wrong.
     """
     places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
-    found = [
-        *_unused(task),
-        *_untripped(task, verdicts),
-        *_same_worlds(task),
-        *(finding for place in places for finding in place.findings()),
-    ]
+    found = [*_unused(task), *_untripped(task, verdicts)]
+    if task.drawn:
+        found += _of_drawn(places)
+    else:
+        found += [*_same_worlds(task), *(finding for place in places for finding in place.findings())]
     distinct = {(finding.name, finding.line): finding for finding in reversed(found)}
     ordered = sorted(distinct.values(), key=lambda finding: (finding.line or 0, finding.name))
     reasons = {accepted.finding: accepted.because for accepted in task.accepted}
     return [*(replace(one, accepted=reasons.get(one.name)) for one in ordered), *_stale(ordered, task)]
+
+
+# --- worlds that are drawn
+
+_MOST_DRAWN = 6
+"""In how many worlds that require different things the logic of drawn ones is looked at."""
+
+
+def _of_drawn(places: Sequence[_Place]) -> Iterator[Finding]:
+    """Findings in drawn worlds, of which many require the same; what is implied is so in all looked at."""
+    different = [*{frozenset(r.formula for r in p.scenario.require): p for p in reversed(places)}.values()]
+    seen: set[str] = set()
+    for place in different:
+        for requirement in place.scenario.require:
+            if requirement.text not in seen:
+                seen.add(requirement.text)
+                yield from place.dead(requirement)
+                yield from place.absent(requirement)
+    implied: dict[int | None, list[Finding]] = {}
+    needed: set[int | None] = set()
+    for place in different[::-1][:_MOST_DRAWN]:
+        found = [*place.logic()]
+        yield from (one for one in found if one.kind != "implied")
+        subjects = {one.subject for one in found if one.kind == "implied"}
+        needed |= {r.line for r in place.scenario.require if r.text not in subjects}
+        for one in found:
+            if one.kind == "implied":
+                implied.setdefault(one.line, []).append(one)
+    yield from (several[0] for line, several in implied.items() if line not in needed)
 
 
 # --- the task as a whole

@@ -127,7 +127,7 @@ def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed
         None if head.instructions is None else _lender(file, head.instructions, path) for path in paths
     ]
     tasks = [
-        read_task(document, path, skills, lender=lender, lot=lot)
+        read_task(document, path, skills, lender=lender, lot=lot, words=head.rules.words_for_people)
         for document, path, lender in zip(documents, paths, lenders, strict=True)
     ]
     content = [file.data, *(document.data for document in documents)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -48,6 +48,7 @@ def read_task(
     *,
     lender: YamlFile | None = None,
     lot: Lot = Lot(),
+    words: Sequence[str] = (),
 ) -> Task:
     """Turn a task file into a task.
 
@@ -57,6 +58,7 @@ def read_task(
         skills: what can stand in formulas.
         lender: the file from which it takes the instruction, if it has none of its own.
         lot: how worlds are drawn, if it describes them.
+        words: for people; `{people}` in a check of drawn worlds is one of them or the name of somebody there.
 
     Raises:
         BadInput: it is wrong; the sentence names the line and the mend.
@@ -66,8 +68,12 @@ def read_task(
     form = file.validate(DrawnTaskFile, data) if drawn else file.validate(TaskFile, data)
     if form.name != path.stem:
         raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"', "name")
-    checks = {check.name: check for check in _checks(form, file)}
-    reader = _Reader(file, checks, skills)
+    names = (
+        [p.name or key for key, p in form.worlds.people.items()] if isinstance(form, DrawnTaskFile) else []
+    )
+    given = {PEOPLE: rf"(?:{'|'.join([*words, *names])})s?"} if isinstance(form, DrawnTaskFile) else {}
+    checks = {check.name: check for check in _checks(form, file, given)}
+    reader = _Reader(file, checks, skills, given)
     if isinstance(form, DrawnTaskFile):
         scenarios, ablation = reader.drawn(Description(form, file), lot), None
     else:
@@ -100,7 +106,11 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
 _PARAMETER = r" *[^\W\d]\w* *"
 
 
-def _checks(form: TaskFile | DrawnTaskFile, file: YamlFile) -> list[Check]:
+PEOPLE = "people"
+"""What every check of drawn worlds may put into its text without a parameter: whoever a look may be for."""
+
+
+def _checks(form: TaskFile | DrawnTaskFile, file: YamlFile, given: Mapping[str, str]) -> list[Check]:
     checks = []
     for head, body in form.checks.items():
         match = re.fullmatch(rf"(\w+)(?:\(({_PARAMETER}(?:,{_PARAMETER})*)\))?", head)
@@ -111,7 +121,7 @@ def _checks(form: TaskFile | DrawnTaskFile, file: YamlFile) -> list[Check]:
             sentence = f'the check "{match[1]}" has two parameters "{again}"; name them apart'
             raise file.wrong(sentence, "checks", head)
         for used in re.findall(r"\{([^\W\d]\w*)\}", body.rtl):
-            if used not in parameters:
+            if used not in parameters and used not in given:
                 known = f"its parameters are: {', '.join(parameters)}" if parameters else "it takes none"
                 sentence = f'the check "{match[1]}" has no parameter "{used}"; {known}'
                 raise file.wrong(sentence, "checks", head, "rtl")
@@ -131,6 +141,7 @@ class _Reader:
     file: YamlFile
     checks: Mapping[str, Check]
     skills: SkillTable
+    given: Mapping[str, str]
     known: dict[tuple[str, Place], Requirement] = field(default_factory=dict)
 
     def written(self, form: TaskFile) -> tuple[tuple[Scenario, ...], tuple[Scenario, ...] | None]:
@@ -179,6 +190,8 @@ class _Reader:
                 f'the check "{name}" takes {wanted}, but "{text}" gives {len(arguments)}', *at
             )
         rtl = check.rtl
+        for name, regex in self.given.items():
+            rtl = rtl.replace("{" + name + "}", regex)
         for parameter, argument in zip(check.parameters, arguments, strict=True):
             rtl = rtl.replace("{" + parameter + "}", argument)
         rtl = f"not ({rtl})" if negated else rtl

@@ -120,6 +120,7 @@ def test_a_time_lies_between_two_others_or_not() -> None:
         ("Alice said yes and Bob said no", "alice", "bob"),
         ("Alice, Bob", "alice bob", ""),
         ("Nobody is coming", "", ""),
+        ("There is no ['old alice', 'bob']", "", "alice bob"),
         ("Here we lack: sliced bread, old Alice, Bob", "", "alice bob"),
         ("He saw Alice, Bob, he did not see Carl", "alice bob", ""),
         ("I know Alice and another Alice", "alice", ""),

@@ -17,7 +17,7 @@ _JOINT = re.compile(r",(?!\d)|(?<!\d),|\b(?:and|but|while|whereas|however|althou
 _ITEM = re.compile(r"\W*(?:\w[\w']*\W+){0,2}(?:\w[\w']*\W*)?")
 _VERB = re.compile(
     r"\b(?:is|are|was|were|am|be|has|have|had|will|would|can|could|should|does|do|did|says?|said|wants?|yes"
-    r"|accept\w*|agree\w*|join\w*|com(?:es?|ing)|lik(?:es?|ing)|needs?|buy|gave|gives?|please)\b|['\u2019]",
+    r"|accept\w*|agree\w*|join\w*|com(?:es?|ing)|lik(?:es?|ing)|needs?|buy|gave|gives?|please)\b|\w['\u2019](?:re|ll|ve|m|d)\b",
     re.IGNORECASE,
 )
 _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
