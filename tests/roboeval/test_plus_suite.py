@@ -1,0 +1,156 @@
+"""The suite `plus`: its worlds are drawn as promised, and its tasks judge programs as their instructions ask."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+import yaml
+
+from codebotler.models.recorded import NAMES, recorded_model
+from codebotler.simulator.engine import run
+from codebotler.world import World
+from roboeval.evaluate import judge
+from roboeval.suite import Suite, Task, load_suite
+from roboeval.taxonomy import Verdict
+
+HERE = Path(__file__).parent
+KNOWN: list[dict[str, Any]] = yaml.safe_load((HERE / "plus" / "known.yaml").read_text())
+TASKS = sorted(load_suite("paper").tasks)
+
+
+@cache
+def plus() -> Suite:
+    return load_suite("plus")
+
+
+def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None) -> list[list[Verdict]]:
+    """How each program does in all worlds of a task, or in changed ones with the same requirements."""
+    scenarios = task.scenarios
+    shown = worlds or [scenario.world for scenario in scenarios]
+    pairs = [(program, world) for program in programs for world in shown]
+    outcomes = iter([*run(pairs, workers=2, rules=plus().rules)])
+    return [[judge(next(outcomes), scenario) for scenario in scenarios] for _ in programs]
+
+
+def passes(several: list[Verdict]) -> bool:
+    return all(verdict.satisfied for verdict in several)
+
+
+def recorded(task: Task) -> list[tuple[str, bool, str]]:
+    """The recorded programs of a task: what each is, whether it is meant to be right, and its text."""
+    replies = [recorded_model(name).replies for name in NAMES]
+    return [
+        (reply.about, reply.fails is None, reply.program)
+        for one in replies
+        for prompt in task.prompts
+        for reply in one.get(prompt, ())
+    ]
+
+
+def test_the_suite_of_the_paper_is_what_it_was() -> None:
+    assert load_suite("paper").digest == "ea395de1c023ae42bcf293f8da46567226ecc850722a2ec3a081fb90c44b5ffb"
+    assert sorted(plus().tasks) == TASKS
+    for name, task in plus().tasks.items():
+        assert task.prompts == load_suite("paper").tasks[name].prompts
+
+
+@pytest.mark.parametrize("known", KNOWN, ids=[known["key"] for known in KNOWN])
+def test_what_other_checks_misjudge_is_judged_right(known: dict[str, Any]) -> None:
+    (judged,) = verdicts([known["program"]], plus().tasks[known["task"]])
+    failed = [(v.world, [r.text for r in v.failed]) for v in judged if not v.satisfied]
+    assert passes(judged) == known["is_right"], failed[:3]
+
+
+# Where the recorded programs are judged otherwise than by the paper, and who is right.
+OTHERWISE = {
+    "puts it down under another name than it was picked up": True,
+    "puts down the bin under another name than it was picked up": True,
+    "puts down something it did not pick under that name": True,
+    "comes back to tell me the choice before bringing the drink": True,
+    "sees what there is in the kitchen before asking": True,
+    "says in an office that it is done": True,
+    "looks for Zarko in the lobby too": True,
+    "one question with the ingredients as options": False,
+    'reports "is not coming" for those who decline, naming them all the same': True,
+    "two lists side by side": False,
+    "goes through the names with an index": False,
+    "looks for her in the other office too": True,
+    "announces the errand before setting out": True,
+    "offers p.m. with full stops, which does not match what Mark answers": True,
+    "looks the offices up by name and returns early": False,
+    "returns to the start between Sally and Mark": True,
+    'says "nobody is here today" in an empty lab': True,
+    "makes sure that there are staplers in the supply room before it starts looking": True,
+    "one long sentence that names the rooms with and without a stapler together": True,
+    "searches every room with room in its name": True,
+    "says that staplers are missing, without any of the words asked for": True,
+    "greets everybody between seeing and asking them": True,
+}
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_recorded_programs_are_judged_as_they_are_meant(name: str) -> None:
+    task = plus().tasks[name]
+    programs = recorded(task)
+    judged = verdicts([program for *_, program in programs], task)
+    wrong = [
+        (
+            about,
+            [(v.world, v.outcome.error, [r.text for r in v.failed]) for v in several if not v.satisfied][:2],
+        )
+        for (about, is_right, _), several in zip(programs, judged, strict=True)
+        if passes(several) != (is_right if about not in OTHERWISE else not is_right)
+        or (about in OTHERWISE and passes(several) != OTHERWISE[about])
+    ]
+    assert wrong == []
+
+
+HARMLESS = """
+_drive = go_to
+def go_to(room):
+    _drive(room)
+    is_in_room("fire extinguisher")
+    time.sleep(1)
+"""
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
+    task = plus().tasks[name]
+    programs = [program for *_, program in recorded(task)[::3]]
+    changed = [
+        f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n"
+        '    say("Hello, I am on my way.")\n    _task()\n'
+        for program in programs
+    ]
+    before, after = verdicts(programs, task), verdicts(changed, task)
+    assert [passes(one) for one in after] == [passes(one) for one in before]
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
+    task = plus().tasks[name]
+    programs = [program for *_, program in recorded(task)]
+    right = [p for p, one in zip(programs, verdicts(programs, task), strict=True) if passes(one)][::4]
+    assert right
+    random = Random(name)
+    worlds = [
+        replace(s.world, rooms=tuple(random.sample(s.world.rooms, len(s.world.rooms))))
+        for s in task.scenarios
+    ]
+    assert all(map(passes, verdicts(right, task, worlds)))
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
+    other = plus().with_worlds(40, 77)
+    task = other.tasks[name]
+    assert {s.world for s in task.scenarios} != {s.world for s in plus().tasks[name].scenarios}
+    programs = recorded(task)
+    chosen = programs[::5]
+    judged = verdicts([program for *_, program in chosen], task)
+    for (about, is_right, _), several in zip(chosen, judged, strict=True):
+        assert passes(several) == OTHERWISE.get(about, is_right), about
