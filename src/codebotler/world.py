@@ -9,7 +9,16 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    model_validator,
+)
 
 from codebotler.badinput import Place, YamlFile
 
@@ -141,13 +150,25 @@ class _Form(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def _not_zero(option: int) -> int:
+    if option == 0:
+        raise ValueError("there is no option 0; 1 is the first, and -1 the last")
+    return option
+
+
 class OptionFile(_Form):
     """An answer as a world file writes it where it is a position among the options."""
 
-    option: Annotated[int, Field(strict=True, ge=-100, le=100)]
+    option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
 
 
-AnswerFile: TypeAlias = Text | OptionFile
+def _kind_of_answer(value: object) -> str:
+    return "option" if isinstance(value, dict | OptionFile) else "text"
+
+
+AnswerFile = Annotated[
+    Annotated[Text, Tag("text")] | Annotated[OptionFile, Tag("option")], Discriminator(_kind_of_answer)
+]
 
 
 class PersonFile(_Form):
@@ -283,8 +304,6 @@ def _distance(point: Point, start: Point, end: Point) -> float:
 
 def _regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
     if isinstance(text, OptionFile):
-        if text.option == 0:
-            raise file.wrong("there is no option 0; 1 is the first, and -1 the last", *place)
         return
     try:
         re.compile(text)

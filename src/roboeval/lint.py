@@ -51,7 +51,10 @@ _MOST_DRAWN = 6
 
 
 def _of_drawn(places: Sequence[_Place]) -> Iterator[Finding]:
-    """Findings in drawn worlds, of which many require the same; what is implied is so in all looked at."""
+    """Findings in drawn worlds, of which many require the same; what is implied is so in all looked at.
+
+    That somebody is absent says nothing there, since the requirements are computed from who is present.
+    """
     different = [*{frozenset(r.formula for r in p.scenario.require): p for p in reversed(places)}.values()]
     seen: set[str] = set()
     for place in different:
@@ -59,7 +62,6 @@ def _of_drawn(places: Sequence[_Place]) -> Iterator[Finding]:
             if requirement.text not in seen:
                 seen.add(requirement.text)
                 yield from place.dead(requirement)
-                yield from place.absent(requirement)
     implied: dict[int | None, list[Finding]] = {}
     needed: set[int | None] = set()
     for place in different[::-1][:_MOST_DRAWN]:

@@ -190,8 +190,8 @@ class _Reader:
                 f'the check "{name}" takes {wanted}, but "{text}" gives {len(arguments)}', *at
             )
         rtl = check.rtl
-        for name, regex in self.given.items():
-            rtl = rtl.replace("{" + name + "}", regex)
+        for given, regex in self.given.items():
+            rtl = rtl.replace("{" + given + "}", regex)
         for parameter, argument in zip(check.parameters, arguments, strict=True):
             rtl = rtl.replace("{" + parameter + "}", argument)
         rtl = f"not ({rtl})" if negated else rtl

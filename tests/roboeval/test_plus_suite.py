@@ -1,4 +1,4 @@
-"""The suite `plus`: its worlds are drawn as promised, and its tasks judge programs as their instructions ask."""
+"""The suite `plus`: its tasks judge as their instructions ask, and what is beside that changes nothing."""
 
 from dataclasses import replace
 from functools import cache
@@ -120,7 +120,7 @@ def go_to(room):
 @pytest.mark.parametrize("name", TASKS)
 def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
     task = plus().tasks[name]
-    programs = [program for *_, program in recorded(task)[::3]]
+    programs = [program for *_, program in recorded(task)[::7]]
     changed = [
         f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n"
         '    say("Hello, I am on my way.")\n    _task()\n'
@@ -134,7 +134,7 @@ def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: 
 def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
     task = plus().tasks[name]
     programs = [program for *_, program in recorded(task)]
-    right = [p for p, one in zip(programs, verdicts(programs, task), strict=True) if passes(one)][::4]
+    right = [p for p, one in zip(programs, verdicts(programs, task), strict=True) if passes(one)][::6]
     assert right
     random = Random(name)
     worlds = [
@@ -150,7 +150,7 @@ def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
     task = other.tasks[name]
     assert {s.world for s in task.scenarios} != {s.world for s in plus().tasks[name].scenarios}
     programs = recorded(task)
-    chosen = programs[::5]
+    chosen = programs[::9]
     judged = verdicts([program for *_, program in chosen], task)
     for (about, is_right, _), several in zip(chosen, judged, strict=True):
         assert passes(several) == OTHERWISE.get(about, is_right), about

@@ -1,0 +1,184 @@
+"""The rules by which a suite is stricter: whole words, own names, what happened; people who come and go."""
+
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.simulator.engine import run
+from codebotler.simulator.robot import RobotError, SimulatedRobot, resolve_room
+from codebotler.simulator.rules import PAPER, Rules
+from codebotler.trace import Option, Status
+from codebotler.world import Person, Room, World
+
+STRICT = Rules(
+    literals="as-written",
+    matching="whole-words",
+    people="own-name-or-word",
+    words_for_people=("person", "someone"),
+    events="as-happened",
+)
+YES_NO = (Option("I don't know"), Option("no"), Option("yes"))
+WORLD = World(
+    (
+        Room("room 1", ("mug", "stapler"), (Person("kim", ("no",)),)),
+        Room("room 12", ("bottle",), (Person("lou", (-1,)), Person("guest|visitor", ("yes",)))),
+        Room("hall"),
+    ),
+    "hall",
+)
+
+
+def robot(world: World = WORLD, rules: Rules = STRICT) -> SimulatedRobot:
+    return SimulatedRobot(world, rules)
+
+
+def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
+    one = robot()
+    one.perform("go_to", ["Room 12 or perhaps room 1"])
+    one.perform("go_to", ["the room 12"])
+    with pytest.raises(RobotError, match="no room"):
+        one.perform("go_to", ["room 123"])
+    assert [(event.kind, event.text) for event in one.trace] == [("goto", "room 1"), ("goto", "room 12")]
+    assert resolve_room(["lab", "lab 2"], "lab 2", "whole-words") == "lab 2"
+    loose = robot(rules=PAPER)
+    loose.perform("go_to", ["room 123"])
+    assert (loose.room, loose.trace[0].text) == ("room 1", "room 123")
+
+
+@pytest.mark.parametrize(
+    ("entity", "strict", "loose"),
+    [
+        ("kim", True, True),
+        ("Kim's friend", True, True),
+        ("a person", True, True),
+        ("persons", True, True),
+        ("personality", False, True),
+        ("unicorn", False, True),
+        ("lou", False, True),
+        ("staplers", True, True),
+        ("smug", False, True),
+    ],
+)
+def test_people_are_found_by_their_own_name_or_a_word_for_people(
+    entity: str,
+    strict: bool,  # noqa: FBT001 - a parameter of the test
+    loose: bool,  # noqa: FBT001 - the same
+) -> None:
+    for rules, seen in ((STRICT, strict), (PAPER, loose)):
+        one = robot(rules=rules)
+        one.perform("go_to", ["room 1"])
+        assert one.perform("is_in_room", [entity]) is seen
+
+
+def test_who_is_asked_is_who_is_meant() -> None:
+    one = robot()
+    one.perform("go_to", ["room 12"])
+    assert one.perform("ask", ["visitor", "Tea?", YES_NO]) == 2
+    assert one.perform("ask", ["lou", "Tea?", YES_NO[:2]]) == 1  # the last option
+    assert one.perform("ask", ["", "Tea?", YES_NO]) == 2
+    with pytest.raises(RobotError, match="nobody is in"):
+        one.perform("ask", ["kim", "Tea?", YES_NO])
+
+
+def test_answers_are_whole_words() -> None:
+    one, loose = robot(), robot(rules=PAPER)
+    for each, chosen in ((one, 1), (loose, 0)):
+        each.perform("go_to", ["room 1"])
+        assert each.perform("ask", ["kim", "Tea?", YES_NO]) == chosen
+
+
+def test_what_is_moved_is_the_thing_by_whatever_name() -> None:
+    one = robot()
+    one.perform("go_to", ["room 1"])
+    one.perform("pick", ["the old stapler"])
+    with pytest.raises(RobotError, match="cannot place"):
+        one.perform("place", ["mug"])
+    one.perform("place", ["stapler"])
+    assert [(event.kind, event.text) for event in one.trace[1:]] == [
+        ("pick", "stapler"),
+        ("place", "stapler"),
+    ]
+    one.perform("pick", ["stapler"])
+
+
+def test_a_topic_is_answered_by_itself() -> None:
+    knows = Person("kim", (1,), (("bread", "no"), ("cheese", "yes")))
+    one = robot(World((Room("hall", people=(knows,)),), "hall"))
+    options = (Option("Yes"), Option("No"))
+    assert one.perform("ask", ["kim", "Have you any bread?", options]) == 1
+    assert one.perform("ask", ["kim", "And cheese?", options]) == 0
+    assert one.perform("ask", ["kim", "And a pan?", options]) == 0
+
+
+def test_people_come_after_looks_in_vain_and_leave_when_asked() -> None:
+    people = (
+        Person("kim", ("yes",), leaves=True),
+        Person("lou", ("no", "yes"), after_looks=2, leaves=True),
+    )
+    one = robot(World((Room("hall", people=people),), "hall"))
+    assert one.perform("is_in_room", ["lou"]) is False
+    assert one.perform("ask", ["", "Tea?", YES_NO]) == 2
+    assert [one.perform("is_in_room", ["person"]) for _ in range(4)] == [False, False, True, True]
+    assert [one.perform("ask", ["lou", "Tea?", YES_NO]) for _ in range(2)] == [1, 2]
+    assert one.perform("is_in_room", ["person"]) is False
+    with pytest.raises(RobotError, match="nobody is in"):
+        one.perform("ask", ["", "Tea?", YES_NO])
+
+
+WAITS = """
+def task_program():
+    looks = 1
+    while not is_in_room("person"):
+        looks += 1
+        time.sleep(10)
+    say(str(looks))
+"""
+
+
+def test_a_program_that_waits_meets_who_comes() -> None:
+    world = World((Room("hall", people=(Person("kim", after_looks=5),)),), "hall")
+    (outcome,) = run([(WAITS, world)], workers=1, rules=STRICT)
+    assert outcome.status is Status.FINISHED
+    assert outcome.trace[-1].text == "6"
+
+
+FILE = """\
+about: everybody
+robot: hall
+rooms: [hall]
+people:
+  hall:
+  - name: kim
+    answers: ['yes', {option: -1}]
+    topics: {tea: 'no', cake: {option: 2}}
+    after_looks: 3
+    leaves: true
+"""
+
+
+def test_world_files_say_so_and_are_written_so(tmp_path: Path) -> None:
+    path = tmp_path / "world.yaml"
+    path.write_text(FILE)
+    world = World.read(path)
+    assert world.rooms[0].people == (
+        Person("kim", ("yes", -1), (("tea", "no"), ("cake", 2)), 3, leaves=True),
+    )
+    path.write_text(world.to_yaml())
+    assert World.read(path) == world
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "problem"),
+    [
+        ("option: 2", "option: 0", "there is no option 0"),
+        ("tea:", "'(':", "no valid regular expression"),
+        ("after_looks: 3", "after_looks: -3", "line 9"),
+    ],
+)
+def test_mistakes_in_world_files_are_told(tmp_path: Path, good: str, bad: str, problem: str) -> None:
+    path = tmp_path / "world.yaml"
+    path.write_text(FILE.replace(good, bad))
+    with pytest.raises(BadInput) as error:
+        World.read(path)
+    assert problem in str(error.value)

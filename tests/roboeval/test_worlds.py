@@ -1,0 +1,195 @@
+"""Drawn worlds: what a description may say, what is drawn from it, and what each world then requires."""
+
+import ast
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from codebotler.badinput import BadInput
+from roboeval.expression import ExpressionError, PersonFact, each_of, parsed, value
+from roboeval.pairwise import covering, met, pairs, spread
+from roboeval.suite import load_suite
+
+SUITE = "name: mine\nversion: 1\nabout: my tasks\nworlds: 12\nseed: 3\n"
+TASK = """\
+name: Tea
+summary: Tell everybody that tea is ready.
+prompts: ["Tell everybody that tea is ready."]
+worlds:
+  robot: hall
+  rooms: [lab, office, hall]
+  people:
+    kim: {in: [lab, office, nowhere], answers: [["yes", "no"], {option: -1}], after_looks: [0, 2]}
+    lou: {name: lou|louise, in: lab, topics: {tea: ["0|none", "2|two"]}, leaves: true}
+  things:
+    mug: {in: [office, nowhere]}
+  may_wait_forever: count(p for p in people if p.room) < 2
+  corners:
+    - {about: nobody is in, set: {"*.in": nowhere}}
+    - {about: lou wants two, set: {lou.topic tea: 2|two, kim.answer 1: "no"}}
+let:
+  here: '[p for p in people if p.room]'
+  cups: 'sum(number(p.topics["tea"]) for p in here if p.name == "lou")'
+checks:
+  tells(room, who):
+    category: SayAtLocation
+    rtl: tr.Exists(at("{room}", say("{who}")))
+  counts(cups):
+    category: SayAtLocation
+    rtl: tr.Exists(say(number({cups}, "cup")))
+  looks:
+    category: CheckEntityAtLocation
+    rtl: tr.Exists(check(r"\\b{people}\\b"))
+require:
+  - tells(p.room, p.name) for p in here if p.room != "hall"
+  - counts(cups) if cups
+  - not counts(3)
+  - looks
+"""
+
+
+def suite(folder: Path, task: str = TASK) -> Path:
+    (folder / "tasks").mkdir()
+    (folder / "suite.yaml").write_text(SUITE)
+    (folder / "tasks" / "Tea.yaml").write_text(task)
+    return folder
+
+
+def test_worlds_are_drawn_from_a_description(tmp_path: Path) -> None:
+    mine = load_suite(str(suite(tmp_path)))
+    scenarios = mine.tasks["Tea"].scenarios
+    assert (mine.worlds, mine.seed) == (12, 3)
+    assert len(scenarios) >= 12
+    assert [s.world.about for s in scenarios[:2]] == ["nobody is in", "lou wants two"]
+    assert len({s.world for s in scenarios}) == len(scenarios)
+    nobody, two = scenarios[:2]
+    assert nobody.world.may_wait_forever
+    assert not two.world.may_wait_forever
+    assert [r.text for r in nobody.require] == ["not counts(3)", "looks"]
+    assert [r.text for r in two.require] == [
+        'tells("lab", "kim")',
+        'tells("lab", "lou")',
+        "counts(2)",
+        "not counts(3)",
+        "looks",
+    ]
+    (kim, lou) = two.world.rooms[0].people
+    assert (kim.name, kim.answers, lou.name, lou.topics) == (
+        "kim",
+        ("no", -1),
+        "lou|louise",
+        (("tea", "2|two"),),
+    )
+    assert lou.leaves
+    assert two.world.rooms[1].objects == ("mug",)
+    assert "lou|louise" in str(two.require[-1].formula)
+
+
+def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: Path) -> None:
+    mine = load_suite(str(suite(tmp_path)))
+    again, other, more = mine.with_worlds(12, 3), mine.with_worlds(seed=4), mine.with_worlds(40)
+    assert again.digest == mine.digest == mine.with_own_worlds().digest
+    assert len({mine.digest, other.digest, more.digest}) == 3
+    assert len(more.tasks["Tea"].scenarios) >= 40
+    assert more.with_own_worlds().digest == mine.digest
+    assert other.tasks["Tea"].scenarios[2:] != mine.tasks["Tea"].scenarios[2:]
+    assert other.tasks["Tea"].scenarios[:2] == mine.tasks["Tea"].scenarios[:2]
+
+
+def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:
+    with pytest.raises(BadInput, match="written by hand"):
+        load_suite("paper").with_worlds(200)
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "problem"),
+    [
+        ("in: lab,", "in: attic,", 'line 9: there is no room "attic"'),
+        ('"*.in": nowhere', '"kim.in": hall', 'nothing that "kim.in" names can be "hall"'),
+        ("counts(cups) if cups", "counts(cup) if cups", 'nothing is called "cup"'),
+        ("not counts(3)", "not counts(here)", "an argument of a check is a text or a number"),
+        ("not counts(3)", "not 3", "is no requirement"),
+        ("not counts(3)", "counts(3", "cannot be read as an expression"),
+        ("not counts(3)", "missing(3)", 'there is no check "missing"'),
+        ('p.topics["tea"]', 'p.topics["milk"]', "cannot be computed"),
+        ("if p.room]'", "if p.age]'", '".age" is nothing that can be known'),
+        ("{option: -1}", "{option: 0}", "there is no option 0; 1 is the first, and -1 the last"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(tmp_path: Path, good: str, bad: str, problem: str) -> None:
+    assert good in TASK
+    folder = str(suite(tmp_path, TASK.replace(good, bad)))
+    with pytest.raises(BadInput) as error:
+        load_suite(folder)
+    assert problem in str(error.value)
+    assert "line " in str(error.value)
+
+
+@pytest.mark.parametrize("sizes", [{"a": 3, "b": 2, "c": 4, "d": 2}, {"a": 2, "b": 2}, {"a": 5}, {}])
+def test_every_two_values_meet(sizes: dict[str, int]) -> None:
+    rows = covering(sizes, Random(1))
+    seen = set().union(*map(met, rows)) if rows else set()
+    assert seen >= pairs(sizes)
+    assert len(spread(sizes, 30, Random(1))) >= 30
+    assert covering(sizes, Random(1)) == rows
+    if len(sizes) == 1:
+        assert {row["a"] for row in rows} == set(range(5))
+
+
+def test_every_task_of_plus_has_its_worlds_and_its_pairs() -> None:
+    for task in load_suite("plus").tasks.values():
+        assert len(task.scenarios) >= 30, task.name
+        assert len({s.world for s in task.scenarios}) == len(task.scenarios), task.name
+        assert len({s.world.about for s in task.scenarios}) == len(task.scenarios), task.name
+
+
+FACTS = {
+    "people": [PersonFact("kim", "lab", ("yes", 2), {"tea": "3|three"}, 0), PersonFact("lou", "", (), {}, 4)],
+    "rooms": ("lab", "hall"),
+    "n": 3,
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("count(p for p in people if p.room)", 1),
+        ("[p.name for p in people if p.room in rooms or p.after_looks > 2]", ["kim", "lou"]),
+        ('number(people[0].topics["tea"]) + 2 * n - 1', 8),
+        ('any("yes" in p.answers for p in people) and not all(p.room for p in people)', True),
+        ('f"{people[0].name} is in" if n == 3 else "no"', "kim is in"),
+        ("max([1, n, 2]) // 2", 1),
+        ("1 < n <= 3 != 4", True),
+    ],
+)
+def test_expressions(text: str, wanted: object) -> None:
+    assert value(parsed(text), FACTS) == wanted
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os')",
+        "people.__class__",
+        "(lambda: 1)()",
+        "[x for x in rooms for y in rooms]",
+        "n ** n",
+        "open",
+        "1 // 0",
+        "number('x')",
+        "[a for a, b in people]",
+        "[a for a in 'text']",
+        "rooms[9]",
+        "x := 3",
+    ],
+)
+def test_nothing_else_is_an_expression(text: str) -> None:
+    with pytest.raises(ExpressionError):
+        value(parsed(text), FACTS)
+
+
+def test_a_loop_binds_one_name() -> None:
+    node = parsed("[p for p in people if p.room]")
+    assert isinstance(node, ast.ListComp)
+    assert [each["p"].name for each in each_of(node.generators[0], FACTS)] == ["kim"]
