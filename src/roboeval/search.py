@@ -7,7 +7,7 @@ import multiprocessing
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, islice
 
 from rich import box
@@ -84,11 +84,20 @@ def _worlds(row: Row, question: Question, formula: Formula | None) -> Iterator[t
 
 
 def _holds(formula: Formula, data: Iterable[object]) -> bool:
-    trace: Trace = trace_from(data, further=True)
+    trace: Trace = _driven(trace_from(data, further=True))
     try:
         return holds(formula, trace)
     except CannotJudge:
         return False
+
+
+def _driven(trace: Trace) -> Trace:
+    """The trace with each event where the last drive was asked to lead; before the first nobody knows."""
+    here, events = "", []
+    for event in trace:
+        events.append(replace(event, place=here))
+        here = event.text if event.kind == "goto" else here
+    return tuple(events)
 
 
 def search(rows: Iterable[bytes], question: Question, *, workers: int = 1) -> Iterator[Found]:

@@ -183,8 +183,10 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
         (["--workers", "0"], "invalid value for '--workers': "),
         (["--workers", "many"], "invalid value for '--workers': "),
         (["--frobnicate"], "no such option: --frobnicate"),
-        (["--worlds", "7"], "--worlds is not there yet; leave it out"),
-        (["--suite", "plus"], 'the suite "plus" is not there yet; leave --suite out'),
+        (["--worlds", "7"], 'the worlds of the suite "paper" are written by hand'),
+        (["--seed", "7"], 'the worlds of the suite "paper" are written by hand'),
+        (["--suite", "plus", "--worlds", "0"], "invalid value for '--worlds': "),
+        (["--suite", "plus", "--ablation"], "no task of the suite"),
         (["--suite", "nonsense"], 'there is no suite "nonsense"'),
         (["--tasks", "SayGoodDay,Nonsense"], 'the suite "paper" has no task "Nonsense"'),
         (["--tasks", "SayGoodDay", "--ablation"], "none of SayGoodDay has an ablation"),
@@ -207,12 +209,22 @@ def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
         assert "evaluate" in ended.out
 
 
-@pytest.mark.parametrize(
-    "arguments", [("show", "run"), ("tasks",), ("export", "run"), ("import", "a.jsonl", "--out", "run")]
-)
-def test_a_suite_that_comes_later(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    sentence = refused(*arguments, "--suite", "plus", cwd=tmp_path)
-    assert sentence.startswith('the suite "plus" is not there yet; leave --suite out')
+def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row())
+    drawn = ("--suite", "plus", "--worlds", "33", "--seed", "9")
+    ended = roboeval("evaluate", "a.jsonl", "--out", "run", *drawn, cwd=tmp_path)
+    assert ended.status == 0, ended.err
+    told = json.loads((tmp_path / "run" / "evaluations" / "plus.json").read_text())
+    assert (told["worlds"], told["seed"], told["rules"]["events"]) == (33, 9, "as-happened")
+    (judged,) = (tmp_path / "run" / "evaluations" / "plus.jsonl").read_text().splitlines()
+    assert len(json.loads(judged)["verdicts"]) >= 33
+    shown = roboeval("show", "run", "SayGoodDay/0/0", "--suite", "plus", cwd=tmp_path)
+    assert shown.status == 0
+    assert "the suite has changed" not in shown.err
+    assert "9:" in shown.out or "world" in shown.out
+    sentence = refused("evaluate", "run", "--suite", "plus", cwd=tmp_path)
+    assert "--redo" in sentence
+    assert roboeval("evaluate", "run", *drawn, cwd=tmp_path).status == 0
 
 
 @pytest.mark.parametrize("verb", ["evaluate", "import"])

@@ -1,0 +1,65 @@
+"""What does a (program, world) pair cost under the suite `plus`, compared with one under `paper`?
+
+Every third recorded program is judged by both, in turns, program by program, so that the ratio holds on a
+machine whose speed drifts. A pair is run and its trace is judged. Printed: milliseconds of a pair under each,
+the ratio of the medians over rounds, and the seconds of all pairs.
+"""
+
+import statistics
+import sys
+import time
+from functools import partial
+
+from codebotler.simulator.engine import Lanes
+from codebotler.simulator.robot import SimulatedRobot
+from roboeval.evaluate import judge
+from roboeval.records import recorded_completions
+from roboeval.suite import Suite, load_suite
+
+ROUNDS = 3
+
+
+def programs(suite: Suite) -> list[tuple[str, str]]:
+    """The fixed list."""
+    models = ("recorded:careful", "recorded:hasty")
+    return sorted({(c.task, c.program) for model in models for c in recorded_completions(model, suite)})[::3]
+
+
+def seconds(lanes: Lanes, suite: Suite, task: str, program: str) -> tuple[float, int]:
+    """How long it takes to judge a program, and in how many worlds that is."""
+    scenarios = suite.tasks[task].scenarios
+    start = time.perf_counter()
+    for scenario in scenarios:
+        judge(lanes.here().run(program, partial(SimulatedRobot, scenario.world, suite.rules)), scenario)
+    return time.perf_counter() - start, len(scenarios)
+
+
+def main() -> int:
+    """Print the figures; 1 where a pair costs more than it may."""
+    suites = [load_suite("paper"), load_suite("plus")]
+    chosen = programs(suites[0])
+    means: list[list[float]] = [[], []]
+    with Lanes(1) as lanes:
+        for _ in range(ROUNDS):
+            spent, pairs = [0.0, 0.0], [0, 0]
+            for task, program in chosen:
+                for at, suite in enumerate(suites):
+                    took, worlds = seconds(lanes, suite, task, program)
+                    spent[at] += took
+                    pairs[at] += worlds
+            for at in range(2):
+                means[at].append(1000 * spent[at] / pairs[at])
+            told = [f"{s.name} {spent[i]:.1f} s for {pairs[i]:,} pairs" for i, s in enumerate(suites)]
+            print("; ".join(told), file=sys.stderr)
+    paper, plus = map(statistics.median, means)
+    costs = f"{plus:.2f} ms, and {paper:.2f} ms under paper"
+    print(f"a pair costs {plus / paper:.2f} times as much under plus as under paper ({costs})")
+    counted = f"{pairs[0]:,} pairs under paper, {pairs[1]:,} under plus"
+    print(f"{len(chosen)} programs: {counted}, {spent[1]:.1f} s for these in all")
+    return plus / paper > MOST
+
+
+MOST = 1.2
+
+if __name__ == "__main__":
+    sys.exit(main())
