@@ -15,8 +15,8 @@ class Clock:
     """Time that starts at 0 and goes on by itself, unless nobody waits for it in truth.
 
     Args:
-        speed: how many of its seconds pass in a real one, from 0.000001 to 1,000,000; None where waiting takes
-            no real time, and time passes only by waiting.
+        speed: how many of its seconds pass in a real one, from 0.000001 to 1,000,000; None where waiting
+            takes no real time, and time passes only by waiting.
 
     Raises:
         BadInput: the speed is out of its range.
