@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -24,6 +23,9 @@ from codebotler.web.turn import Order, View
 
 HERE = "current"
 """Names the mission at hand in an address."""
+
+STOPS = "the page"
+"""Who stops a mission over the API, in words."""
 
 QUIET = 15.0
 """Seconds after which a stream says that it is still there."""
@@ -140,17 +142,13 @@ def _add_changes(api: APIRouter, desk: Desk) -> None:
     async def stop_mission(mission: str) -> dict[str, Any]:
         """Stop the mission at hand; `state` says when it has stopped."""
         _expect_at_hand(desk, mission)
-        _stop(desk)
+        desk.stop_soon(STOPS)
         return view_data(desk.view)
 
     @api.post("/stop", status_code=202)
     async def stop(*, only_moving: bool = False) -> dict[str, Any]:
         """Stop whatever goes on, or only a robot that runs; whether there is anything to stop."""
-        view = desk.view
-        stopping = view.is_running if only_moving else not view.is_over
-        if stopping:
-            _stop(desk)
-        return {"stopping": stopping}
+        return {"stopping": desk.stop_soon(STOPS, only_moving=only_moving)}
 
 
 def _add_events(api: APIRouter, desk: Desk) -> None:
@@ -186,11 +184,6 @@ def _add_rest(api: APIRouter, desk: Desk) -> None:
             "reason": view.reason,
             "is_over": view.is_over,
         }
-
-
-def _stop(desk: Desk) -> None:
-    """On a thread of its own: a stop waits for nothing, and holds nothing up."""
-    threading.Thread(target=desk.stop, args=("the page",), daemon=True).start()
 
 
 async def _stream(desk: Desk, known: int) -> AsyncIterator[str]:
