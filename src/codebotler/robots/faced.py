@@ -82,8 +82,8 @@ class Faced:
         screens = self._face.screens
         told(f"shown on {screens} {'face' if screens == 1 else 'faces'}" if screens else "no face is open")
         if skill == SAY:
-            (text,) = map(str, arguments)
-            return self._say(text)
+            self._say(str(arguments[0]))
+            return None
         return self._ask(*arguments)
 
     def cancel(self) -> None:

@@ -19,7 +19,7 @@ from starlette.types import ASGIApp
 
 from codebotler import __version__
 from codebotler.terminal import note
-from codebotler.web import api, apipage, face, operate
+from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
 from codebotler.web.desk import Desk
 from codebotler.web.guard import MOST_BYTES, Guard
@@ -97,7 +97,7 @@ def application(desk: Desk) -> FastAPI:
     )
     app.include_router(api.router(desk))
     if desk.face is not None:
-        app.include_router(face.router(desk, desk.face))
+        app.include_router(facepage.router(desk, desk.face))
     apipage.add(app)
     app.mount("/static", StaticFiles(directory=STATIC))
     operate.add(desk)

@@ -68,6 +68,15 @@ class PageServer:
         self.link, self.port, self.token = link[0].strip(), int(link[1]), link[2] or ""
 
     @property
+    def face_token(self) -> str:
+        """The token of the robot's face, where it has one."""
+        ends = time.monotonic() + 10
+        while (found := re.search(r"/face\?token=(\S+)\n", self.said)) is None:
+            assert time.monotonic() < ends, self.said
+            time.sleep(0.02)
+        return found[1]
+
+    @property
     def said(self) -> str:
         """What it has told whoever started it."""
         return self._said.read_text()
@@ -109,6 +118,10 @@ class PageServer:
     def call(self, method: str, path: str, body: object = None) -> Answer:
         """Send a request as the API's clients do, with the token."""
         return self.ask(method, path, body, authorization=f"Bearer {self.token}")
+
+    def face(self, method: str, path: str, body: object = None) -> Answer:
+        """Send a request with the token of the robot's face."""
+        return self.ask(method, path, body, authorization=f"Bearer {self.face_token}")
 
     @property
     def cookie(self) -> str:

@@ -44,7 +44,7 @@ function show(told) {
   put("doing", doingWords(told));
   showSaid(told.said);
   if (told.question?.number !== before?.question?.number) ask(told.question);
-  late = performance.now() + 1000 * (told.seconds_left ?? 0);
+  late = performance.now() + 1000 * (told.seconds_left ?? Infinity);
   put("ended", ending(told));
   const isNew = before !== null; // what was said before this page was opened is not said again
   for (const { number, text } of told.said) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -111,13 +112,19 @@ def face_data(desk: Desk, face: Face) -> dict[str, Any]:
         "to": words(view.progress.room, MOST_OPTION) if is_moving else "",
         "said": [{"number": said.number, "text": words(said.text)} for said in shown.said],
         "question": None if question is None else question_data(question),
-        "seconds_left": None if question is None else round(max(0.0, question.until - time.monotonic()), 1),
+        "seconds_left": None if question is None else _left(question),
         "ended": None if shown.ended is None else _ended_data(shown.ended),
         "screens": face.screens,
         "state": view.state,
         "is_over": view.is_over,
         "reason": UNCONFIRMED if view.reason == UNCONFIRMED else "",
     }
+
+
+def _left(question: Question) -> float | None:
+    """Seconds in which it can be answered; None for ever."""
+    left = question.until - time.monotonic()
+    return round(max(0.0, left), 1) if math.isfinite(left) else None
 
 
 def question_data(question: Question) -> dict[str, Any]:
