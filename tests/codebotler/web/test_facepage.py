@@ -60,16 +60,6 @@ def until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds
     return now
 
 
-def run(server: PageServer, program: str, *, despite: bool = False) -> None:
-    server.call("POST", "/api/missions", {"program": program})
-    ends = time.monotonic() + 20
-    while (view := server.call("GET", "/api/missions/current").data)["check"] is None:
-        assert time.monotonic() < ends, view
-        time.sleep(0.01)
-    approval = {"program": view["digest"], "despite_problems": despite}
-    assert server.call("POST", "/api/missions/current/approve", approval).status == 200
-
-
 def opened(server: PageServer, path: str = LIVE, **headers: str) -> ClientConnection:
     return connect(
         f"ws://127.0.0.1:{server.port}{path}", additional_headers=headers, proxy=None, open_timeout=5
@@ -98,7 +88,7 @@ def ending(socket: ClientConnection, number: int) -> Any:  # noqa: ANN401 - JSON
 def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
     with watching(server) as one, watching(server) as other:
         heard(one, lambda now: now["screens"] == 2)
-        run(server, TEA)
+        server.run(TEA)
         asked, same = (heard(socket, lambda now: now["question"]) for socket in (one, other))
         assert asked["question"] == same["question"]
         assert (asked["doing"], asked["question"]["person"]) == ("asking", "ann")
@@ -121,7 +111,7 @@ def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
 
 def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> None:
     with watching(server) as one, watching(server) as other:
-        run(server, TEA)
+        server.run(TEA)
         number = until(server, lambda now: now["question"])["question"]["number"]
         server.call("POST", "/api/stop")
         for socket in (one, other):
@@ -132,7 +122,7 @@ def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> Non
 
 def test_nobody_answers_in_time(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--face", "--speed", "0", "--face-timeout", "1") as server:
-        run(server, TEA)
+        server.run(TEA)
         assert until(server, lambda now: now["is_over"])["ended"]["how"] == "unanswered"
         (mission,) = missions(server.home)
         assert (mission.state, mission.reason) == ("failed", 'AskTimeout: nobody answered "Tea?" within 1 s')
@@ -142,7 +132,7 @@ def test_nobody_answers_in_time(tmp_path: Path) -> None:
 
 def test_the_face_tells_what_the_robot_does_and_nothing_of_its_program(server: PageServer) -> None:
     assert server.face("GET", "/api/face").data["doing"] == "idle"
-    run(server, SECRET, despite=True)
+    server.run(SECRET, despite_problems=True)
     moving = until(server, lambda now: now["doing"] == "moving")
     assert moving["to"] == "kitchen"
     over = until(server, lambda now: now["is_over"])
@@ -159,7 +149,7 @@ def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path:
 
 
 def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> None:
-    run(server, FAR)
+    server.run(FAR)
     until(server, lambda now: now["doing"] == "moving")
     assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": True}
     assert until(server, lambda now: now["is_over"])["state"] == "stopped"
@@ -242,7 +232,7 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
         assert "face" not in server.said
         assert server.call("GET", "/face").status == 404
         assert server.call("GET", "/api/face").status == 404
-        run(server, "def task_program():\n    say('hello')\n")
+        server.run("def task_program():\n    say('hello')\n")
         while not server.call("GET", "/api/robot").data["is_over"]:
             time.sleep(0.01)
         assert missions(server.home)[-1].state == "done"

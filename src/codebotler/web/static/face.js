@@ -32,8 +32,8 @@ const sized = (element, text) => {
 };
 
 const ENDS = { done: "I have finished.", stopped: "I was stopped.", failed: "Something went wrong, and I gave up." };
-const doingWords = ({ doing, to, state, reason, said }) => {
-  const rests = reason || (said.length && ENDS[state]) || WELCOME;
+const doingWords = ({ doing, to, state, reason }) => {
+  const rests = reason || ENDS[state] || WELCOME;
   return { idle: rests, moving: to ? `On my way: ${to}` : "On my way", working: "At work …", asking: "" }[doing];
 };
 
@@ -76,16 +76,13 @@ function showSaid(said) {
 function ask(question) {
   propose(null);
   $("asked").hidden = question === null;
-  $("options").replaceChildren();
-  $("announce").textContent = "";
-  if (question !== null) {
-    put("person", question.person && `For ${question.person}`);
-    put("question", question.text || "?");
-    sized($("question"), question.text);
-    put("more", question.more_options ? `${question.more_options} more answers cannot be shown.` : "");
-    $("options").replaceChildren(...question.options.map((text, position) => option(question, text, position)));
-    $("announce").textContent = `The robot asks: ${question.text}`;
-  }
+  put("person", question?.person ? `For ${question.person}` : "");
+  put("question", question === null ? "" : question.text || "?");
+  put("more", question?.more_options ? `${question.more_options} more answers cannot be shown.` : "");
+  sized($("question"), $("question").textContent);
+  const options = question?.options.map((text, position) => option(question, text, position)) ?? [];
+  $("options").replaceChildren(...options);
+  $("announce").textContent = question === null ? "" : `The robot asks: ${question.text}`;
   listen();
 }
 
