@@ -10,7 +10,7 @@ from dataclasses import asdict
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Header, HTTPException
-from fastapi.responses import Response, StreamingResponse
+from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.archive import find, missions, summary_of
@@ -64,13 +64,21 @@ class ProgramToCheck(_Form):
     program: Text
 
 
+class AnyText(JSONResponse):
+    """JSON in ASCII, which holds texts that no encoding takes, such as half characters of a program."""
+
+    def render(self, content: object) -> bytes:
+        """As bytes."""
+        return json.dumps(content, separators=(",", ":")).encode("ascii")
+
+
 def router(desk: Desk) -> APIRouter:
     """The addresses of the API.
 
     Args:
         desk: what they speak of.
     """
-    api = APIRouter(prefix="/api", tags=["missions"])
+    api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AnyText)
     _add_missions(api, desk)
     _add_changes(api, desk)
     _add_events(api, desk)

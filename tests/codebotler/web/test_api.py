@@ -118,6 +118,13 @@ def test_a_check_alone_begins_nothing(server: PageServer) -> None:
     assert len(missions(server.home)) == before
 
 
+def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
+    view = begun(server, "def task_program():\n    say('\\ud800')\n    go_to('\\udfff')\n")
+    assert "\\udfff" in json.dumps(view["problems"])
+    raw = begun(server, "def task_program():\n    say('\ud800')\n")
+    assert raw["program"] == "def task_program():\n    say('\ud800')\n"
+
+
 @pytest.mark.parametrize(
     ("method", "path", "body", "status"),
     [
