@@ -7,9 +7,11 @@ import json
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from http import HTTPStatus
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, HTTPException
+from fastapi import APIRouter, Header, HTTPException, Request
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -70,6 +72,13 @@ class AnyText(JSONResponse):
     def render(self, content: object) -> bytes:
         """As bytes."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
+
+
+def refused(_request: Request, error: Exception) -> AnyText:
+    """Say what is wrong with a request, without sending all of it back."""
+    assert isinstance(error, RequestValidationError), "it is called for no other"
+    told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
+    return AnyText({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(desk: Desk) -> APIRouter:

@@ -13,6 +13,7 @@ from urllib.parse import urlencode
 import nicegui
 import uvicorn
 from fastapi import FastAPI
+from fastapi.exceptions import RequestValidationError
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
 from starlette.types import ASGIApp
@@ -98,6 +99,7 @@ def application(desk: Desk) -> FastAPI:
     app.include_router(api.router(desk))
     if desk.face is not None:
         app.include_router(facepage.router(desk, desk.face))
+    app.add_exception_handler(RequestValidationError, api.refused)
     apipage.add(app)
     app.mount("/static", StaticFiles(directory=STATIC))
     operate.add(desk)
