@@ -196,6 +196,7 @@ def _add_rest(api: APIRouter, desk: Desk) -> None:
             "skills": [skill.signature for skill in desk.robot.skills.values()],
             "missing": dict(desk.robot.missing),
             "models": list(desk.models),
+            "has_face": desk.face is not None,
             "mission": view.id,
             "state": view.state,
             "reason": view.reason,
