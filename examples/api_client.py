@@ -1,6 +1,6 @@
 """Have a robot carry out a program over the API: begin a mission, look at its check, approve it, answer.
 
-Give it the link that `codebotler serve --face` printed for operators; without one it starts a page of its own,
+Give it the link that `codebotler serve --face` printed for operators; without one it starts its own page,
 with a simulated robot.
 """
 

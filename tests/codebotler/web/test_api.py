@@ -16,6 +16,7 @@ import pytest
 
 from codebotler.archive import missions
 from pageserver import PageServer
+from server import Server
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 BAD = "def task_program():\n    go_to('cellar')\n"
@@ -90,6 +91,23 @@ def test_problems_need_a_word_and_the_program_that_was_seen(server: PageServer) 
     assert server.call("PUT", f"/api/missions/{view['id']}/program", {"program": HELLO}).status == 200
     mended = until(server, lambda now: now["check"] is not None)
     assert (mended["problems"], mended["program"]) == ([], HELLO)
+
+
+def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None:
+    with (
+        Server(answer=lambda asked: HELLO if "cellar" in json.dumps(asked.body) else BAD) as model,
+        PageServer(tmp_path, "--model", "completions:m", "--base-url", model.url) as server,
+    ):
+        assert server.call("POST", "/api/missions/current/again", {}).status == 409
+        server.call("POST", "/api/missions", {"instruction": "say hello"})
+        for repair, problems in ((True, 1), (False, 0), (False, 1)):
+            now = until(server, lambda now: now["check"] is not None and not now["busy"])
+            assert len(now["problems"]) == problems
+            again = server.call("POST", f"/api/missions/{now['id']}/again", {"repair": repair})
+            assert (again.status, again.data["busy"]) == (202, "asking completions:m")
+    with PageServer(tmp_path) as server:
+        begun(server, HELLO)
+        assert server.call("POST", "/api/missions/current/again", {}).status == 409, "nobody wrote it"
 
 
 def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:
@@ -169,6 +187,8 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
         server.end(signal.SIGKILL)
     with PageServer(tmp_path) as server:
         assert "was interrupted: the tool died during go_to" in server.said
+        (interrupted,) = server.call("GET", "/api/robot").data["interrupted"]
+        assert "the tool died during go_to" in interrupted["reason"]
         assert missions(tmp_path / "home")[-1].state == "interrupted"
 
 

@@ -168,6 +168,17 @@ def test_an_answer_that_is_none_is_refused(server: PageServer, answer: object) -
     assert server.face("POST", "/api/face/answer", answer).status == 422
 
 
+def test_a_face_that_reads_nothing_holds_nothing_up(tmp_path: Path) -> None:
+    """Its messages would fill all buffers many times over."""
+    talks = "def task_program():\n    for n in range(400):\n        say(str(n) + chr(8987) * 5000)\n"
+    with PageServer(tmp_path, "--face", "--speed", "0") as server, watching(server) as slow:
+        heard(slow, lambda now: now["screens"] == 1)
+        with watching(server) as quick:
+            server.run(talks, despite_problems=True)
+            over = heard(quick, lambda now: now["state"] == "done")
+            assert over["said"][-1]["text"].startswith("399")
+
+
 # --- what a face may
 
 
