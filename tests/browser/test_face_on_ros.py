@@ -21,6 +21,7 @@ from codebotler.robots.worker import lacks
 from faces import SPEAKING
 from pageserver import WORLD, PageServer
 from ros_graph import Graph
+from server import Server
 from viewing import TABLET, OpenPage
 
 TEA = """def task_program():
@@ -75,15 +76,18 @@ def virtual(graph: Graph, tmp_path: Path) -> Iterator[Path]:
         robot.communicate(timeout=20)
 
 
-def test_from_a_program_to_an_answer_on_a_real_graph(
+def test_from_an_instruction_to_an_answer_on_a_real_graph(
     graph: Graph, virtual: Path, tmp_path: Path, opened: OpenPage
 ) -> None:
     robot = ("--robot", "ros1", "--address", graph.uri, "--speed", "10", "--face")
-    with PageServer(tmp_path, *robot) as server:
+    with (
+        Server(answer=lambda _: TEA) as model,
+        PageServer(tmp_path, *robot, "--model", "completions:m", "--base-url", model.url) as server,
+    ):
         operator = opened(server)
         face = opened(server, link=server.face_link, size=TABLET, script=SPEAKING)
-        operator.locator(".cm-content").click()
-        operator.keyboard.insert_text(TEA)
+        operator.locator("textarea").fill("Ask ann in the study whether she would like tea.")
+        operator.get_by_role("button", name="Write the program").click()
         expect(operator.get_by_text("The check found no problem.")).to_be_visible()
         expect(operator.get_by_role("button", name="Run it on the robot")).to_be_enabled()
         operator.get_by_role("button", name="Run it on the robot").click()

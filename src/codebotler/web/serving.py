@@ -6,14 +6,16 @@ import logging
 import socket
 import threading
 from functools import partial
+from http import HTTPStatus
 from pathlib import Path
 from types import FrameType
 from urllib.parse import urlencode
 
 import nicegui
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
 from starlette.types import ASGIApp
@@ -23,7 +25,7 @@ from codebotler.terminal import note
 from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
 from codebotler.web.desk import Desk
-from codebotler.web.guard import MOST_BYTES, Guard
+from codebotler.web.guard import MOST_BYTES, REFUSAL, Guard
 from codebotler.web.place import Place
 from codebotler.web.presence import Presence
 
@@ -105,6 +107,7 @@ def application(desk: Desk) -> FastAPI:
     operate.add(desk)
     core.sio.eio.cors_allowed_origins = []  # NiceGUI invites all pages; the guard lets in ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]
+    nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, _not_found)
     ui.run_with(
         app,
         title="CodeBotler",
@@ -117,6 +120,14 @@ def application(desk: Desk) -> FastAPI:
         show_welcome_message=False,
     )
     return app
+
+
+def _not_found(request: Request, _error: Exception) -> Response:
+    """In a sentence, as a person or a program wants it."""
+    sentence = "there is no such page"
+    if "text/html" in request.headers.get("accept", ""):
+        return HTMLResponse(REFUSAL.format(sentence=sentence), HTTPStatus.NOT_FOUND)
+    return JSONResponse({"detail": sentence}, HTTPStatus.NOT_FOUND)
 
 
 class _Server(uvicorn.Server):

@@ -147,6 +147,7 @@ def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
 @pytest.mark.parametrize(
     ("method", "path", "body", "status"),
     [
+        ("GET", "/api/nothing", None, 404),
         ("GET", "/api/missions/20200101-000000", None, 404),
         ("GET", "/api/missions/..%2f..%2fetc/events.jsonl", None, 404),
         ("POST", "/api/missions/20200101-000000/stop", None, 409),
