@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from codebotler.archive import missions
@@ -24,6 +24,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.web.access import SHORTEST_TOKEN
 from codebotler.web.desk import Desk
 from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
+from codebotler.web.guard import MOST_BYTES
 from codebotler.web.turn import View
 from codebotler.world import Room, World
 from pageserver import PageServer
@@ -177,6 +178,16 @@ def test_a_face_that_reads_nothing_holds_nothing_up(tmp_path: Path) -> None:
             server.run(talks, despite_problems=True)
             over = heard(quick, lambda now: now["state"] == "done")
             assert over["said"][-1]["text"].startswith("399")
+
+
+def test_what_a_face_sends_has_a_limit(server: PageServer) -> None:
+    with watching(server) as socket:
+        socket.send("x" * (MOST_BYTES + 1))
+        with pytest.raises(ConnectionClosedError) as closed:
+            heard(socket, lambda _: False)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1009
+        assert server.call("GET", "/api/face").status == 200
 
 
 # --- what a face may
