@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from nicegui import html, ui
 
 from codebotler.web.desk import Desk
@@ -20,12 +22,13 @@ BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assert
 <script src="/static/stop.js"></script>"""
 
 
-def frame(title: str, here: str) -> None:
+def frame(title: str, here: str, *, has_face: bool = False) -> None:
     """What all pages of an operator have: the bar with STOP, which needs nothing of the rest to work.
 
     Args:
         title: of the page.
         here: the address of the page.
+        has_face: whether there is a face to be looked at.
     """
     ui.page_title(f"{title} · CodeBotler")
     ui.add_head_html(HEAD)
@@ -33,7 +36,8 @@ def frame(title: str, here: str) -> None:
     with ui.element("header").classes("bar"):
         html.a("CodeBotler", href="/").classes("brand")
         with ui.element("nav").props('aria-label="Pages"'):
-            for name, address in (("Robot", "/"), ("Missions", "/missions")):
+            pages = [("Robot", "/"), ("Missions", "/missions"), *([("Face", "/face")] if has_face else [])]
+            for name, address in pages:
                 link = html.a(name, href=address)
                 if address == here:
                     link.props('aria-current="page"')
@@ -45,10 +49,11 @@ def add(desk: Desk) -> None:
     Args:
         desk: what they show.
     """
+    framed = partial(frame, has_face=desk.face is not None)
 
     @ui.page("/", response_timeout=10.0)
     async def operate() -> None:
-        frame("Robot", "/")
+        framed("Robot", "/")
         Words("h1", "Operate the robot", "unseen")
         with ui.element("div").classes("operate"):
             instruct = Instruct(desk)
@@ -70,4 +75,4 @@ def add(desk: Desk) -> None:
         await ui.context.client.connected()
         await instruct.load()
 
-    add_past(desk, frame)
+    add_past(desk, framed)

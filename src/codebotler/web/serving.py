@@ -5,35 +5,44 @@ from __future__ import annotations
 import logging
 import socket
 import threading
+from functools import partial
+from http import HTTPStatus
 from pathlib import Path
 from types import FrameType
+from urllib.parse import urlencode
 
 import nicegui
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
+from starlette.types import ASGIApp
 
 from codebotler import __version__
 from codebotler.terminal import note
-from codebotler.web import api, apipage, operate
+from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
 from codebotler.web.desk import Desk
-from codebotler.web.guard import Guard
+from codebotler.web.guard import MOST_BYTES, REFUSAL, Guard
 from codebotler.web.place import Place
+from codebotler.web.presence import Presence
 
 STATIC = Path(__file__).with_name("static")
+LEAVING = "the leaving of the last operator"
 LINGER = 3
 """Seconds that streams have to end when the tool does."""
 
 
-def serve(desk: Desk, place: Place, access: Access) -> None:
+def serve(desk: Desk, place: Place, access: Access, *, alone_for: float | None = None) -> None:
     """Serve the page until Ctrl-C; a robot that runs is stopped then.
 
     Args:
         desk: not yet entered.
         place: where the page is.
         access: who may open it.
+        alone_for: a robot that runs is stopped so many seconds after the last operator left; None: never.
 
     Raises:
         BadInput: nobody can listen there.
@@ -41,7 +50,9 @@ def serve(desk: Desk, place: Place, access: Access) -> None:
     """
     with place.listening() as bound, desk:
         port = bound.getsockname()[1]
-        app = application(desk)
+        app: ASGIApp = application(desk)
+        if alone_for is not None:
+            app = Presence(app, alone_for, partial(desk.stop_soon, LEAVING, only_moving=True))
         guard = Guard(app, place.rules(access, port))
         settings = uvicorn.Config(
             guard,
@@ -49,17 +60,28 @@ def serve(desk: Desk, place: Place, access: Access) -> None:
             access_log=False,
             proxy_headers=False,
             server_header=False,
-            ws_max_size=2_000_000,
+            ws_max_size=MOST_BYTES,
             timeout_graceful_shutdown=LINGER,
         )
         for summary in desk.interrupted:
             note(f"mission {summary.id} was interrupted: {summary.reason}")
-        shown = "localhost" if place.is_loopback else socket.gethostname()
-        address = f"http://{shown}:{port}/"
-        query = "" if access.operator is None else f"?token={access.operator}"
-        note("open this link in a browser; Ctrl-C ends the page and stops the robot:\n")
-        note(f"    {address}{query}\n")
+        _tell_links(place, port, access, has_face=desk.face is not None)
         _Server(settings, desk).run([bound])
+
+
+def _tell_links(place: Place, port: int, access: Access, *, has_face: bool) -> None:
+    shown = "localhost" if place.is_loopback else socket.gethostname()
+    address = f"http://{shown}:{port}/"
+
+    def query(token: str) -> str:
+        return "" if access.operator is None else f"?{urlencode({'token': token})}"
+
+    note("open this link in a browser; Ctrl-C ends the page and stops the robot:\n")
+    note(f"    {address}{query(access.operator or '')}\n")
+    if has_face:
+        where = "here; --host lets other machines in" if place.is_loopback else "on the robot's tablet"
+        note(f"the robot's face, which can run nothing, to be opened {where}:\n")
+        note(f"    {address}face{query(access.face)}\n")
 
 
 def application(desk: Desk) -> FastAPI:
@@ -77,11 +99,15 @@ def application(desk: Desk) -> FastAPI:
         openapi_url="/api/openapi.json",
     )
     app.include_router(api.router(desk))
+    if desk.face is not None:
+        app.include_router(facepage.router(desk, desk.face))
+    app.add_exception_handler(RequestValidationError, api.refused)
     apipage.add(app)
     app.mount("/static", StaticFiles(directory=STATIC))
     operate.add(desk)
     core.sio.eio.cors_allowed_origins = []  # NiceGUI invites all pages; the guard lets in ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]
+    nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, _not_found)
     ui.run_with(
         app,
         title="CodeBotler",
@@ -94,6 +120,14 @@ def application(desk: Desk) -> FastAPI:
         show_welcome_message=False,
     )
     return app
+
+
+def _not_found(request: Request, _error: Exception) -> Response:
+    """In a sentence, as a person or a program wants it."""
+    sentence = "there is no such page"
+    if "text/html" in request.headers.get("accept", ""):
+        return HTMLResponse(REFUSAL.format(sentence=sentence), HTTPStatus.NOT_FOUND)
+    return JSONResponse({"detail": sentence}, HTTPStatus.NOT_FOUND)
 
 
 class _Server(uvicorn.Server):
