@@ -15,19 +15,23 @@ from codebotler import __version__
 from codebotler.options import (
     ROS_PYTHON,
     BaseUrlOption,
+    HostOption,
     MaxTokensOption,
     ModelOption,
+    NameOption,
+    NoTokenOption,
+    PortOption,
     RosPythonOption,
     SeedOption,
     TemperatureOption,
     TimeoutOption,
+    TokenOption,
     TopPOption,
     WorldOption,
 )
 
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
-SHORTEST_TOKEN = 16
 USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
@@ -218,15 +222,11 @@ def robots(
 
 @app.command()
 def serve(
-    host: Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0 takes a free one.")] = 8080,
-    name: Annotated[
-        list[str] | None, typer.Option(help="A name by which the page is called, besides its address.")
-    ] = None,
-    token: Annotated[str | None, typer.Option(help="What opens the page; a new one by default.")] = None,
-    no_token: Annotated[
-        bool, typer.Option("--no-token", help="Let everybody on this machine in; not with --host.")
-    ] = False,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    name: NameOption = None,
+    token: TokenOption = None,
+    no_token: NoTokenOption = False,
     robot: Annotated[
         str, typer.Option(help="Which robot: sim, or another that `codebotler robots` lists.")
     ] = "sim",
@@ -242,24 +242,19 @@ def serve(
     ros_python: Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")] = Path(
         "/usr/bin/python3"
     ),
+    runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
 ) -> None:
     """Serve the page from which a robot is operated, until Ctrl-C, which also stops the robot."""
-    from codebotler.badinput import BadInput
     from codebotler.home import home
     from codebotler.models.base import Settings
     from codebotler.models.open import kind_of, open_model
     from codebotler.robots.base import Options
     from codebotler.robots.open import open_robot
-    from codebotler.web.access import Access, new_token
     from codebotler.web.desk import Desk
-    from codebotler.web.place import Place
+    from codebotler.web.place import entrance
     from codebotler.world import World
 
-    place = Place(host, port, tuple(name or ()))
-    if no_token and (token or not place.is_loopback):
-        raise BadInput("--no-token is only for this machine; leave out --host and --token")
-    if token is not None and len(token) < SHORTEST_TOKEN:
-        raise BadInput(f"this token can be guessed; take at least {SHORTEST_TOKEN} characters, or none")
+    place, access = entrance(host, port, name or (), token, no_token=no_token)
     known = None if world is None else World.read(world)
     models = tuple(model or ("recorded:careful", "recorded:hasty"))
     for each in models:
@@ -270,9 +265,10 @@ def serve(
         open_robot(robot, options), home(), lambda m: open_model(m, settings), models=models, world=known
     )
 
+    from codebotler.web.further import installed
     from codebotler.web.serving import serve as serve_page
 
-    serve_page(desk, place, Access(None if no_token else token or new_token()))
+    serve_page(desk, place, access, installed(), runs)
 
 
 @app.command("virtual-robot")

@@ -13,7 +13,7 @@ PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>CodeBotler: the API</title>
 <link rel="stylesheet" href="/static/api.css"></head><body><main><h1>The API</h1>
 <p>Everything the page does. Show the token with each request: <code>Authorization: Bearer TOKEN</code>.
-For machines: <a href="/api/openapi.json">openapi.json</a>. <a href="/">Back to the robot</a></p>
+For machines: <a href="/api/openapi.json">openapi.json</a>. <a href="/">Back to the page</a></p>
 {calls}</main></body></html>"""
 
 
