@@ -37,11 +37,13 @@ class Pages:
 
     Args:
         name: in the bar.
+        brand: what it is all called where there are no other pages.
         address: of the first of them.
         add: puts them, and what belongs to them, at their addresses.
     """
 
     name: str
+    brand: str
     address: str
     add: Callable[[Site], None]
 

@@ -78,7 +78,7 @@ def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> 
         runs: the folder of runs for those.
     """
     links = tuple((pages.name, pages.address) for pages in further)
-    frame = Frame((*ROBOT, *links)) if desk else Frame(links, links[0][0], has_robot=False)
+    frame = Frame((*ROBOT, *links)) if desk else Frame(links, further[0].brand, has_robot=False)
     app = FastAPI(
         title="CodeBotler",
         version=__version__,
