@@ -1,4 +1,4 @@
-"""Runs over HTTP: which there are, one with its prompts, its completions page by page, and each with its verdicts."""
+"""Runs over HTTP: which there are, each with its prompts, and their completions with their verdicts."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, HTTPException, Query
 from fastapi.responses import Response
 
 from codebotler.badinput import BadInput
+from roboeval.records import Key
 from roboeval.web.followed import FollowedRun, GoneError
 from roboeval.web.seen import Seen, Wanted
 from roboeval.web.shelf import Shelf
@@ -40,6 +41,20 @@ class Choice:
     def wanted(self) -> Wanted:
         """The same as the rest calls it."""
         return Wanted(self.task, self.prompt, self.passed, self.failure, self.kind)
+
+
+@dataclass(frozen=True)
+class Which:
+    """The completion that somebody asks for, as the address says it."""
+
+    task: str
+    prompt: int
+    index: int
+
+    @property
+    def key(self) -> Key:
+        """What no other one shares."""
+        return self.task, self.prompt, self.index
 
 
 def router(shelf: Shelf) -> APIRouter:
@@ -80,12 +95,12 @@ def router(shelf: Shelf) -> APIRouter:
 
     @api.get("/{run}/completions/{task:path}/{prompt}/{index}")
     def show_completion(
-        run: str, task: str, prompt: int, index: int, evaluation: Evaluation = None
+        run: str, which: Annotated[Which, Depends()], evaluation: Evaluation = None
     ) -> Response:
         """One completion: its program, and in each world what the robot did, what failed there, and why."""
         with _refusing():
             followed, seen = _opened(shelf, run, evaluation)
-            entry = seen.by_key.get((task, prompt, index))
+            entry = seen.by_key.get(which.key)
             if entry is None:
                 raise HTTPException(404, "this run has no such completion")
             return _json(completion_told(followed, seen, entry, shelf.suite_of(seen)))

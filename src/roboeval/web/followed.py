@@ -111,8 +111,8 @@ class FollowedRun:
         """
         if entry.judged is None:
             return None
-        row = self._again(self._rows, entry.judged.at, entry.judged.size)
-        if row is None or _judged(row, 0, 0) is None or key_of(row) != entry.key:
+        row: Any = self._again(self._rows, entry.judged.at, entry.judged.size)
+        if _judged(row, 0, 0) is None or key_of(row) != entry.key:
             raise BadInput("was written anew meanwhile; reload the page", file=self._rows.path.name)
         return row
 
@@ -274,7 +274,7 @@ def _judged(row: Any, at: int, size: int) -> tuple[Key, Judged] | None:  # noqa:
 
 
 def _is_locked(path: Path) -> bool:
-    """Whether a process writes the run. The lock is let go of at once; a writer that starts just now tries again."""
+    """Whether a process writes the run. Our hold lasts a moment, for which a writer has patience."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError:

@@ -10,7 +10,7 @@ from fastapi.staticfiles import StaticFiles
 
 from codebotler.web.further import Pages, Site
 from roboeval.suite import Suite
-from roboeval.web import api
+from roboeval.web import api, oneprogram, onerun, overview, sidebyside
 from roboeval.web.shelf import Shelf
 
 STATIC = Path(__file__).with_name("static")
@@ -27,6 +27,8 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
         shelf = Shelf(site.runs, suites)
         site.app.include_router(api.router(shelf))
         site.app.mount("/static/benchmark", StaticFiles(directory=STATIC))
+        for page in (overview, onerun, sidebyside, oneprogram):
+            page.add(shelf, site.frame)
         if not site.frame.has_robot:
             site.app.get("/", include_in_schema=False)(lambda: RedirectResponse("/runs"))
 

@@ -1,4 +1,4 @@
-"""What is known of a run at a moment: an entry for each completion, and which of them somebody wants to see."""
+"""What is known of a run at a moment: an entry for each completion, and which of them are wanted."""
 
 from __future__ import annotations
 

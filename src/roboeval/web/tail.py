@@ -1,4 +1,4 @@
-"""A file of lines that somebody else goes on writing: what is new is read, what was read is not read again."""
+"""A file of lines that somebody else goes on writing: each line of it is read once."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Tail:
         return self.offset < self.size and not self._at_end
 
     def lines(self) -> Iterator[tuple[int, bytes]]:
-        """The whole lines that were not read before, each with its place in bytes; whoever stops goes on there.
+        """The whole lines that were not read before, with their places in bytes; whoever stops goes on there.
 
         Raises:
             BadInput: a line is too long; the next ones are read on.

@@ -41,23 +41,16 @@ def state_of(seen: Seen, wanted: int | None) -> State:
         wanted: how many completions it shall have; None where nobody said so.
     """
     lacks = wanted is not None and seen.written_count < wanted
-    judged = len(seen.judged)
-    match seen:
-        case _ if seen.share < 1:
-            return State.READING
-        case _ if seen.is_written and (lacks or not seen.written_count):
-            return State.GENERATING
-        case _ if seen.is_written and judged < seen.to_judge:
-            return State.JUDGING
-        case _ if not seen.entries:
-            return State.EMPTY
-        case _ if lacks:
-            return State.UNFINISHED
-        case _ if not judged:
-            return State.NOT_JUDGED
-        case _ if judged < seen.to_judge:
-            return State.UNFINISHED
-    return State.JUDGED
+    unjudged = len(seen.judged) < seen.to_judge
+    stages = (
+        (State.READING, seen.share < 1),
+        (State.GENERATING, seen.is_written and (lacks or not seen.written_count)),
+        (State.JUDGING, seen.is_written and unjudged),
+        (State.EMPTY, not seen.entries),
+        (State.NOT_JUDGED, not lacks and not seen.judged),
+        (State.UNFINISHED, lacks or unjudged),
+    )
+    return next((state for state, holds in stages if holds), State.JUDGED)
 
 
 def wanted_count(seen: Seen, suite: Suite | None) -> int | None:
@@ -108,9 +101,8 @@ def notes(seen: Seen, suite: Suite | None) -> list[str]:
     if told:
         told.append("The other rows are shown.")
     if seen.stale_count:
-        told.append(
-            f"{how_many(seen.stale_count)} changed since it was judged; `roboeval evaluate` with --redo judges anew."
-        )
+        changed = f"{how_many(seen.stale_count)} changed since the verdict"
+        told.append(f"{changed}; `roboeval evaluate` with --redo judges anew.")
     if seen.judged and suite is None:
         name = shortened(str(seen.head.get("suite")), MOST_TOLD)
         told.append(
