@@ -12,7 +12,6 @@ from fastapi import APIRouter, Depends, HTTPException, Query
 from fastapi.responses import Response
 
 from codebotler.badinput import BadInput
-from roboeval.records import Key
 from roboeval.web.followed import FollowedRun, GoneError
 from roboeval.web.seen import Seen, Wanted
 from roboeval.web.shelf import Shelf
@@ -41,20 +40,6 @@ class Choice:
     def wanted(self) -> Wanted:
         """The same as the rest calls it."""
         return Wanted(self.task, self.prompt, self.passed, self.failure, self.kind)
-
-
-@dataclass(frozen=True)
-class Which:
-    """The completion that somebody asks for, as the address says it."""
-
-    task: str
-    prompt: int
-    index: int
-
-    @property
-    def key(self) -> Key:
-        """What no other one shares."""
-        return self.task, self.prompt, self.index
 
 
 def router(shelf: Shelf) -> APIRouter:
@@ -95,12 +80,12 @@ def router(shelf: Shelf) -> APIRouter:
 
     @api.get("/{run}/completions/{task:path}/{prompt}/{index}")
     def show_completion(
-        run: str, which: Annotated[Which, Depends()], evaluation: Evaluation = None
+        run: str, task: str, prompt: int, index: int, evaluation: Evaluation = None
     ) -> Response:
         """One completion: its program, and in each world what the robot did, what failed there, and why."""
         with _refusing():
             followed, seen = _opened(shelf, run, evaluation)
-            entry = seen.by_key.get(which.key)
+            entry = seen.by_key.get((task, prompt, index))
             if entry is None:
                 raise HTTPException(404, "this run has no such completion")
             return _json(completion_told(followed, seen, entry, shelf.suite_of(seen)))
@@ -119,7 +104,7 @@ def _told(shelf: Shelf, name: str) -> dict[str, Any]:
         _, seen = _opened(shelf, name, None)
         return run_data(seen, shelf.suite_of(seen), shelf.evaluations(name))
     except BadInput as error:
-        return {"run": name, "state": "damaged", "notes": [str(error)]}
+        return {"run": name, "state": "not read", "notes": [str(error)]}
 
 
 def _json(data: object) -> Response:

@@ -57,7 +57,9 @@ class FollowedRun:
             tail.start_over()
         self._written: dict[Key, Written] = {}
         self._judged: dict[Key, Judged] = {}
-        self._order: list[Key] = []
+        self._order: list[
+            Key | None
+        ] = []  # None for a damaged row, so that the next ones keep their programs
         self._digests: list[bytes] = []
         self._faults: list[str] = []
         self._fault_count = 0
@@ -111,10 +113,11 @@ class FollowedRun:
         """
         if entry.judged is None:
             return None
-        row: Any = self._again(self._rows, entry.judged.at, entry.judged.size)
+        row = self._again(self._rows, entry.judged.at, entry.judged.size)
         if _judged(row, 0, 0) is None or key_of(row) != entry.key:
             raise BadInput("was written anew meanwhile; reload the page", file=self._rows.path.name)
-        return row
+        found: Row = row
+        return found
 
     def completion(self, entry: Entry) -> Completion | None:
         """The completion again, with its program; None if it is not there.
@@ -174,7 +177,7 @@ class FollowedRun:
         try:
             row = json.loads(line)
         except (ValueError, RecursionError):
-            raise BadInput("this line is no JSON", file=tail.path.name, line=tail.number) from None
+            row = None
         if tail is self._completions:
             self._take_completion(row, at, line)
         else:
@@ -185,12 +188,14 @@ class FollowedRun:
             completion = Completion.model_validate(row)
         except ValidationError:
             raise BadInput(
-                "this line is no completion", file=self._completions.path.name, line=self._completions.number
+                "this line is no completion; correct or remove it",
+                file=self._completions.path.name,
+                line=self._completions.number,
             ) from None
         key = _interned(completion.key)
         if key in self._written:
             raise BadInput(
-                f"{shortened(name_of(key))} stands here again",
+                f"{shortened(name_of(key))} stands here again; remove one of them",
                 file=self._completions.path.name,
                 line=self._completions.number,
             )
@@ -199,12 +204,14 @@ class FollowedRun:
 
     def _take_row(self, row: object, at: int, line: bytes) -> None:
         found = _judged(row, at, len(line))
+        self._order.append(found and found[0])
         if found is None:
             raise BadInput(
-                "this line is no row of an evaluation", file=self._rows.path.name, line=self._rows.number
+                "this line is no row of an evaluation; --redo judges again",
+                file=self._rows.path.name,
+                line=self._rows.number,
             )
         key, judged = found
-        self._order.append(key)
         self._judged[key] = judged
 
     def _fault(self, error: BadInput) -> None:

@@ -20,7 +20,7 @@ from codebotler.world import World
 from roboeval.records import Key, name_of
 from roboeval.suite import ABLATED, Suite
 from roboeval.tables import NOT_RECORDED, by_hand
-from roboeval.web.api import Choice, Evaluation, Which
+from roboeval.web.api import Choice, Evaluation
 from roboeval.web.parts import Code, begin
 from roboeval.web.seen import Wanted
 from roboeval.web.shades import address, query_of
@@ -40,18 +40,18 @@ def add(shelf: Shelf, frame: Frame) -> None:
         frame: what all pages have.
     """
 
-    @ui.page("/runs/{run}/{task:path}/{prompt}/{index}", response_timeout=10.0)
+    @ui.page("/runs/{run}/{which:path}", response_timeout=10.0)
     async def one_program(
         run: str,
-        which: Annotated[Which, Depends()],
+        which: str,
         choice: Annotated[Choice, Depends()],
         evaluation: Evaluation = None,
     ) -> None:
-        begin(frame, shortened(name_of(which.key), MOST_NAME))
+        begin(frame, shortened(which, MOST_NAME))
         with ui.element("main").classes("benchmark"):
             try:
                 told, beside, suite = await asyncio.to_thread(
-                    _read, shelf, run, which.key, choice.wanted, evaluation
+                    _read, shelf, run, which, choice.wanted, evaluation
                 )
             except BadInput as error:
                 Words("p", error.sentence, "trouble").props("role=alert")
@@ -64,15 +64,15 @@ def add(shelf: Shelf, frame: Frame) -> None:
 
 
 def _read(
-    shelf: Shelf, run: str, key: Key, wanted: Wanted, evaluation: str | None
+    shelf: Shelf, run: str, which: str, wanted: Wanted, evaluation: str | None
 ) -> tuple[dict[str, Any], list[Key | None], Suite | None]:
     followed = shelf.open(run, evaluation)
     seen = followed.wait()
     suite = shelf.suite_of(seen)
-    entry = seen.by_key.get(key)
+    entry = next((entry for key, entry in seen.by_key.items() if name_of(key) == which), None)
     if entry is None:
-        raise BadInput(f"this run has no completion {shortened(name_of(key), MOST_NAME)}")
-    beside = list(seen.neighbours(key, wanted, order_of(suite)))
+        raise BadInput(f'this run has no completion "{shortened(which, MOST_NAME)}"')
+    beside = list(seen.neighbours(entry.key, wanted, order_of(suite)))
     return completion_told(followed, seen, entry, suite), beside, suite
 
 

@@ -17,7 +17,7 @@ from codebotler.web.words import Press, Words
 from roboeval.suite import Suite
 from roboeval.web.api import Choice, Evaluation
 from roboeval.web.followed import FollowedRun, GoneError
-from roboeval.web.overview import EVERY, GROWING, count_of, progress_of
+from roboeval.web.overview import EVERY, GROWING, count_of, progress_of, score_of
 from roboeval.web.parts import Heat, Rows, begin
 from roboeval.web.seen import Seen, Wanted
 from roboeval.web.shades import NONE, Shades, address, columns, percent, query_of, title_of
@@ -66,14 +66,14 @@ class _RunPage:
                 Words(
                     "p", "Percent of the completions of each prompt; the first column is their mean.", "quiet"
                 )
-            with ui.element("section").classes("pane").props("aria-labelledby=h-kinds"):
+            with ui.element("section").classes("pane ends").props("aria-labelledby=h-kinds"):
                 Words("h2", "How they end").props("id=h-kinds")
                 self._kinds = ui.element("div").classes("kinds")
-        with ui.element("section").classes("pane").props("id=completions aria-labelledby=h-list"):
-            with ui.element("div").classes("head"):
-                self._which = Words("h2", "").props("id=h-list")
-                self._all = Press("Show all", lambda: self._choose(Wanted()), "plain small")
-            self._rows = Rows(address(followed.run.path.name))
+            with ui.element("section").classes("pane list").props("id=completions aria-labelledby=h-list"):
+                with ui.element("div").classes("head"):
+                    self._which = Words("h2", "").props("id=h-list")
+                    self._all = Press("Show all", lambda: self._choose(Wanted()), "plain small")
+                self._rows = Rows(address(followed.run.path.name))
 
     async def refresh(self) -> None:
         """Show what is known by now.
@@ -186,13 +186,7 @@ class _Head:
         self._who.say(
             f"{title_of(seen)}, judged by {shortened(seen.key, MOST_NAME)}" if seen.key else title_of(seen)
         )
-        mean = told["pass@1"]
-        said = (
-            ""
-            if mean is None
-            else f"pass@1 {mean['mean']:.3f} (95% interval {mean['low']:.2f} to {mean['high']:.2f})"
-        )
-        self._score.say(said)
+        self._score.say(score_of(told))
         self._count.say(f"{count_of(told)} completions")
         done, of = progress_of(told)
         self._bar.set_visibility(told["state"] in GROWING)

@@ -68,7 +68,7 @@ def looked_at(shelf: Shelf) -> list[dict[str, Any]]:
             seen = shelf.open(name).look(max(0.0, until - time.monotonic()))
             found.append(run_data(seen, shelf.suite_of(seen), shelf.evaluations(name)))
         except BadInput as error:
-            found.append({"run": name, "state": "damaged", "notes": [str(error)]})
+            found.append({"run": name, "state": "not read", "notes": [str(error)]})
     return found
 
 
@@ -180,6 +180,7 @@ class _Row:
         mean = told.get("pass@1")
         self._score.say(NONE if mean is None else f"{mean['mean']:.3f}")
         self._interval.say("" if mean is None else f"{mean['low']:.2f} to {mean['high']:.2f}")
+        self._meter.set_visibility(mean is not None)
         self._meter.style(f"--share: {0 if mean is None else mean['mean']:.3f}")
 
 
@@ -205,3 +206,11 @@ def count_of(told: Mapping[str, Any]) -> str:
     if judged < told["to_judge"]:
         return f"{judged:,} of {told['to_judge']:,} judged"
     return f"{judged or written:,}"
+
+
+def score_of(told: Mapping[str, Any]) -> str:
+    """How often its programs pass, in words; nothing where nobody knows."""
+    mean = told.get("pass@1")
+    if mean is None:
+        return ""
+    return f"pass@1 {mean['mean']:.3f} (95% interval {mean['low']:.2f} to {mean['high']:.2f})"

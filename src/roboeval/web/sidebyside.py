@@ -14,7 +14,7 @@ from codebotler.terminal import shortened
 from codebotler.web.frame import Frame
 from codebotler.web.words import Words
 from roboeval.suite import Suite
-from roboeval.web.overview import EVERY
+from roboeval.web.overview import EVERY, count_of, score_of
 from roboeval.web.parts import Heat, begin
 from roboeval.web.seen import Seen, Wanted
 from roboeval.web.shades import Shades, address, columns, kinds_table, title_of
@@ -61,6 +61,7 @@ class _SideBySide:
         self._shelf, self._names = shelf, names
         self._versions: list[tuple[str, int]] = []
         self._troubles = ui.element("div").props("role=status")
+        self._list = ui.element("ul").classes("beside-list")
         with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
             Words("h2", "Where they pass").props("id=h-heat")
             self._heat = Heat("Tasks by prompts, run by run", "Task")
@@ -69,7 +70,7 @@ class _SideBySide:
                 "Percent of the completions of each prompt; the first column of a run is their mean.",
                 "quiet",
             )
-        with ui.element("section").classes("pane").props("aria-labelledby=h-kinds"):
+        with ui.element("section").classes("pane causes").props("aria-labelledby=h-kinds"):
             Words("h2", "Why they fail").props("id=h-kinds")
             self._kinds = Heat("Kinds of failures by run", "Kind of failure")
             Words("p", "Percent of all completions of a run.", "quiet")
@@ -101,12 +102,14 @@ class _SideBySide:
         return runs, troubles
 
     def _draw(self, runs: Sequence[tuple[Seen, Suite | None]]) -> None:
+        self._list.clear()
+        with self._list:
+            for seen, suite in runs:
+                _draw_run(seen, run_data(seen, suite, ()))
         shades = [Shades(seen, suite, Wanted(), None) for seen, suite in runs]
         groups: list[dict[str, Any]] = []
-        for (seen, suite), one in zip(runs, shades, strict=True):
-            mean = run_data(seen, suite, ())["pass@1"]
-            score = "" if mean is None else f", pass@1 {mean['mean']:.3f}"
-            name = shortened(seen.name, MOST_NAME) + score
+        for (seen, _), one in zip(runs, shades, strict=True):
+            name = shortened(seen.name, MOST_NAME)
             groups.append(
                 {
                     "name": name,
@@ -126,3 +129,11 @@ class _SideBySide:
         self._heat.show(groups, rows)
         judged = [seen for seen, _ in runs if seen.judged]
         self._kinds.show(*(kinds_table(judged, lambda _: None) if judged else ([], [])))
+
+
+def _draw_run(seen: Seen, told: dict[str, Any]) -> None:
+    with ui.element("li"):
+        html.a(shortened(seen.name, MOST_NAME), href=address(seen.name)).props("dir=auto")
+        Words("small", str(told["state"]), f"state state-{str(told['state']).replace(' ', '-')}")
+        Words("b", score_of(told))
+        Words("span", f"{count_of(told)} completions, {title_of(seen)}", "quiet")

@@ -31,6 +31,7 @@ class State(StrEnum):
     NOT_JUDGED = "not judged"
     JUDGED = "judged"
     EMPTY = "empty"
+    DAMAGED = "damaged"
 
 
 def state_of(seen: Seen, wanted: int | None) -> State:
@@ -46,6 +47,7 @@ def state_of(seen: Seen, wanted: int | None) -> State:
         (State.READING, seen.share < 1),
         (State.GENERATING, seen.is_written and (lacks or not seen.written_count)),
         (State.JUDGING, seen.is_written and unjudged),
+        (State.DAMAGED, seen.fault_count > 0),
         (State.EMPTY, not seen.entries),
         (State.NOT_JUDGED, not lacks and not seen.judged),
         (State.UNFINISHED, lacks or unjudged),

@@ -25,7 +25,7 @@ export default {
         </thead>
         <tbody>
           <tr v-for="row in rows" :key="row.name">
-            <th scope="row" class="name" dir="auto">{{ row.name }}</th>
+            <th scope="row" class="name" dir="auto"><template v-for="piece in pieces(row.name)">{{ piece }}<wbr></template></th>
             <td v-for="cell in row.cells" :class="cell.look">
               <a v-if="cell.href" :href="cell.href" :title="cell.told" :aria-label="cell.told"
                 :aria-current="cell.here ? 'true' : null" @click="choose($event, cell)">{{ cell.text }}</a>
@@ -36,6 +36,7 @@ export default {
       </table>
     </div>`,
   methods: {
+    pieces: (name) => name.split(/(?<=[a-z:])(?=[A-Z ])/),
     choose(event, cell) {
       if (!cell.at || event.ctrlKey || event.metaKey || event.shiftKey || event.altKey) return;
       event.preventDefault();
