@@ -1,10 +1,10 @@
 """How long does it take to open a run of 4,000 completions in a browser, and to scroll through it?
 
 A run is made up: verdicts on the programs that ship with the package, repeated. `roboeval serve` shows it in
-the system's Chromium. Printed are the worst of OPENS=10 and the middle one, in milliseconds, once everything was
-opened before: until the heat map and the first completions of a run stand there, the same of its page of all
-runs, of a filter, and of one completion; and until the completions at a place stand there after a jump to it.
-The first opening, for which the files are read, is printed besides.
+the system's Chromium. Printed are the worst of OPENS=10 and the middle one, in milliseconds, once all pages
+were opened before: until the heat map and the first completions of a run stand there, the same of the page of
+all runs, of a filter, and of one completion; and until the completions at a place stand there after a jump to
+it. The first opening, for which the files are read, is printed besides.
 """
 
 import os

@@ -36,7 +36,6 @@ def add(desk: Desk, frame: Frame) -> None:
 
         def refresh() -> None:
             nonlocal seen
-            program.send_typed()
             version = desk.board.version
             if version != seen:
                 seen = version
@@ -48,6 +47,5 @@ def add(desk: Desk, frame: Frame) -> None:
         ui.timer(EVERY, refresh, immediate=False)
         await ui.context.client.connected()
         await instruct.load()
-        await program.take_colours()
 
     add_past(desk, frame)

@@ -12,7 +12,7 @@ from typing import BinaryIO
 from codebotler.badinput import BadInput
 
 KEPT = 200
-"""Bytes before the place that was reached, by which a file is known again."""
+"""Bytes at its beginning, and before the place that was reached, by which a file is known again."""
 
 
 class Change(Enum):
@@ -44,7 +44,7 @@ class Tail:
         self._known: tuple[int, int] | None = None
         self._changed = 0
         self._at_end = False
-        self._last = b""
+        self._first = self._last = b""
 
     def look(self) -> Change:
         """Say what became of the file, for a few system calls.
@@ -66,8 +66,9 @@ class Tail:
                 same = found.st_mtime_ns == self._changed
                 return Change.ANOTHER if not same else Change.MORE if self._stopped else Change.NONE
         with self._opened() as file:
+            begins = file.read(len(self._first)) == self._first
             file.seek(max(0, self.offset - len(self._last)))
-            if file.read(len(self._last)) != self._last:
+            if not begins or file.read(len(self._last)) != self._last:
                 return Change.ANOTHER
         self._known, self.size, self._changed = identity, found.st_size, found.st_mtime_ns
         self._at_end = False
@@ -102,7 +103,7 @@ class Tail:
                 at = self.offset
                 self.number += 1
                 self.offset += len(line)
-                self._last = line[-KEPT:]
+                self._first, self._last = self._first or line[:KEPT], line[-KEPT:]
                 yield at, line
 
     def at(self, place: int, size: int) -> bytes:
