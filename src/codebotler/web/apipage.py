@@ -29,7 +29,17 @@ def _calls(about: dict[str, Any]) -> Iterator[str]:
     for path, methods in about["paths"].items():
         for method, call in methods.items():
             yield f"<section><h2><b>{method.upper()}</b> {escape(path)}</h2>"
-            yield f"<p>{escape(call.get('description', ''))}</p>{_body(call, about)}</section>"
+            yield f"<p>{escape(call.get('description', ''))}</p>"
+            yield f"{_queries(call)}{_body(call, about)}</section>"
+
+
+def _queries(call: dict[str, Any]) -> str:
+    rows = [
+        f"<li><code>?{escape(one['name'])}=</code> {escape(one['description'])}</li>"
+        for one in call.get("parameters", ())
+        if one["in"] == "query" and "description" in one
+    ]
+    return f"<ul>{''.join(rows)}</ul>" if rows else ""
 
 
 def _body(call: dict[str, Any], about: dict[str, Any]) -> str:

@@ -37,7 +37,7 @@ class Shelf:
     @property
     def is_run(self) -> bool:
         """Whether the folder is a run itself."""
-        return Run(self.folder).completions.exists()
+        return Run(self.folder).completions.is_file()
 
     def names(self) -> list[str]:
         """The names of the runs, sorted.
