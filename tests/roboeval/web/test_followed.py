@@ -172,7 +172,7 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
     seen = seen_of(run)
     unjudged = tuple(type(e)(e.key, e.written, None) for e in seen.entries)
     partly = (*unjudged[:5], *seen.entries[5:])
-    for changes, wanted, state in [
+    cases: list[tuple[dict[str, Any], int | None, State]] = [
         ({"share": 0.5}, 45, State.READING),
         ({"is_written": True, "entries": unjudged}, 50, State.GENERATING),
         ({"is_written": True, "entries": ()}, None, State.GENERATING),
@@ -183,13 +183,14 @@ def test_how_far_a_run_has_come(runs: Path) -> None:
         ({"entries": unjudged}, 45, State.NOT_JUDGED),
         ({"entries": partly}, 45, State.UNFINISHED),
         ({}, None, State.JUDGED),
-    ]:
+    ]
+    for changes, wanted, state in cases:
         assert state_of(seen_of(run, **changes), wanted) is state, state
 
 
 def test_a_look_reads_a_part_and_the_next_one_goes_on(runs: Path) -> None:
     run = followed(runs / "hasty")
-    shares = []
+    shares: list[float] = []
     while not shares or shares[-1] < 1:
         shares.append(run.look(0.0).share)
     assert len(shares) > 45
