@@ -76,7 +76,7 @@ def router(shelf: Shelf) -> APIRouter:
             _, seen = _opened(shelf, run, evaluation)
             found = seen.chosen(choice.wanted, order_of(shelf.suite_of(seen)))
         part = [entry_data(entry) for entry in found[offset : offset + limit]]
-        return _json({"version": seen.version, "total": len(found), "offset": offset, "completions": part})
+        return _json({"total": len(found), "offset": offset, "completions": part})
 
     @api.get("/{run}/completions/{task:path}/{prompt}/{index}")
     def show_completion(

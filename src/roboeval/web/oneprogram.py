@@ -48,7 +48,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
         evaluation: Evaluation = None,
     ) -> None:
         begin(frame, shortened(which, MOST_NAME))
-        with ui.element("main").classes("benchmark"):
+        with ui.element("div").classes("benchmark"):
             try:
                 told, beside, suite = await asyncio.to_thread(
                     _read, shelf, run, which, choice.wanted, evaluation

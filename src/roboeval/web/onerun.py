@@ -25,6 +25,7 @@ from roboeval.web.shelf import Shelf
 from roboeval.web.telling import classes_of, run_data
 
 MOST_NAME = 80
+GONE = "This run is gone: its folder was deleted or renamed. What is below was read before."
 
 
 def add(shelf: Shelf, frame: Frame) -> None:
@@ -38,7 +39,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
     @ui.page("/runs/{run}", response_timeout=10.0)
     async def one_run(run: str, choice: Annotated[Choice, Depends()], evaluation: Evaluation = None) -> None:
         begin(frame, shortened(run, MOST_NAME))
-        with ui.element("main").classes("benchmark"):
+        with ui.element("div").classes("benchmark"):
             try:
                 followed = await asyncio.to_thread(shelf.open, run, evaluation)
                 page = _RunPage(shelf, followed, choice.wanted, evaluation)
@@ -57,12 +58,13 @@ class _RunPage:
         self._shelf, self._followed, self._wanted, self._evaluation = shelf, followed, wanted, evaluation
         self._seen: Seen | None = None
         self._told: dict[str, Any] = {}
+        self._changes = 0
         self.timer: ui.timer | None = None
         self._head = _Head(followed.run.path.name)
         with ui.element("div").classes("findings"):
             with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
                 self._title = Words("h2", "").props("id=h-heat")
-                self._heat = Heat("Tasks by prompts", "Task")
+                self._heat = Heat("Tasks by prompts", "Task", self._choose_cell)
                 Words(
                     "p", "Percent of the completions of each prompt; the first column is their mean.", "quiet"
                 )
@@ -83,19 +85,22 @@ class _RunPage:
         """
         try:
             seen, told, suite = await asyncio.to_thread(self._look)
-        except GoneError as error:
+        except GoneError:
             if self._seen is None:
                 raise
-            self._head.trouble(f"This run {error.sentence}. What is below was read before.")
+            self._head.trouble(GONE)
             if self.timer is not None:
                 self.timer.deactivate()
             return
         if seen != self._seen:
             self._seen = seen
             self._told = told
+            self._changes += 1
             self._draw(suite)
 
     def _look(self) -> tuple[Seen, dict[str, Any], Suite | None]:
+        # anew each time: what was only being generated may have an evaluation by now
+        self._followed = self._shelf.open(self._name, self._evaluation)
         seen = self._followed.look()
         suite = self._shelf.suite_of(seen)
         return seen, run_data(seen, suite, self._shelf.evaluations(seen.name)), suite
@@ -106,6 +111,9 @@ class _RunPage:
         self._head.show(seen, self._told, self._evaluation)
         self._suite = suite
         self._show_choice()
+
+    def _choose_cell(self, task: str, prompt: int | None) -> None:
+        self._choose(replace(self._wanted, task=task, prompt=prompt))
 
     def _choose(self, wanted: Wanted) -> None:
         self._wanted = wanted
@@ -130,7 +138,7 @@ class _RunPage:
         self._all.set_visibility(wanted != Wanted())
         query = query_of(wanted, self._followed.key)
         source = f"/api/runs/{quote(self._name, safe='')}/completions{query or '?'}"
-        self._rows.show(source, query_of(wanted, self._evaluation), seen.version)
+        self._rows.show(source, query_of(wanted, self._evaluation), self._changes)
         self._draw_kinds(seen)
 
     def _draw_kinds(self, seen: Seen) -> None:

@@ -47,7 +47,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
     @ui.page("/runs", response_timeout=10.0)
     async def list_runs() -> None:
         begin(frame, "Runs")
-        with ui.element("main").classes("benchmark"):
+        with ui.element("div").classes("benchmark"):
             Words("h1", "Runs")
             Words("p", f"In {shortened(str(shelf.folder.resolve()), 200)}", "quiet")
             table = _Table(shelf)
@@ -93,7 +93,8 @@ class _Table:
                 html.table().classes("runs"),
             ):
                 with html.thead(), html.tr():
-                    html.th().props("scope=col").classes("tick")
+                    with html.th().props("scope=col").classes("tick"):
+                        Words("span", "Side by side", "unseen")
                     for name in ("Run", "Suite", "State", "Completions", "pass@1"):
                         self._head(name)
                 self._body = html.tbody()

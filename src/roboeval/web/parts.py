@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from keyword import kwlist
 from typing import Any, TypeAlias
 
@@ -48,11 +48,16 @@ class Heat(Element, component="static/heat.js"):
     Args:
         label: what it is, for those who do not see it.
         corner: what its rows are.
+        chosen: called with the task and the prompt of a cell that is clicked; by default cells are links.
     """
 
-    def __init__(self, label: str, corner: str) -> None:
+    def __init__(
+        self, label: str, corner: str, chosen: Callable[[str, int | None], None] | None = None
+    ) -> None:
         super().__init__()
-        self._props.update(label=label, corner=corner, groups=[], rows=[])
+        self._props.update(label=label, corner=corner, groups=[], rows=[], chooses=chosen is not None)
+        if chosen is not None:
+            self.on("choose", lambda event: chosen(*event.args))
 
     def show(self, groups: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]) -> None:
         """Show other numbers.

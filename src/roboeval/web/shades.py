@@ -40,7 +40,7 @@ def shade(share: float | None, *, bad: bool) -> str:
 
 def address(run: str) -> str:
     """Where the page of a run is."""
-    return f"/runs/{quote(run, safe='')}"
+    return f"/runs/{quote(run, safe='', errors='replace')}"
 
 
 def query_of(wanted: Wanted, evaluation: str | None) -> str:
@@ -53,7 +53,7 @@ def query_of(wanted: Wanted, evaluation: str | None) -> str:
         "failure": wanted.failure_class,
         "kind": wanted.kind,
     }
-    found = urlencode({name: value for name, value in given.items() if value is not None})
+    found = urlencode({name: value for name, value in given.items() if value is not None}, errors="replace")
     return f"?{found}" if found else ""
 
 
@@ -132,7 +132,7 @@ class Shades:
             "told": f"{which}: {told}",
             "href": address(self._seen.name) + query_of(place, self._evaluation) + "#completions",
             "here": here,
-            "at": [task, prompt],
+            "at": [task.encode(errors="replace").decode(), prompt],
         }
 
 

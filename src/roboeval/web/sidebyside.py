@@ -41,7 +41,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
     async def side_by_side(run: Names = None) -> None:
         begin(frame, "Side by side")
         names = list(dict.fromkeys(run or ()))
-        with ui.element("main").classes("benchmark"):
+        with ui.element("div").classes("benchmark"):
             Words("h1", "Runs side by side")
             if not names:
                 Words("p", "Tick runs in the list, then show them side by side.", "quiet")

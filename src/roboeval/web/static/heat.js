@@ -1,6 +1,6 @@
 // A table of shares with a shade and a number in each cell; cells lead to their completions.
 export default {
-  props: { label: String, corner: String, groups: Array, rows: Array },
+  props: { label: String, corner: String, groups: Array, rows: Array, chooses: Boolean },
   emits: ["choose"],
   template: `
     <div class="heat" tabindex="0" role="region" :aria-label="label">
@@ -38,7 +38,7 @@ export default {
   methods: {
     pieces: (name) => name.split(/(?<=[a-z:])(?=[A-Z ])/),
     choose(event, cell) {
-      if (!cell.at || event.ctrlKey || event.metaKey || event.shiftKey || event.altKey) return;
+      if (!this.chooses || event.ctrlKey || event.metaKey || event.shiftKey || event.altKey) return;
       event.preventDefault();
       this.$emit("choose", cell.at);
     },

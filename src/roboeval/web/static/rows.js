@@ -6,27 +6,29 @@ const LOST = "The tool cannot be reached; is it still running?";
 export default {
   props: { source: String, version: Number, base: String, query: String },
   template: `
-    <div class="completions" role="table" :aria-rowcount="total + 1" aria-label="Completions" aria-describedby="count">
+    <div class="completions">
       <p id="count" class="quiet" role="status">{{ told }}</p>
-      <div role="rowgroup" class="completions-head">
-        <div role="row" aria-rowindex="1" class="completion">
-          <span role="columnheader">Completion</span><span role="columnheader">Verdict</span>
-          <span role="columnheader">Worlds</span><span role="columnheader">What failed first</span>
+      <div role="table" :aria-rowcount="total + 1" aria-label="Completions" aria-describedby="count">
+        <div role="rowgroup" class="completions-head">
+          <div role="row" aria-rowindex="1" class="completion">
+            <span role="columnheader">Completion</span><span role="columnheader">Verdict</span>
+            <span role="columnheader">Worlds</span><span role="columnheader">What failed first</span>
+          </div>
         </div>
-      </div>
-      <div ref="view" role="rowgroup" class="completions-view" tabindex="0" aria-label="Completions, in order"
-        :style="{ height: Math.max(1, Math.min(total, 12)) * tall + 'px' }" @scroll.passive="look">
-        <div class="completions-all" role="presentation" :style="{ height: total * tall + 'px' }">
-          <div v-for="row in shown" :key="row.at" role="row" class="completion" :aria-rowindex="row.at + 2"
-            :style="{ transform: 'translateY(' + row.at * tall + 'px)', height: tall + 'px' }">
-            <template v-if="row.one">
-              <span role="cell" class="which"><a :href="address(row.one)" dir="auto">{{ name(row.one) }}</a></span>
-              <span role="cell" class="verdict-cell"><b :class="lookOf(row.one)" dir="auto">{{ verdict(row.one) }}</b></span>
-              <span role="cell" class="worlds"><span role="img" :aria-label="worlds(row.one)" :title="worlds(row.one)">
-                <i v-for="sign in signs(row.one)" :class="sign[0]">{{ sign[1] }}</i></span></span>
-              <span role="cell" class="why" dir="auto">{{ row.one.stale ? "Changed since it was judged. " : "" }}{{ row.one.why }}</span>
-            </template>
-            <span v-else role="cell" class="quiet">…</span>
+        <div ref="view" role="rowgroup" class="completions-view" tabindex="0" aria-label="Completions, in order"
+          :style="{ height: Math.max(1, Math.min(total, 12)) * tall + 'px' }" @scroll.passive="look">
+          <div class="completions-all" role="presentation" :style="{ height: total * tall + 'px' }">
+            <div v-for="row in shown" :key="row.at" role="row" class="completion" :aria-rowindex="row.at + 2"
+              :style="{ transform: 'translateY(' + row.at * tall + 'px)', height: tall + 'px' }">
+              <template v-if="row.one">
+                <span role="cell" class="which"><a :href="address(row.one)" dir="auto">{{ name(row.one) }}</a></span>
+                <span role="cell" class="verdict-cell"><b :class="lookOf(row.one)" dir="auto">{{ verdict(row.one) }}</b></span>
+                <span role="cell" class="worlds"><span role="img" :aria-label="worlds(row.one)" :title="worlds(row.one)">
+                  <i v-for="sign in signs(row.one)" :class="sign[0]">{{ sign[1] }}</i></span></span>
+                <span role="cell" class="why" dir="auto">{{ row.one.stale ? "Changed since it was judged. " : "" }}{{ row.one.why }}</span>
+              </template>
+              <span v-else role="cell" class="quiet">…</span>
+            </div>
           </div>
         </div>
       </div>
@@ -103,7 +105,7 @@ export default {
     },
     name: (one) => `${one.task}/${one.prompt}/${one.index}`,
     address(one) {
-      return `${this.base}/${encodeURIComponent(one.task)}/${one.prompt}/${one.index}${this.query}`;
+      return `${this.base}/${encodeURIComponent(one.task.toWellFormed())}/${one.prompt}/${one.index}${this.query}`;
     },
     verdict: (one) => (one.passed === null ? "not judged yet" : one.passed ? "passed" : one.failure.kind),
     lookOf: (one) => (one.passed === null ? "waits" : one.passed ? "good" : "bad"),
