@@ -145,6 +145,14 @@ def test_everything_is_reached_with_the_keyboard(served: PageServer, opened: Ope
     page.get_by_role("link", name=re.compile("^LunchBreak, prompt 1")).focus()
     page.keyboard.press("Enter")
     expect(page.locator("#count")).to_have_text("3 completions")
+    kind = page.get_by_role("button", name=re.compile("^passed"))
+    kind.focus()
+    page.keyboard.press("Enter")
+    expect(
+        page.get_by_role("heading", name="Completions of LunchBreak, prompt 1, that passed")
+    ).to_be_visible()
+    expect(kind).to_be_focused()
+    expect(kind).to_have_attribute("aria-pressed", "true")
     page.get_by_role("button", name="Show all").focus()
     page.keyboard.press("Space")
     expect(page.locator("#count")).to_have_text("240 completions")
@@ -304,13 +312,14 @@ def expect_unharmed(page: Page, before: int) -> None:
 def test_no_text_becomes_more_than_text(runs: Path, opened: OpenPage, evil: str) -> None:
     """A program, a model, an instruction, an error, a check, a world, a room, a task, a run, a file."""
     name = "".join(c for c in evil if c.isprintable()).replace("/", "|")[:80].strip()
+    whole = evil.encode(errors="replace").decode()  # a name in an address holds no half character
     run = Run(runs / name)
     (runs / "hasty").rename(run.path)
 
     def make_evil(completion: dict[str, Any], row: dict[str, Any]) -> None:
         completion |= {"program": evil * 3, "model": evil, "instruction": evil}
         if completion["task"] == "LunchBreak":
-            completion["task"] = row["task"] = f"{evil[:200]} LunchBreak"
+            completion["task"] = row["task"] = f"{whole[:200]} LunchBreak"
         for verdict in row["verdicts"]:
             verdict["world"] = evil
             verdict["trace"] = [
@@ -324,7 +333,7 @@ def test_no_text_becomes_more_than_text(runs: Path, opened: OpenPage, evil: str)
                 verdict["error"] = {"kind": evil, "message": evil}
         if row["failure"]:
             check = row["failure"]["check"] and evil
-            row["failure"] |= {"class": evil[:300], "kind": evil[:300], "check": check}
+            row["failure"] |= {"class": whole[:300], "kind": whole[:300], "check": check}
 
     changed(run, make_evil)
     head = json.loads(run.head("paper").read_text())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated, Any
 from urllib.parse import quote
@@ -59,6 +60,7 @@ class _RunPage:
         self._seen: Seen | None = None
         self._told: dict[str, Any] = {}
         self._changes = 0
+        self._kinds: dict[Wanted, _Kind] = {}
         self.timer: ui.timer | None = None
         self._head = _Head(followed.run.path.name)
         with ui.element("div").classes("findings"):
@@ -70,7 +72,7 @@ class _RunPage:
                 )
             with ui.element("section").classes("pane ends").props("aria-labelledby=h-kinds"):
                 Words("h2", "How they end").props("id=h-kinds")
-                self._kinds = ui.element("div").classes("kinds")
+                self._ends = ui.element("div").classes("kinds")
             with ui.element("section").classes("pane list").props("id=completions aria-labelledby=h-list"):
                 with ui.element("div").classes("head"):
                     self._which = Words("h2", "").props("id=h-list")
@@ -139,30 +141,45 @@ class _RunPage:
         query = query_of(wanted, self._followed.key)
         source = f"/api/runs/{quote(self._name, safe='')}/completions{query or '?'}"
         self._rows.show(source, query_of(wanted, self._evaluation), self._changes)
-        self._draw_kinds(seen)
+        self._show_kinds(seen)
 
-    def _draw_kinds(self, seen: Seen) -> None:
-        self._kinds.clear()
-        of, here = len(seen.judged), replace(self._wanted, task=None, prompt=None)
+    def _show_kinds(self, seen: Seen) -> None:
+        of = len(seen.judged)
         passed = sum(one.passed for _, one in seen.judged)
-        with self._kinds:
-            self._kind("all that were judged", of, of, Wanted(), here)
-            self._kind("passed", passed, of, Wanted(passed=True), here)
-            for name, count, kinds in classes_of(seen):
-                self._kind(name, count, of, Wanted(failure_class=name), here)
-                for kind, each in kinds:
-                    self._kind(kind, each, of, Wanted(failure_class=name, kind=kind), here)
+        counts = {Wanted(): ("all that were judged", of), Wanted(passed=True): ("passed", passed)}
+        for name, count, kinds in classes_of(seen):
+            counts[Wanted(failure_class=name)] = (name, count)
+            counts |= {Wanted(failure_class=name, kind=kind): (kind, each) for kind, each in kinds}
+        if list(self._kinds) != list(counts):
+            self._ends.clear()
+            with self._ends:
+                self._kinds = {
+                    wanted: _Kind(name, wanted, self._choose_kind) for wanted, (name, _) in counts.items()
+                }
+        for wanted, (_, count) in counts.items():
+            self._kinds[wanted].show(count, of, is_here=wanted == self._wanted.of_any_place)
 
-    def _kind(self, name: str, count: int, of: int, wanted: Wanted, here: Wanted) -> None:
-        place = replace(wanted, task=self._wanted.task, prompt=self._wanted.prompt)
+    def _choose_kind(self, wanted: Wanted) -> None:
+        self._choose(replace(wanted, task=self._wanted.task, prompt=self._wanted.prompt))
+
+
+class _Kind:
+    """A way in which programs end, to be chosen."""
+
+    def __init__(self, name: str, wanted: Wanted, chosen: Callable[[Wanted], None]) -> None:
         look = "kind of-class" if wanted.kind is not None else "kind"
         look += " bad-kind" if wanted.failure_class is not None else ""
-        with Press("", lambda: self._choose(place), look) as button:
-            button.props(f"aria-pressed={'true' if wanted == here else 'false'}")
-            button.style(f"--share: {count / of if of else 0:.3f}")
+        with Press("", lambda: chosen(wanted), look) as self._button:
             Words("span", shortened(name, MOST_NAME))
-            Words("b", f"{count:,}")
-            Words("small", f"{percent(count / of)} %" if of else NONE, "quiet")
+            self._count = Words("b", "")
+            self._share = Words("small", "", "quiet")
+
+    def show(self, count: int, of: int, *, is_here: bool) -> None:
+        """Show how many there are, of how many, and whether it is chosen."""
+        self._button.props(f"aria-pressed={'true' if is_here else 'false'}")
+        self._button.style(f"--share: {count / of if of else 0:.3f}")
+        self._count.say(f"{count:,}")
+        self._share.say(f"{percent(count / of)} %" if of else NONE)
 
 
 class _Head:

@@ -118,7 +118,8 @@ class Shades:
     @property
     def _word(self) -> str:
         wanted = self._wanted
-        return "passed" if wanted.passed else f"failed by {wanted.kind or wanted.failure_class or 'anything'}"
+        by = shortened(wanted.kind or wanted.failure_class or "anything", MOST_NAME)
+        return "passed" if wanted.passed else f"failed by {by}"
 
     def _linked(
         self, task: str, prompt: int | None, text: str, look: str, told: str, *, here: bool
