@@ -145,8 +145,7 @@ class _RunPage:
 
     def _show_kinds(self, seen: Seen) -> None:
         of = len(seen.judged)
-        passed = sum(one.passed for _, one in seen.judged)
-        counts = {Wanted(): ("all that were judged", of), Wanted(passed=True): ("passed", passed)}
+        counts = {Wanted(): ("all that were judged", of), Wanted(passed=True): ("passed", seen.passed_count)}
         for name, count, kinds in classes_of(seen):
             counts[Wanted(failure_class=name)] = (name, count)
             counts |= {Wanted(failure_class=name, kind=kind): (kind, each) for kind, each in kinds}

@@ -21,7 +21,7 @@ from roboeval.web.telling import State, run_data
 EVERY = 1.0
 """Seconds after which the page looks whether something has changed."""
 
-READ_FOR = 0.3
+READ_FOR = 0.5
 """Seconds that one look reads at most, of all runs together."""
 
 ORDERS: Mapping[str, Callable[[Mapping[str, Any]], tuple[float, str]]] = {

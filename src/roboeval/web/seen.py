@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
-from roboeval.metrics import PromptScore, TaskScore
+from roboeval.metrics import Estimate, PromptScore, TaskScore, overall
 from roboeval.records import Key
 
 
@@ -183,6 +183,17 @@ class Seen:
     def judged(self) -> tuple[tuple[Key, Judged], ...]:
         """The completions that were judged."""
         return tuple((entry.key, entry.judged) for entry in self.entries if entry.judged is not None)
+
+    @cached_property
+    def passed_count(self) -> int:
+        """How many passed."""
+        return sum(one.passed for _, one in self.judged)
+
+    @cached_property
+    def mean(self) -> Estimate | None:
+        """pass@1 over all prompts; None where nothing was judged."""
+        scores = self.scores(())
+        return overall(scores, 1) if scores else None
 
     @cached_property
     def written_count(self) -> int:

@@ -8,7 +8,6 @@ from typing import Any
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
-from roboeval.metrics import overall
 from roboeval.records import how_many, name_of
 from roboeval.show import GONE, completion_data
 from roboeval.suite import ABLATED, Suite
@@ -73,8 +72,7 @@ def run_data(seen: Seen, suite: Suite | None, evaluations: Sequence[str]) -> dic
         evaluations: the names of all its evaluations.
     """
     wanted = wanted_count(seen, suite)
-    scores = seen.scores(())
-    mean = overall(scores, 1) if scores else None
+    mean = seen.mean
     models = [model for model in seen.models if model is not None]
     return {
         "run": seen.name,
@@ -89,7 +87,7 @@ def run_data(seen: Seen, suite: Suite | None, evaluations: Sequence[str]) -> dic
         "wanted": wanted,
         "judged": len(seen.judged),
         "to_judge": seen.to_judge,
-        "passed": sum(one.passed for _, one in seen.judged),
+        "passed": seen.passed_count,
         "pass@1": None if mean is None else {"mean": mean.mean, "low": mean.low, "high": mean.high},
         "notes": notes(seen, suite),
     }
