@@ -90,6 +90,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
 	$(BIN)/python bench/page.py
+	$(BIN)/python bench/benchmark_pages.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"

@@ -16,14 +16,19 @@ from codebotler.options import (
     ROS_PYTHON,
     AddressOption,
     BaseUrlOption,
+    HostOption,
     MaxTokensOption,
     ModelOption,
+    NameOption,
+    NoTokenOption,
+    PortOption,
     RobotOption,
     RosPythonOption,
     SeedOption,
     SpeedOption,
     TemperatureOption,
     TimeoutOption,
+    TokenOption,
     TopPOption,
     WorldOption,
 )
@@ -216,15 +221,11 @@ def robots(
 
 @app.command()
 def serve(
-    host: Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0 takes a free one.")] = 8080,
-    name: Annotated[
-        list[str] | None, typer.Option(help="A name by which the page is called, besides its address.")
-    ] = None,
-    token: Annotated[str | None, typer.Option(help="What opens the page; a new one by default.")] = None,
-    no_token: Annotated[
-        bool, typer.Option("--no-token", help="Let everybody on this machine in; not with --host.")
-    ] = False,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    name: NameOption = None,
+    token: TokenOption = None,
+    no_token: NoTokenOption = False,
     robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file, for the robot and for the map.")] = None,
     model: Annotated[
@@ -244,6 +245,7 @@ def serve(
     stop_when_alone: Annotated[
         float | None, typer.Option(min=1, help="Stop the robot so many seconds after the last page closed.")
     ] = None,
+    runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
 ) -> None:
     """Serve the page from which a robot is operated, until Ctrl-C, which also stops the robot."""
     from codebotler.home import home
@@ -252,13 +254,11 @@ def serve(
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_faced, open_robot
-    from codebotler.web.access import Access
     from codebotler.web.desk import Desk
-    from codebotler.web.place import Place
+    from codebotler.web.place import entrance
     from codebotler.world import World
 
-    place = Place(host, port, tuple(name or ()))
-    access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
+    place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)
     known = None if world is None else World.read(world)
     models = tuple(model or ("recorded:careful", "recorded:hasty"))
     for each in models:
@@ -269,9 +269,10 @@ def serve(
     body = open_robot(robot, options) if shown is None else open_faced(robot, options, shown)
     desk = Desk(body, home(), lambda m: open_model(m, settings), models=models, world=known, face=shown)
 
+    from codebotler.web.further import installed
     from codebotler.web.serving import serve as serve_page
 
-    serve_page(desk, place, access, alone_for=stop_when_alone)
+    serve_page(desk, place, access, installed(), runs, alone_for=stop_when_alone)
 
 
 @app.command("virtual-robot")

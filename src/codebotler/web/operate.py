@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
-
-from nicegui import html, ui
+from nicegui import ui
 
 from codebotler.web.desk import Desk
+from codebotler.web.frame import Frame
 from codebotler.web.instruct import Instruct
 from codebotler.web.past import add as add_past
 from codebotler.web.programpane import ProgramPane
@@ -16,44 +15,18 @@ from codebotler.web.words import Words
 EVERY = 0.1
 """Seconds after which a page looks whether something has changed."""
 
-HEAD = '<link rel="stylesheet" href="/static/page.css">'
-BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
-<button id="stop" type="button" aria-keyshortcuts="Escape"><b>STOP</b><small>Esc</small></button></div>
-<script src="/static/stop.js"></script>"""
 
-
-def frame(title: str, here: str, *, has_face: bool = False) -> None:
-    """What all pages of an operator have: the bar with STOP, which needs nothing of the rest to work.
-
-    Args:
-        title: of the page.
-        here: the address of the page.
-        has_face: whether there is a face to be looked at.
-    """
-    ui.page_title(f"{title} · CodeBotler")
-    ui.add_head_html(HEAD)
-    ui.add_body_html(BAR)
-    with ui.element("header").classes("bar"):
-        html.a("CodeBotler", href="/").classes("brand")
-        with ui.element("nav").props('aria-label="Pages"'):
-            pages = [("Robot", "/"), ("Missions", "/missions"), *([("Face", "/face")] if has_face else [])]
-            for name, address in pages:
-                link = html.a(name, href=address)
-                if address == here:
-                    link.props('aria-current="page"')
-
-
-def add(desk: Desk) -> None:
+def add(desk: Desk, frame: Frame) -> None:
     """Put the operator's pages at their addresses.
 
     Args:
         desk: what they show.
+        frame: what all pages have.
     """
-    framed = partial(frame, has_face=desk.face is not None)
 
     @ui.page("/", response_timeout=10.0)
     async def operate() -> None:
-        framed("Robot", "/")
+        frame("Robot", "/")
         Words("h1", "Operate the robot", "unseen")
         with ui.element("div").classes("operate"):
             instruct = Instruct(desk)
@@ -75,4 +48,4 @@ def add(desk: Desk) -> None:
         await ui.context.client.connected()
         await instruct.load()
 
-    add_past(desk, framed)
+    add_past(desk, frame)

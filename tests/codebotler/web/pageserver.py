@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +22,8 @@ rooms: [hall, kitchen, study]
 objects: {kitchen: [mug]}
 people: {study: [{name: ann, answers: ["yes"]}]}
 """
+
+SERVE = ("codebotler.cli", "serve", "--world", "world.yaml")
 
 
 @dataclass(frozen=True)
@@ -48,12 +51,16 @@ class PageServer:
     Args:
         folder: where the world file and the missions lie.
         arguments: further ones.
+        world: what the world file says.
+        serve: another command that serves a page.
     """
 
-    def __init__(self, folder: Path, *arguments: str, world: str = WORLD) -> None:
+    def __init__(
+        self, folder: Path, *arguments: str, world: str = WORLD, serve: Sequence[str] = SERVE
+    ) -> None:
         self.home = folder / "home"
         (folder / "world.yaml").write_text(world)
-        command = [sys.executable, "-m", "codebotler.cli", "serve", "--port", "0", "--world", "world.yaml"]
+        command = [sys.executable, "-m", *serve, "--port", "0"]
         self._said = folder / "said.txt"
         with self._said.open("w") as file:
             self._process = subprocess.Popen(

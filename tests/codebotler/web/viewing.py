@@ -23,6 +23,7 @@ SCREENS: list[Screen] = [
 
 
 def expect_no_grave_fault(page: Page) -> None:
+    """Have axe look for what shuts somebody out."""
     found = Axe().run(page).response["violations"]
     grave = [fault for fault in found if fault["impact"] in GRAVE]
     assert [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in grave] == []
