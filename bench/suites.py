@@ -39,6 +39,7 @@ def main() -> int:
     suites = [load_suite("paper"), load_suite("plus")]
     chosen = programs(suites[0])
     means: list[list[float]] = [[], []]
+    spent, pairs = [0.0, 0.0], [0, 0]
     with Lanes(1) as lanes:
         for _ in range(ROUNDS):
             spent, pairs = [0.0, 0.0], [0, 0]

@@ -92,12 +92,13 @@ def _world_lines(scenario: Scenario) -> list[RenderableType]:
 
 def _room(world: World, index: int) -> Text:
     room = world.rooms[index]
-    who = [_person(person) for person in room.people]
+    who = [person_told(person) for person in room.people]
     there = [*room.objects, *who, *(["the robot"] if room.name == world.robot else [])]
     return Text(f"{room.name}: {', '.join(there) or 'nobody and nothing'}")
 
 
-def _person(person: Person) -> str:
+def person_told(person: Person) -> str:
+    """Somebody, with what they answer and when they come and go."""
     told = [f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]
     told += [f"{topic}: {_answer(answer)}" for topic, answer in person.topics]
     if person.after_looks:

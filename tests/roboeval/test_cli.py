@@ -186,7 +186,7 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
         (["--worlds", "7"], 'the worlds of the suite "paper" are written by hand'),
         (["--seed", "7"], 'the worlds of the suite "paper" are written by hand'),
         (["--suite", "plus", "--worlds", "0"], "invalid value for '--worlds': "),
-        (["--suite", "plus", "--ablation"], "no task of the suite"),
+        (["--suite", "plus", "--ablation"], "none of CountSavory, "),
         (["--suite", "nonsense"], 'there is no suite "nonsense"'),
         (["--tasks", "SayGoodDay,Nonsense"], 'the suite "paper" has no task "Nonsense"'),
         (["--tasks", "SayGoodDay", "--ablation"], "none of SayGoodDay has an ablation"),

@@ -17,6 +17,7 @@ from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import scenes
 from codebotler.web.words import Words
 from codebotler.world import World
+from roboeval.catalogue import person_told
 from roboeval.records import Key, name_of
 from roboeval.suite import ABLATED, Suite
 from roboeval.tables import NOT_RECORDED, by_hand
@@ -205,9 +206,7 @@ def _draw_rooms(world: World) -> None:
     ui.html(floorplan(world, None, world.robot), sanitize=False).classes("map")
     with ui.element("dl").classes("rooms"):
         for room in world.rooms:
-            people = [
-                f"{person.name} (answers {', '.join(person.answers) or 'nothing'})" for person in room.people
-            ]
+            people = map(person_told, room.people)
             there = ", ".join([*people, *room.objects])
             Words("dt", shortened(room.name, 200))
             Words("dd", shortened(there, 500) if there else "nobody and nothing")
