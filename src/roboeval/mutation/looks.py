@@ -1,0 +1,74 @@
+"""Operators about what the robot looks for."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from roboeval.mutation.operator import Operator, Setting, others
+from roboeval.mutation.rewriting import Edit, Source, argument, literal, rewritten, skill_of, text_of
+
+SEEN = "seen_once"
+
+
+def _looks(source: Source) -> Iterator[ast.Call]:
+    """The looks whose result is used."""
+    unused = {call for _, call in source.steps("is_in_room")}
+    yield from (call for call in source.calls("is_in_room") if call not in unused)
+
+
+def drop_look(source: Source, _: Setting) -> Iterator[Edit]:
+    """Take it for granted that somebody or something is there."""
+    for call in _looks(source):
+        yield {call: ast.Constant(value=True)}
+
+
+def see_nothing(source: Source, _: Setting) -> Iterator[Edit]:
+    """Take it for granted that nobody and nothing is there."""
+    for call in _looks(source):
+        yield {call: ast.Constant(value=False)}
+
+
+def look_once(source: Source, _: Setting) -> Iterator[Edit]:
+    """Look before the loop, and never again in it."""
+    for loop in source.loops:
+        for call in (node for node in ast.walk(loop) if isinstance(node, ast.Call)):
+            if skill_of(call) == "is_in_room" and text_of(argument(call, 0)) is not None:
+                first = ast.Assign([ast.Name(SEEN, ast.Store())], call)
+                after = rewritten(loop, {call: ast.Name(SEEN, ast.Load())})
+                assert isinstance(after, ast.stmt)
+                yield {loop: [first, after]}
+
+
+def look_for_another(source: Source, setting: Setting) -> Iterator[Edit]:
+    """Look for another thing, or for another person."""
+    for call in _looks(source):
+        wanted = argument(call, 0)
+        name = text_of(wanted)
+        for known in (setting.things, setting.people):
+            if wanted is not None and name is not None and name.lower() in {one.lower() for one in known}:
+                yield from ({wanted: literal(other)} for other in others(known, name, most=1))
+
+
+def look_at_the_name(source: Source, _: Setting) -> Iterator[Edit]:
+    """Look for the word in the name of the room, and never into the room."""
+    for loop in source.loops:
+        if not isinstance(loop, ast.For) or not isinstance(loop.target, ast.Name):
+            continue
+        for call in (node for node in ast.walk(loop) if isinstance(node, ast.Call)):
+            wanted = argument(call, 0) if skill_of(call) == "is_in_room" else None
+            if wanted is not None:
+                yield {call: ast.Compare(wanted, [ast.In()], [ast.Name(loop.target.id, ast.Load())])}
+
+
+OPERATORS = (
+    Operator("drop-the-look", "Does not look, and takes it that somebody or something is there.", drop_look),
+    Operator("see-nothing", "Does not look, and takes it that nobody and nothing is there.", see_nothing),
+    Operator("look-once", "Looks once, before a loop, and relies on it.", look_once),
+    Operator("look-for-another", "Looks for another thing or person.", look_for_another),
+    Operator(
+        "look-at-the-name",
+        "Looks for a word in the name of the room and not into the room.",
+        look_at_the_name,
+    ),
+)

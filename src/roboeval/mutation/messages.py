@@ -1,0 +1,152 @@
+"""Operators about what the robot says, and when."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from itertools import pairwise
+
+from roboeval.mutation.operator import Operator, Setting
+from roboeval.mutation.rewriting import (
+    Edit,
+    Source,
+    literal,
+    names_in,
+    names_set_in,
+    skill_of,
+    skills_in,
+    text_of,
+)
+
+OPPOSITES = {
+    "yes": "no",
+    "no": "yes",
+    "nobody": "everybody",
+    "none": "all",
+    "nothing": "everything",
+    "not": "surely",
+    "n't": "",
+    "without": "with",
+    "lacks": "has",
+    "missing": "there",
+    "declined": "accepted",
+    "accepted": "declined",
+    "warmer": "colder",
+    "colder": "warmer",
+    "more": "less",
+}
+EMPTY = "Done."
+
+
+def _messages(source: Source) -> Iterator[ast.AST]:
+    """All that stands in what may be said: everything but the arguments of the other skills."""
+    elsewhere = {
+        inner
+        for node in source.nodes
+        if (skill := skill_of(node)) is not None and skill != "say"
+        for inner in ast.walk(node)
+    }
+    yield from (node for node in source.nodes if node not in elsewhere)
+
+
+def forget_to_say(source: Source, _: Setting) -> Iterator[Edit]:
+    """Keep silent."""
+    for statement, _call in source.steps("say"):
+        yield {statement: []}
+
+
+def say_nothing_of_it(source: Source, _: Setting) -> Iterator[Edit]:
+    """Say something that tells nothing."""
+    for statement, call in source.steps("say"):
+        yield {statement: [ast.Expr(ast.Call(call.func, [literal(EMPTY)], []))]}
+
+
+def constant_for_value(source: Source, _: Setting) -> Iterator[Edit]:
+    """Report a constant, not what was counted or heard."""
+    for node in _messages(source):
+        for value in (1, 2):
+            match node:
+                case ast.FormattedValue(inner) if not isinstance(inner, ast.Constant):
+                    yield {node: ast.FormattedValue(literal(value), -1, None)}
+                case ast.Call(ast.Name("str"), [_]):
+                    yield {node: literal(str(value))}
+
+
+def leave_out_value(source: Source, _: Setting) -> Iterator[Edit]:
+    """Leave a value out of a message."""
+    for node in _messages(source):
+        match node:
+            case ast.JoinedStr(parts) if len(parts) > 1:
+                for part in parts:
+                    if isinstance(part, ast.FormattedValue):
+                        yield {node: ast.JoinedStr([one for one in parts if one is not part])}
+            case ast.BinOp(left, ast.Add(), right):
+                for operand, rest in ((left, right), (right, left)):
+                    if isinstance(operand, ast.Name | ast.Call | ast.Subscript | ast.Attribute):
+                        yield {node: rest}
+
+
+def swap_values(source: Source, _: Setting) -> Iterator[Edit]:
+    """Mix up two values of a message."""
+    for node in _messages(source):
+        match node:
+            case ast.JoinedStr(parts):
+                values = [part for part in parts if isinstance(part, ast.FormattedValue)]
+                yield from ({a: b, b: a} for a, b in pairwise(values))
+            case ast.BinOp():
+                operands = [
+                    part for part in _added(node) if not isinstance(part, ast.Constant | ast.JoinedStr)
+                ]
+                yield from ({a: b, b: a} for a, b in pairwise(operands))
+
+
+def _added(node: ast.expr) -> Iterator[ast.expr]:
+    match node:
+        case ast.BinOp(left, ast.Add(), right):
+            yield from _added(left)
+            yield from _added(right)
+        case _:
+            yield node
+
+
+def say_the_opposite(source: Source, _: Setting) -> Iterator[Edit]:
+    """Turn one word of a message into its opposite."""
+    options = {inner for call in source.calls("ask") for inner in ast.walk(call)}
+    compared = {inner for node in source.nodes if isinstance(node, ast.Compare) for inner in ast.walk(node)}
+    for node in _messages(source):
+        text = text_of(node)
+        if text is None or " " not in text.strip() or node in options | compared:
+            continue
+        for word, opposite in OPPOSITES.items():
+            pattern = re.escape(word) if word == "n't" else rf"\b{word}\b"
+            if (found := re.search(pattern, text, re.IGNORECASE)) is not None:
+                put = opposite.capitalize() if found[0][:1].isupper() else opposite
+                yield {node: literal(text[: found.start()] + put + text[found.end() :])}
+
+
+def say_before_asking(source: Source, _: Setting) -> Iterator[Edit]:
+    """Say first what should be said after a question."""
+    for block in source.blocks:
+        for at, statement in enumerate(block):
+            if "say" not in skills_in(statement) or "ask" in skills_in(statement):
+                continue
+            for before in range(at - 1, -1, -1):
+                if names_set_in(block[before]) & names_in(statement):
+                    break
+                if "ask" in skills_in(block[before]):
+                    yield {block[before]: [statement, block[before]], statement: []}
+                    break
+
+
+OPERATORS = (
+    Operator("forget-to-say", "Does not say something.", forget_to_say),
+    Operator("say-nothing-of-it", "Says something that tells nothing.", say_nothing_of_it),
+    Operator(
+        "constant-for-a-value", "Reports a constant instead of what it counted or heard.", constant_for_value
+    ),
+    Operator("leave-out-a-value", "Leaves a value out of a message.", leave_out_value),
+    Operator("swap-values", "Mixes up two values in a message.", swap_values),
+    Operator("say-the-opposite", "Says the opposite.", say_the_opposite),
+    Operator("say-before-asking", "Says before a question what should come after it.", say_before_asking),
+)
