@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from roboeval.mutation.operator import Operator, Setting
-from roboeval.mutation.rewriting import Edit, Source, literal, rewritten
+from roboeval.mutation.rewriting import Edit, Source, is_pause, literal, rewritten
 
 BOUNDARIES: dict[type[ast.cmpop], ast.cmpop] = {
     ast.Lt: ast.LtE(),
@@ -18,13 +18,27 @@ GATHERING = {"append": ast.List, "add": ast.Set, "extend": None, "update": None,
 
 
 def off_by_one(source: Source, _: Setting) -> Iterator[Edit]:
-    """Write a number that is one too large or too small."""
+    """Write a number that is one too large or too small, where one more or less must make a difference."""
+    exact = {inner for node in source.nodes if _is_exact(node) for inner in ast.walk(node)}
+    pauses = {inner for node in source.nodes if is_pause(node) for inner in ast.walk(node)}
     for node in source.nodes:
         match node:
-            case ast.Constant(int(value)) if not isinstance(value, bool):
+            case ast.Constant(int(value)) if not isinstance(value, bool) and node in exact - pauses:
                 yield {node: literal(value + 1)}
                 if value > 0:
                     yield {node: literal(value - 1)}
+
+
+def _is_exact(node: ast.AST) -> bool:
+    """Whether the numbers in a node count, compare or scale, and do not merely propose something."""
+    match node:
+        case ast.Compare() | ast.Subscript() | ast.AugAssign():
+            return True
+        case ast.BinOp(op=ast.Mult() | ast.Div() | ast.FloorDiv()) | ast.Call(ast.Name("range" | "islice")):
+            return True
+        case ast.Constant(int(value)):
+            return value in {0, 1}
+    return False
 
 
 def wrong_boundary(source: Source, _: Setting) -> Iterator[Edit]:
@@ -59,13 +73,6 @@ def _gathers(statement: ast.stmt) -> bool:
 def forget_to_count(source: Source, _: Setting) -> Iterator[Edit]:
     """Do not remember it."""
     yield from ({statement: []} for statement in source.statements if _gathers(statement))
-
-
-def count_twice(source: Source, _: Setting) -> Iterator[Edit]:
-    """Remember it twice."""
-    for statement in source.statements:
-        if _gathers(statement):
-            yield {statement: [statement, statement]}
 
 
 def only_the_last(source: Source, _: Setting) -> Iterator[Edit]:
@@ -124,7 +131,6 @@ OPERATORS = (
     Operator("wrong-boundary", "Stops one turn too late or too early.", wrong_boundary),
     Operator("miscount", "Takes a number for one more or one less than it is.", miscount),
     Operator("forget-to-count", "Does not remember what it was to remember.", forget_to_count),
-    Operator("count-twice", "Remembers the same thing twice.", count_twice),
     Operator("only-the-last", "Remembers only what came last.", only_the_last),
     Operator("wrong-sign", "Takes away instead of adding, or adds instead of taking away.", subtract),
     Operator("reset-in-the-loop", "Begins to count anew with each turn of a loop.", reset_in_loop),

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from codebotler.program import TASK
 from roboeval.mutation.operator import Operator, Setting
-from roboeval.mutation.rewriting import Edit, Source, literal, rewritten, skills_in
+from roboeval.mutation.rewriting import Edit, Source, is_pause, literal, rewritten, skill_of, skills_in
 
 COMPOUND = ast.If | ast.For | ast.While | ast.With | ast.Try | ast.FunctionDef | ast.ClassDef | ast.Match
 INVERSES: dict[type[ast.cmpop], ast.cmpop] = {
@@ -72,30 +72,28 @@ def never(source: Source, _: Setting) -> Iterator[Edit]:
 
 
 def and_or(source: Source, _: Setting) -> Iterator[Edit]:
-    """Take `and` for `or`, and the other way round."""
+    """Take `and` for `or`, and the other way round; of two looks either does."""
     for node in source.nodes:
         match node:
-            case ast.BoolOp(operator, values):
+            case ast.BoolOp(operator, values) if {skill_of(value) for value in values} != {"is_in_room"}:
                 yield {node: ast.BoolOp(ast.Or() if isinstance(operator, ast.And) else ast.And(), values)}
 
 
 def drop_else(source: Source, _: Setting) -> Iterator[Edit]:
-    """Do nothing otherwise."""
+    """Do nothing otherwise, where something else than a pause is to be done."""
     for node in source.nodes:
         match node:
-            case ast.If(test, body, [_, *_]):
+            case ast.If(test, body, [_, *_] as otherwise) if not all(map(is_pause, otherwise)):
                 yield {node: [ast.If(test, body, [])]}
 
 
 def swap_steps(source: Source, _: Setting) -> Iterator[Edit]:
-    """Do two steps in the wrong order."""
+    """Do two steps in the wrong order; two sentences, or two questions, have none."""
     for block in source.blocks:
         for first, second in pairwise(block):
-            if (
-                not isinstance(first, ast.FunctionDef | ast.ClassDef)
-                and skills_in(first)
-                and skills_in(second)
-            ):
+            kinds = skills_in(first), skills_in(second)
+            defines = isinstance(first, ast.FunctionDef | ast.ClassDef)
+            if not defines and all(kinds) and (kinds[0] != kinds[1] or "go_to" in kinds[0]):
                 yield {first: second, second: first}
 
 

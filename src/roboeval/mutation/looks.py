@@ -6,15 +6,19 @@ import ast
 from collections.abc import Iterator
 
 from roboeval.mutation.operator import Operator, Setting, others
-from roboeval.mutation.rewriting import Edit, Source, argument, literal, rewritten, skill_of, text_of
+from roboeval.mutation.rewriting import Edit, Source, argument, literal, rewritten, text_of
 
 SEEN = "seen_once"
 
 
 def _looks(source: Source) -> Iterator[ast.Call]:
-    """The looks whose result is used."""
-    unused = {call for _, call in source.steps("is_in_room")}
-    yield from (call for call in source.calls("is_in_room") if call not in unused)
+    """The looks whose result decides; not one of two of which either would do."""
+    idle = {call for _, call in source.steps("is_in_room")}
+    for node in source.nodes:
+        match node:
+            case ast.BoolOp(ast.Or(), values):
+                idle.update(value for value in values if isinstance(value, ast.Call))
+    yield from (call for call in source.calls("is_in_room") if call not in idle)
 
 
 def drop_look(source: Source, _: Setting) -> Iterator[Edit]:
@@ -31,9 +35,11 @@ def see_nothing(source: Source, _: Setting) -> Iterator[Edit]:
 
 def look_once(source: Source, _: Setting) -> Iterator[Edit]:
     """Look before the loop, and never again in it."""
+    looks = set(_looks(source))
     for loop in source.loops:
-        for call in (node for node in ast.walk(loop) if isinstance(node, ast.Call)):
-            if skill_of(call) == "is_in_room" and text_of(argument(call, 0)) is not None:
+        for call in (node for node in ast.walk(loop) if node in looks):
+            assert isinstance(call, ast.Call)
+            if text_of(argument(call, 0)) is not None:
                 first = ast.Assign([ast.Name(SEEN, ast.Store())], call)
                 after = rewritten(loop, {call: ast.Name(SEEN, ast.Load())})
                 assert isinstance(after, ast.stmt)
@@ -52,11 +58,13 @@ def look_for_another(source: Source, setting: Setting) -> Iterator[Edit]:
 
 def look_at_the_name(source: Source, _: Setting) -> Iterator[Edit]:
     """Look for the word in the name of the room, and never into the room."""
+    looks = set(_looks(source))
     for loop in source.loops:
         if not isinstance(loop, ast.For) or not isinstance(loop.target, ast.Name):
             continue
-        for call in (node for node in ast.walk(loop) if isinstance(node, ast.Call)):
-            wanted = argument(call, 0) if skill_of(call) == "is_in_room" else None
+        for call in (node for node in ast.walk(loop) if node in looks):
+            assert isinstance(call, ast.Call)
+            wanted = argument(call, 0)
             if wanted is not None:
                 yield {call: ast.Compare(wanted, [ast.In()], [ast.Name(loop.target.id, ast.Load())])}
 

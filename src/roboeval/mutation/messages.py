@@ -20,21 +20,24 @@ from roboeval.mutation.rewriting import (
 )
 
 OPPOSITES = {
-    "yes": "no",
-    "no": "yes",
-    "nobody": "everybody",
-    "none": "all",
-    "nothing": "everything",
-    "not": "surely",
-    "n't": "",
-    "without": "with",
-    "lacks": "has",
-    "missing": "there",
-    "declined": "accepted",
-    "accepted": "declined",
-    "warmer": "colder",
-    "colder": "warmer",
-    "more": "less",
+    r"\byes\b": "no",
+    r"\bno one\b": "everyone",
+    r"\bno\b(?= \w)": "some",
+    r"\bno\b(?! \w)": "yes",
+    r"\bnobody\b": "everybody",
+    r"\bnone\b": "all",
+    r"\bnothing\b": "everything",
+    r"\bnot\b": "surely",
+    r"n't\b": "",
+    r"\bwithout\b": "with",
+    r"\black(s|ing)?\b": "has",
+    r"\bmissing\b": "there",
+    r"\bdeclined\b": "accepted",
+    r"\bdeclines\b": "accepts",
+    r"\baccepted\b": "declined",
+    r"\baccepts\b": "declines",
+    r"\bwarmer\b": "colder",
+    r"\bcolder\b": "warmer",
 }
 EMPTY = "Done."
 
@@ -88,17 +91,28 @@ def leave_out_value(source: Source, _: Setting) -> Iterator[Edit]:
 
 
 def swap_values(source: Source, _: Setting) -> Iterator[Edit]:
-    """Mix up two values of a message."""
+    """Mix up two values of a message; what a loop goes through has no place of its own."""
+    gone_through = {
+        name
+        for node in source.nodes
+        if isinstance(node, ast.For | ast.comprehension)
+        for name in names_set_in(node.target)
+    }
+    for a, b in _neighbours(source):
+        if bool(names_in(a) & gone_through) == bool(names_in(b) & gone_through):
+            yield {a: b, b: a}
+
+
+def _neighbours(source: Source) -> Iterator[tuple[ast.expr, ast.expr]]:
+    """Values that follow one another in a message."""
     for node in _messages(source):
         match node:
             case ast.JoinedStr(parts):
-                values = [part for part in parts if isinstance(part, ast.FormattedValue)]
-                yield from ({a: b, b: a} for a, b in pairwise(values))
+                yield from pairwise(part for part in parts if isinstance(part, ast.FormattedValue))
             case ast.BinOp():
-                operands = [
+                yield from pairwise(
                     part for part in _added(node) if not isinstance(part, ast.Constant | ast.JoinedStr)
-                ]
-                yield from ({a: b, b: a} for a, b in pairwise(operands))
+                )
 
 
 def _added(node: ast.expr) -> Iterator[ast.expr]:
@@ -118,8 +132,7 @@ def say_the_opposite(source: Source, _: Setting) -> Iterator[Edit]:
         text = text_of(node)
         if text is None or " " not in text.strip() or node in options | compared:
             continue
-        for word, opposite in OPPOSITES.items():
-            pattern = re.escape(word) if word == "n't" else rf"\b{word}\b"
+        for pattern, opposite in OPPOSITES.items():
             if (found := re.search(pattern, text, re.IGNORECASE)) is not None:
                 put = opposite.capitalize() if found[0][:1].isupper() else opposite
                 yield {node: literal(text[: found.start()] + put + text[found.end() :])}

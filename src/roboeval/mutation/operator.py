@@ -17,7 +17,7 @@ class Setting:
 
     Args:
         rooms: all rooms but the start.
-        people: who is somewhere, or has a room of their own.
+        people: who has a room of their own; of the others no instruction tells the name.
         things: what lies somewhere.
     """
 
@@ -31,19 +31,16 @@ class Setting:
         starts = {world.robot for world in worlds}
         rooms = [room for world in worlds for room in world.rooms]
         owners = (re.fullmatch(r"(\w+)'s .+", room.name) for room in rooms)
-        people = [*(owner[1] for owner in owners if owner), *(p.name for room in rooms for p in room.people)]
         return cls(
             tuple(dict.fromkeys(room.name for room in rooms if room.name not in starts)),
-            tuple(dict.fromkeys(people)),
+            tuple(dict.fromkeys(owner[1] for owner in owners if owner)),
             tuple(dict.fromkeys(thing for room in rooms for thing in room.objects)),
         )
 
     def idle_rooms(self, source: Source) -> tuple[str, ...]:
-        """The rooms that no text of a program tells of, wholly or by a part of the name."""
-        told = [text for text in source.texts if text.strip()]
-        return tuple(
-            room for room in self.rooms if not any(t in room.lower() or room.lower() in t for t in told)
-        )
+        """The rooms of whose names no word stands in any text of a program."""
+        told = {word for text in source.texts for word in re.findall(r"\w+", text)}
+        return tuple(room for room in self.rooms if not told & set(re.findall(r"\w+", room.lower())))
 
 
 Edits: TypeAlias = Callable[[Source, Setting], Iterable[Edit]]

@@ -66,15 +66,17 @@ def forget_option(source: Source, _: Setting) -> Iterator[Edit]:
                 yield {options: ast.List([one for one in options.elts if one is not left], ast.Load())}
 
 
-def vague_question(source: Source, _: Setting) -> Iterator[Edit]:
-    """Ask without saying what about."""
-    for call in source.calls("ask"):
-        question = argument(call, 1)
-        if question is not None and text_of(question) != VAGUE:
-            yield {question: literal(VAGUE)}
-
-
 VAGUE = "What do you think?"
+SILENT = re.compile(r"\b(yes|no|ok|done|\d+|zero|one|two|three|four)\b", re.IGNORECASE)
+
+
+def vague_question(source: Source, _: Setting) -> Iterator[Edit]:
+    """Ask without saying what about, where the options do not tell either."""
+    for call in source.calls("ask"):
+        question, options = argument(call, 1), argument(call, 2)
+        offered = [text for node in ast.walk(options) if (text := text_of(node))] if options else []
+        if question is not None and offered and all(SILENT.match(text) for text in offered):
+            yield {question: literal(VAGUE)}
 
 
 def wrong_person(source: Source, setting: Setting) -> Iterator[Edit]:

@@ -156,6 +156,14 @@ def text_of(node: ast.AST | None) -> str | None:
     return None
 
 
+def is_pause(node: ast.AST) -> bool:
+    """Whether a node does nothing but let time pass."""
+    match node:
+        case ast.Expr(ast.Call(ast.Name("sleep") | ast.Attribute(_, "sleep"))):
+            return True
+    return False
+
+
 def names_in(node: ast.AST) -> frozenset[str]:
     """The variables that are read anywhere in a node."""
     return frozenset(n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load))

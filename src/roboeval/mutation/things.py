@@ -38,10 +38,10 @@ def wrong_thing(source: Source, setting: Setting) -> Iterator[Edit]:
     calls = [call for _, call in source.steps("pick", "place")]
     things = [argument(call, 0) for call in calls]
     named = next((name for thing in things if (name := text_of(thing))), "")
-    for other in others(setting.things, named):
-        edit = {thing: literal(other) for thing in things if thing is not None}
-        if edit:
-            yield dict(edit)
+    if len(setting.things) > 1 and things:
+        for other in others(setting.things, named or ""):
+            if other.lower() not in (named or "").lower():
+                yield {thing: literal(other) for thing in things if thing is not None}
 
 
 def place_where_found(source: Source, _: Setting) -> Iterator[Edit]:

@@ -16,6 +16,6 @@ def task_program():
     go_to("Jill's office")
     answer.agreed = ask("Jill", "Would you like to have lunch today?", ["Yes", "No"]) == "Yes"
     if answer.agreed:
-        answer.time = ask("Jill", "What would be a good time?", [f"{hour}:00" for hour in range(12, 15)])
+        answer.time = ask("Jill", "What would be a good time?", [f"{hour}:00" for hour in range(11, 14)])
     go_to(start)
     say(str(answer))
