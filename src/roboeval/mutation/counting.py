@@ -123,7 +123,7 @@ def reset_in_loop(source: Source, _: Setting) -> Iterator[Edit]:
                     ):
                         inside = rewritten(loop, {loop.body[0]: [statement, loop.body[0]]})
                         assert isinstance(inside, ast.stmt)
-                        yield {loop: [statement, inside]}
+                        yield {loop: inside}
 
 
 OPERATORS = (

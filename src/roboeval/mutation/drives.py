@@ -69,19 +69,19 @@ def wrong_room(source: Source, setting: Setting) -> Iterator[Edit]:
 
 def return_elsewhere(source: Source, setting: Setting) -> Iterator[Edit]:
     """Come back to another room."""
+    rooms = dict.fromkeys((*setting.rooms[:1], *setting.idle_rooms(source)[-1:]))
     for call in source.calls("go_to"):
-        if _is_return(call, source):
-            place = call.args[0] if call.args else call.keywords[0].value
-            yield from ({place: literal(room)} for room in others(setting.rooms, "", most=1))
-            yield from ({place: literal(room)} for room in setting.idle_rooms(source)[:1])
+        place = argument(call, 0)
+        if place is not None and _is_return(call, source):
+            yield from ({place: literal(room)} for room in rooms)
 
 
 def stay_and_call(source: Source, _: Setting) -> Iterator[Edit]:
     """Take the place to come back to only when it is time to come back."""
     for call in source.calls("go_to"):
-        if _is_return(call, source):
-            here = ast.Call(ast.Name("get_current_location", ast.Load()), [], [])
-            yield {call.args[0] if call.args else call.keywords[0].value: here}
+        place = argument(call, 0)
+        if place is not None and _is_return(call, source):
+            yield {place: ast.Call(ast.Name("get_current_location", ast.Load()), [], [])}
 
 
 def drive_by_words(source: Source, _: Setting) -> Iterator[Edit]:

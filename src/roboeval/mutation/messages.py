@@ -99,8 +99,16 @@ def swap_values(source: Source, _: Setting) -> Iterator[Edit]:
         for name in names_set_in(node.target)
     }
     for a, b in _neighbours(source):
-        if bool(names_in(a) & gone_through) == bool(names_in(b) & gone_through):
+        if not {_variable(a), _variable(b)} & gone_through:
             yield {a: b, b: a}
+
+
+def _variable(value: ast.expr) -> str | None:
+    """The variable that a value of a message is."""
+    match value:
+        case ast.Name(name) | ast.FormattedValue(ast.Name(name)):
+            return name
+    return None
 
 
 def _neighbours(source: Source) -> Iterator[tuple[ast.expr, ast.expr]]:

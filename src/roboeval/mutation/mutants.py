@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import difflib
 import hashlib
 from collections import defaultdict
@@ -11,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, zip_longest
 
-from codebotler.program import Problem
 from roboeval.mutation.operator import Operator, Setting
 from roboeval.mutation.operators import OPERATORS
 from roboeval.mutation.rewriting import Source, changed, read
@@ -36,14 +34,13 @@ class Original:
 
     @cached_property
     def source(self) -> Source | None:
-        """It as operators read it; None where it does not parse."""
-        found = read(self.program)
-        return None if isinstance(found, Problem) else found
+        """It as operators read it; None where they cannot."""
+        return read(self.program)
 
-    @cached_property
-    def normal(self) -> str | None:
-        """The text that all programs with the same tree share, without comments; None without a tree."""
-        return None if self.source is None else ast.unparse(self.source.tree)
+    @property
+    def text(self) -> str:
+        """What all programs with the same tree share; as it stands where there is none."""
+        return self.program if self.source is None else self.source.text
 
 
 @dataclass(frozen=True)
@@ -63,7 +60,7 @@ class Mutant:
     @cached_property
     def diff(self) -> str:
         """What was changed, as lines of a unified diff, without names of files."""
-        before, after = (self.original.normal or "").splitlines(), self.program.splitlines()
+        before, after = self.original.text.splitlines(), self.program.splitlines()
         return "\n".join([*difflib.unified_diff(before, after, lineterm="")][2:]) + "\n"
 
 
@@ -84,7 +81,7 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
     written = (Original(f"right/{variant.name}", variant.program) for variant in variants(task))
     distinct: dict[str, Original] = {}
     for original in chain(recorded, written, further):
-        distinct.setdefault(original.normal or original.program, original)
+        distinct.setdefault(original.text, original)
     return tuple(distinct.values())
 
 
@@ -98,7 +95,7 @@ def mutants(
         setting: the names that operators put in place of others.
         operators: what makes mutants.
     """
-    seen = {original.normal for original in right}
+    seen = {original.text for original in right}
     for original in right:
         if original.source is None:
             continue
@@ -114,14 +111,14 @@ def drawn(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
     """Some of the mutants, as evenly over the operators as there are mutants of each.
 
     Args:
-        every: mutants.
+        every: mutants; their order makes no difference.
         most: how many at most.
         seed: from which they are drawn; the same seed draws the same ones.
     """
     by_operator: dict[str, list[Mutant]] = defaultdict(list)
     for mutant in every:
         by_operator[mutant.operator].append(mutant)
-    shuffled = [sorted(those, key=_lot(seed)) for those in by_operator.values()]
+    shuffled = [sorted(by_operator[name], key=_lot(seed)) for name in sorted(by_operator)]
     turns = zip_longest(*shuffled)
     return tuple([one for turn in turns for one in turn if one is not None][:most])
 

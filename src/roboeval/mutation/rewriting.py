@@ -24,9 +24,11 @@ class Source:
 
     Args:
         tree: of the whole program.
+        text: that all programs with the same tree share, without comments.
     """
 
     tree: ast.Module
+    text: str
 
     @cached_property
     def nodes(self) -> tuple[ast.AST, ...]:
@@ -83,10 +85,15 @@ class Source:
                     yield node, call
 
 
-def read(program: str) -> Source | Problem:
-    """A program as operators read it, or why nobody can."""
+def read(program: str) -> Source | None:
+    """A program as operators read it; None where it does not parse, or is nested too deeply to be written."""
     tree = parsed(program, compiled=True)
-    return tree if isinstance(tree, Problem) else Source(tree)
+    if isinstance(tree, Problem):
+        return None
+    try:
+        return Source(tree, ast.unparse(tree))
+    except RecursionError:
+        return None
 
 
 def rewritten(node: ast.AST, edit: Edit) -> ast.AST:
@@ -112,14 +119,11 @@ def _put(value: object, edit: Edit) -> object:
 
 def changed(source: Source, edit: Edit) -> str | None:
     """The text of an edited program; None where it is no program any more, such as with a stray `break`."""
-    text = ast.unparse(ast.fix_missing_locations(rewritten(source.tree, edit)))
+    try:
+        text = ast.unparse(ast.fix_missing_locations(rewritten(source.tree, edit)))
+    except RecursionError:
+        return None
     return None if isinstance(parsed(text, compiled=True), Problem) else text
-
-
-def normal(program: str) -> str | None:
-    """The text that all programs with the same tree share, without comments; None if there is no tree."""
-    tree = parsed(program)
-    return None if isinstance(tree, Problem) else ast.unparse(tree)
 
 
 def skill_of(node: ast.AST) -> str | None:

@@ -10,7 +10,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.badinput import YamlFile
-from codebotler.world import Text
+from codebotler.world import Name, Text
 from roboeval.mutation.mutants import Mutant
 from roboeval.suite import Task
 
@@ -32,9 +32,9 @@ class EntryFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    operator: Text
+    operator: Name
     diff: Text
-    because: Text
+    because: Name
 
 
 class ListFile(BaseModel):
