@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ import pytest
 import yaml
 
 from command_line import ENVIRONMENT, Ended, refused, roboeval
-from roboeval.suite import SUITES
 from test_suite import a_suite
 
 WIDE = {**ENVIRONMENT, "COLUMNS": "160"}
@@ -59,6 +57,23 @@ def test_two_tasks_from_end_to_end(tmp_path: Path) -> None:
     assert ended.err.splitlines()[-1] == "scores, mutants and survivors are in found"
 
 
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """The folder of a suite with one task, two right programs, and two that are not right."""
+    (tmp_path / "small").mkdir()
+    own = Path(a_suite(tmp_path / "small"))
+    (own / "recorded").mkdir()
+    (own / "right" / "T").mkdir(parents=True)
+    for name, body in {
+        "01-goes": "go_to('kitchen')",
+        "02-broken": "go_to('kitchen'",
+        "03-idle": "pass",
+        "04-greets": "go_to('kitchen'); say('hello')",
+    }.items():
+        (own / "right" / "T" / f"{name}.py").write_text(f"# {name}.\ndef task_program(): {body}\n")
+    return own
+
+
 def test_the_same_bytes_whatever_the_number_of_workers(tmp_path: Path) -> None:
     first, second = (
         mutate("SayGoodDay", "--out", f"out{workers}", cwd=tmp_path, workers=workers) for workers in (1, 3)
@@ -70,18 +85,21 @@ def test_the_same_bytes_whatever_the_number_of_workers(tmp_path: Path) -> None:
         assert (tmp_path / "out1" / file).read_bytes() == (tmp_path / "out3" / file).read_bytes()
 
 
-def test_another_seed_draws_others(tmp_path: Path) -> None:
+def test_another_seed_draws_others(small: Path) -> None:
     for seed in ("1", "2"):
-        assert mutate("SayGoodDay", "--brief", "--seed", seed, "--out", seed, cwd=tmp_path).status == 0
-    one, two = ({row["program"] for row in rows_of(tmp_path / seed, "SayGoodDay")} for seed in ("1", "2"))
-    assert 0 < len(one - two) < 60
+        words = ("--suite", small, "--mutants", "3", "--seed", seed, "--out", small / seed)
+        assert roboeval("mutate", *words, "--workers", "1").status == 0
+    one, two = ({row["program"] for row in rows_of(small / seed, "T")} for seed in ("1", "2"))
+    assert len(one) == len(two) == 3
+    assert one != two
 
 
-def test_brief_is_without_survivors(tmp_path: Path) -> None:
-    ended = mutate("GetDrink", "--brief", cwd=tmp_path)
-    assert LINE.findall(ended.out)
-    assert "@@" not in ended.out
-    assert "GetDrink 1 " not in ended.out
+def test_brief_is_without_survivors(small: Path) -> None:
+    brief, whole = (mutate("--suite", small, *words, cwd=small) for words in (["--brief"], []))
+    assert whole.out.startswith(brief.out)
+    assert "@@" not in brief.out
+    assert "T 1  " in whole.out
+    assert "-    say('hello')" in whole.out
 
 
 def test_programs_that_a_user_names(tmp_path: Path) -> None:
@@ -106,44 +124,34 @@ def test_programs_that_a_user_names(tmp_path: Path) -> None:
     assert "mine.jsonl:SayGoodDay/0/1" in mutated
 
 
-def test_a_right_program_that_the_suite_finds_wrong(tmp_path: Path) -> None:
-    (tmp_path / "mine").mkdir()
-    own = Path(a_suite(tmp_path / "mine"))
-    for folder in ("right", "recorded"):
-        (own / folder / "T").mkdir(parents=True)
-    (own / "right" / "T" / "01-goes.py").write_text("# Goes there.\ndef task_program(): go_to('kitchen')\n")
-    (own / "right" / "T" / "02-broken.py").write_text("# Is broken.\ndef task_program(:\n")
-    (own / "right" / "T" / "03-idle.py").write_text("# Does nothing.\ndef task_program(): pass\n")
-    ended = mutate("--suite", "mine", cwd=tmp_path)
+def test_a_right_program_that_the_suite_finds_wrong(small: Path) -> None:
+    ended = mutate("--suite", small, "--brief", cwd=small)
     assert ended.status == 0, ended
     assert [line for line in ended.err.splitlines() if "right, and so" in line] == [
         "not right, and so not mutated: T, right/02-broken (one: SyntaxError)",
         "not right, and so not mutated: T, right/03-idle (one: goes)",
     ]
-    assert re.search(r"warning: T: only \d mutants do something else than their original", ended.err)
+    assert re.search(r"^warning: T: only \d mutants do something else", ended.err, re.MULTILINE)
 
 
-def test_a_score_that_is_too_low(tmp_path: Path) -> None:
-    assert mutate("GetDrink", "--brief", "--at-least", "0.2", cwd=tmp_path).status == 0
-    assert mutate("GetDrink", "--brief", "--at-least", "0.999", cwd=tmp_path).status == 1
+def test_a_score_that_is_too_low(small: Path) -> None:
+    assert mutate("--suite", small, "--brief", "--at-least", "0.1", cwd=small).status == 0
+    assert mutate("--suite", small, "--brief", "--at-least", "0.999", cwd=small).status == 1
 
 
-def test_a_mutant_on_the_list_is_not_shown_again(tmp_path: Path) -> None:
-    own = tmp_path / "own"
-    shutil.copytree(SUITES / "paper", own)
-    for task in (own / "tasks").glob("*.yaml"):
-        if task.stem != "GetDrink":
-            task.unlink()
-    assert mutate("--suite", "own", "--out", "found", cwd=tmp_path).status == 0
-    survivors = (tmp_path / "found" / "survivors" / "GetDrink.yaml").read_text()
-    (own / "still-right").mkdir()
-    (own / "still-right" / "GetDrink.yaml").write_text(survivors.replace("because: ''", "because: It may."))
-    ended = mutate("--suite", "own", "--out", "found", cwd=tmp_path)
-    (score,) = json.loads((tmp_path / "found" / "scores.json").read_text())["tasks"]
+def test_a_mutant_on_the_list_is_not_shown_again(small: Path) -> None:
+    words = ("--suite", small, "--out", small / "found")
+    assert mutate(*words, cwd=small).status == 0
+    survivors = (small / "found" / "survivors" / "T.yaml").read_text()
+    (small / "still-right").mkdir()
+    (small / "still-right" / "T.yaml").write_text(survivors.replace("because: ''", "because: It may."))
+    ended = mutate(*words, cwd=small)
+    (score,) = json.loads((small / "found" / "scores.json").read_text())["tasks"]
     assert (score["survived"], score["score"]) == (0, 1.0)
     assert score["score_of_all"] == score["killed"] / (score["killed"] + score["still_right"]) < 1
-    assert not (tmp_path / "found" / "survivors" / "GetDrink.yaml").exists()
+    assert not (small / "found" / "survivors" / "T.yaml").exists()
     assert "mutants are still right, more than 15%" in ended.err
+    assert "@@" not in ended.out
 
 
 @pytest.mark.parametrize(
