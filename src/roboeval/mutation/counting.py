@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from roboeval.mutation.operator import Operator, Setting
-from roboeval.mutation.rewriting import Edit, Source, is_pause, literal, rewritten
+from roboeval.mutation.rewriting import Edit, Source, is_pause, literal, names_set_in, rewritten
 
 BOUNDARIES: dict[type[ast.cmpop], ast.cmpop] = {
     ast.Lt: ast.LtE(),
@@ -105,6 +105,25 @@ def subtract(source: Source, _: Setting) -> Iterator[Edit]:
                 yield {node: ast.BinOp(left, ast.Sub() if isinstance(way, ast.Add) else ast.Add(), right)}
 
 
+def add_as_texts(source: Source, _: Setting) -> Iterator[Edit]:
+    """Put digits together instead of adding numbers."""
+    edit: dict[ast.AST, ast.AST] = {}
+    names: set[str] = set()
+    for node in source.nodes:
+        match node:
+            case ast.AugAssign(ast.Name(name), ast.Add(), ast.Call(ast.Name("int"), [text]) as number):
+                names.add(name)
+                edit[number] = text
+    for node in source.nodes:
+        match node:
+            case ast.Assign(targets, ast.Constant(0) as zero) if any(
+                names & names_set_in(target) for target in targets
+            ):
+                edit[zero] = literal("0")
+    if names:
+        yield edit
+
+
 def reset_in_loop(source: Source, _: Setting) -> Iterator[Edit]:
     """Begin to count anew with each turn of a loop."""
     for block in source.blocks:
@@ -133,5 +152,6 @@ OPERATORS = (
     Operator("forget-to-count", "Does not remember what it was to remember.", forget_to_count),
     Operator("only-the-last", "Remembers only what came last.", only_the_last),
     Operator("wrong-sign", "Takes away instead of adding, or adds instead of taking away.", subtract),
+    Operator("add-as-texts", "Puts digits together instead of adding numbers.", add_as_texts),
     Operator("reset-in-the-loop", "Begins to count anew with each turn of a loop.", reset_in_loop),
 )

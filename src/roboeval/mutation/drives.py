@@ -6,16 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from roboeval.mutation.operator import Operator, Setting, others
-from roboeval.mutation.rewriting import Edit, Source, argument, literal, step, text_of
-
-
-def _sliced(items: ast.expr, lower: int | None, upper: int | None) -> ast.expr:
-    part = ast.Slice(
-        None if lower is None else literal(lower),
-        None if upper is None else ast.UnaryOp(ast.USub(), literal(-upper)),
-    )
-    whole = ast.Call(ast.Name("list", ast.Load()), [items], [])
-    return ast.Subscript(whole, part, ast.Load())
+from roboeval.mutation.rewriting import Edit, Source, argument, literal, rewritten, sliced, step, text_of
 
 
 def _sequences(source: Source) -> Iterator[ast.expr]:
@@ -28,13 +19,13 @@ def _sequences(source: Source) -> Iterator[ast.expr]:
 def skip_first(source: Source, _: Setting) -> Iterator[Edit]:
     """Leave the first out."""
     for items in _sequences(source):
-        yield {items: _sliced(items, 1, None)}
+        yield {items: sliced(items, 1, None)}
 
 
 def skip_last(source: Source, _: Setting) -> Iterator[Edit]:
     """Leave the last out."""
     for items in _sequences(source):
-        yield {items: _sliced(items, None, -1)}
+        yield {items: sliced(items, None, -1)}
 
 
 def _is_return(call: ast.Call, source: Source) -> bool:
@@ -93,6 +84,20 @@ def drive_by_words(source: Source, _: Setting) -> Iterator[Edit]:
             yield {statement: [step("say", told)]}
 
 
+def one_drive(source: Source, _: Setting) -> Iterator[Edit]:
+    """Name all rooms in one drive."""
+    for loop in source.loops:
+        if not isinstance(loop, ast.For) or not isinstance(loop.target, ast.Name):
+            continue
+        for statement, call in source.steps("go_to"):
+            match argument(call, 0):
+                case ast.Name(name) if name == loop.target.id and statement in set(ast.walk(loop)):
+                    together = ast.Call(ast.Attribute(literal(" or "), "join", ast.Load()), [loop.iter], [])
+                    rest = rewritten(loop, {statement: []})
+                    assert isinstance(rest, ast.stmt)
+                    yield {loop: [step("go_to", together), rest]}
+
+
 def detour(source: Source, setting: Setting) -> Iterator[Edit]:
     """Pass through a room that nobody named, on the last drive."""
     drives = [statement for statement, _ in source.steps("go_to")]
@@ -120,6 +125,7 @@ OPERATORS = (
     Operator("return-elsewhere", "Comes back to another place than it started from.", return_elsewhere),
     Operator("return-to-here", "Takes the place where it is for the place to come back to.", stay_and_call),
     Operator("drive-by-words", "Says that it goes somewhere, and stays.", drive_by_words),
+    Operator("one-drive-for-all", "Names all rooms in one drive, which leads to one of them.", one_drive),
     Operator("detour", "Drives through a room that nobody named.", detour),
     Operator("plural-rooms", "Looks for a plural in the names of rooms.", plural_rooms),
 )

@@ -8,7 +8,16 @@ from itertools import pairwise
 
 from codebotler.program import TASK
 from roboeval.mutation.operator import Operator, Setting
-from roboeval.mutation.rewriting import Edit, Source, is_pause, literal, rewritten, skill_of, skills_in
+from roboeval.mutation.rewriting import (
+    Edit,
+    Source,
+    is_pause,
+    literal,
+    rewritten,
+    skill_of,
+    skills_in,
+    sliced,
+)
 
 COMPOUND = ast.If | ast.For | ast.While | ast.With | ast.Try | ast.FunctionDef | ast.ClassDef | ast.Match
 INVERSES: dict[type[ast.cmpop], ast.cmpop] = {
@@ -163,6 +172,19 @@ def into_the_loop(source: Source, _: Setting) -> Iterator[Edit]:
                 yield {loop: inside, after: []}
 
 
+def before_the_last(source: Source, _: Setting) -> Iterator[Edit]:
+    """Do what should come after a loop before its last turn."""
+    for block in source.blocks:
+        for at, loop in enumerate(block):
+            after = block[at + 1 :]
+            if isinstance(loop, ast.For) and any(map(skills_in, after)) and skills_in(loop):
+                most, last = (
+                    ast.For(loop.target, sliced(loop.iter, *bounds), loop.body, [])
+                    for bounds in ((None, -1), (-1, None))
+                )
+                yield {loop: most, after[-1]: [after[-1], last]}
+
+
 def out_of_the_block(source: Source, _: Setting) -> Iterator[Edit]:
     """Do after a loop or a condition what should be done in it."""
     for node in source.nodes:
@@ -176,6 +198,9 @@ def out_of_the_block(source: Source, _: Setting) -> Iterator[Edit]:
 
 
 OPERATORS = (
+    Operator(
+        "before-the-last", "Does before the last turn of a loop what should come after it.", before_the_last
+    ),
     Operator("negate-a-condition", "Takes a condition for its opposite.", negate),
     Operator("drop-a-condition", "Does in any case what depends on a condition.", whatever),
     Operator("never", "Does in no case what depends on a condition.", never),

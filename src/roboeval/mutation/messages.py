@@ -38,8 +38,14 @@ OPPOSITES = {
     r"\baccepts\b": "declines",
     r"\bwarmer\b": "colder",
     r"\bcolder\b": "warmer",
+    r"\b(?<!who )(is|are|will|would|has|have)\b(?! (not|no|some)\b)": r"\1 not",
 }
 EMPTY = "Done."
+HEDGE = "0, 1, 2, 3 or 4"
+CLAUSES = re.compile(r"(?:^|\band |[^\s.!?;,]).*?(?:[.!?;,] |(?= and )|$)")
+POLITE = re.compile(
+    r"\s*(hello|hi|dear|good|great|thank|please|sorry|excuse|well|very|i am back|done)\b", re.IGNORECASE
+)
 
 
 def _messages(source: Source) -> Iterator[ast.AST]:
@@ -68,7 +74,7 @@ def say_nothing_of_it(source: Source, _: Setting) -> Iterator[Edit]:
 def constant_for_value(source: Source, _: Setting) -> Iterator[Edit]:
     """Report a constant, not what was counted or heard."""
     for node in _messages(source):
-        for value in (1, 2):
+        for value in (1, 2, 12):
             match node:
                 case ast.FormattedValue(inner) if not isinstance(inner, ast.Constant):
                     yield {node: ast.FormattedValue(literal(value), -1, None)}
@@ -142,8 +148,29 @@ def say_the_opposite(source: Source, _: Setting) -> Iterator[Edit]:
             continue
         for pattern, opposite in OPPOSITES.items():
             if (found := re.search(pattern, text, re.IGNORECASE)) is not None:
-                put = opposite.capitalize() if found[0][:1].isupper() else opposite
+                put = found.expand(opposite)
+                put = put.capitalize() if found[0][:1].isupper() else put
                 yield {node: literal(text[: found.start()] + put + text[found.end() :])}
+
+
+def hedge(source: Source, _: Setting) -> Iterator[Edit]:
+    """Report all numbers, so that the right one is among them."""
+    for node in _messages(source):
+        match node:
+            case ast.FormattedValue(inner) if not isinstance(inner, ast.Constant):
+                yield {node: ast.FormattedValue(literal(HEDGE), -1, None)}
+            case ast.Call(ast.Name("str"), [_]):
+                yield {node: literal(HEDGE)}
+
+
+def leave_out_clause(source: Source, _: Setting) -> Iterator[Edit]:
+    """Say only a part of what is to be said; politeness is no part of it."""
+    asked = {inner for call in source.calls("ask") for inner in ast.walk(call)}
+    for node in _messages(source):
+        clauses = CLAUSES.findall(text_of(node) or "")
+        for left in clauses if len(clauses) > 1 and node not in asked else ():
+            if not POLITE.match(left):
+                yield {node: literal("".join(one for one in clauses if one is not left).strip(" ,;"))}
 
 
 def say_before_asking(source: Source, _: Setting) -> Iterator[Edit]:
@@ -166,6 +193,8 @@ OPERATORS = (
     Operator(
         "constant-for-a-value", "Reports a constant instead of what it counted or heard.", constant_for_value
     ),
+    Operator("hedge", "Reports all numbers, of which one is right.", hedge),
+    Operator("leave-out-a-clause", "Says only a part of a sentence.", leave_out_clause),
     Operator("leave-out-a-value", "Leaves a value out of a message.", leave_out_value),
     Operator("swap-values", "Mixes up two values in a message.", swap_values),
     Operator("say-the-opposite", "Says the opposite.", say_the_opposite),

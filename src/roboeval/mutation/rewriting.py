@@ -186,3 +186,15 @@ def step(skill: str, *arguments: ast.expr) -> ast.Expr:
 def literal(value: str | float) -> ast.Constant:
     """A literal."""
     return ast.Constant(value)
+
+
+def sliced(items: ast.expr, lower: int | None, upper: int | None) -> ast.expr:
+    """A part of what can be gone through, as `list(items)[lower:upper]`."""
+    whole = ast.Call(ast.Name("list", ast.Load()), [items], [])
+    return ast.Subscript(whole, ast.Slice(_bound(lower), _bound(upper)), ast.Load())
+
+
+def _bound(number: int | None) -> ast.expr | None:
+    if number is None:
+        return None
+    return literal(number) if number >= 0 else ast.UnaryOp(ast.USub(), literal(-number))
