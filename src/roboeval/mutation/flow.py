@@ -97,9 +97,12 @@ def drop_else(source: Source, _: Setting) -> Iterator[Edit]:
 
 
 def swap_steps(source: Source, _: Setting) -> Iterator[Edit]:
-    """Do two steps in the wrong order; two sentences, or two questions, have none."""
+    """Do two steps in the wrong order; two sentences, two questions, or an idle look have none."""
+    idle = {statement for statement, _ in source.steps("is_in_room")}
     for block in source.blocks:
         for first, second in pairwise(block):
+            if idle & {first, second}:
+                continue
             kinds = skills_in(first), skills_in(second)
             defines = isinstance(first, ast.FunctionDef | ast.ClassDef)
             if not defines and all(kinds) and (kinds[0] != kinds[1] or "go_to" in kinds[0]):

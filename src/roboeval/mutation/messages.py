@@ -20,26 +20,28 @@ from roboeval.mutation.rewriting import (
 )
 
 OPPOSITES = {
-    r"\byes\b": "no",
-    r"\bno one\b": "everyone",
-    r"\bno\b(?= \w)": "some",
-    r"\bno\b(?! \w)": "yes",
-    r"\bnobody\b": "everybody",
-    r"\bnone\b": "all",
-    r"\bnothing\b": "everything",
-    r"\bnot\b": "surely",
-    r"n't\b": "",
-    r"\bwithout\b": "with",
-    r"\black(s|ing)?\b": "has",
-    r"\bmissing\b": "there",
-    r"\bdeclined\b": "accepted",
-    r"\bdeclines\b": "accepts",
-    r"\baccepted\b": "declined",
-    r"\baccepts\b": "declines",
-    r"\bwarmer\b": "colder",
-    r"\bcolder\b": "warmer",
-    r"\b(?<!who )(is|are|will|would|has|have)\b(?! (not|no|some)\b)": r"\1 not",
+    "yes": "no",
+    "no one": "everyone",
+    "no(?= \\w)": "some",
+    "no": "yes",
+    "nobody": "everybody",
+    "none": "all",
+    "nothing": "everything",
+    "not": "surely",
+    "don't": "do",
+    "doesn't": "does",
+    "without": "with",
+    "lacks|lacking": "has",
+    "missing": "there",
+    "declined": "accepted",
+    "declines": "accepts",
+    "accepted": "declined",
+    "accepts": "declines",
+    "warmer": "colder",
+    "colder": "warmer",
 }
+TELLING = re.compile("|".join(rf"\b({word})\b" for word in OPPOSITES), re.IGNORECASE)
+CLAIM = re.compile(r"\b(is|are|will|would)\b")
 EMPTY = "Done."
 HEDGE = "0, 1, 2, 3 or 4"
 CLAUSES = re.compile(r"(?:^|\band |[^\s.!?;,]).*?(?:[.!?;,] |(?= and )|$)")
@@ -139,18 +141,22 @@ def _added(node: ast.expr) -> Iterator[ast.expr]:
 
 
 def say_the_opposite(source: Source, _: Setting) -> Iterator[Edit]:
-    """Turn one word of a message into its opposite."""
+    """Turn a message into its opposite."""
     options = {inner for call in source.calls("ask") for inner in ast.walk(call)}
     compared = {inner for node in source.nodes if isinstance(node, ast.Compare) for inner in ast.walk(node)}
     for node in _messages(source):
         text = text_of(node)
         if text is None or " " not in text.strip() or node in options | compared:
             continue
-        for pattern, opposite in OPPOSITES.items():
-            if (found := re.search(pattern, text, re.IGNORECASE)) is not None:
-                put = found.expand(opposite)
-                put = put.capitalize() if found[0][:1].isupper() else put
-                yield {node: literal(text[: found.start()] + put + text[found.end() :])}
+        other = TELLING.sub(_opposite, text)
+        other = CLAIM.sub(r"\1 not", text, count=1) if other == text else other
+        if other != text:
+            yield {node: literal(other)}
+
+
+def _opposite(found: re.Match[str]) -> str:
+    put = [*OPPOSITES.values()][(found.lastindex or 1) - 1]
+    return put.capitalize() if found[0][:1].isupper() else put
 
 
 def hedge(source: Source, _: Setting) -> Iterator[Edit]:
@@ -169,7 +175,7 @@ def leave_out_clause(source: Source, _: Setting) -> Iterator[Edit]:
     for node in _messages(source):
         clauses = CLAUSES.findall(text_of(node) or "")
         for left in clauses if len(clauses) > 1 and node not in asked else ():
-            if not POLITE.match(left):
+            if len(left.split()) > 1 and not POLITE.match(left):
                 yield {node: literal("".join(one for one in clauses if one is not left).strip(" ,;"))}
 
 
