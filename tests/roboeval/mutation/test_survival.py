@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from roboeval.mutation.scores import Score, Trial, explained
 from roboeval.mutation.stillright import list_of, reasons, to_yaml
 from roboeval.mutation.survival import Baseline, End, Fate, baselines, ends
 from roboeval.mutation.worlds import worlds_of
-from roboeval.suite import Suite, Task, load_suite
+from roboeval.suite import Scenario, Suite, Task, load_suite
 from test_suite import a_suite
 
 TASK = """\
@@ -197,6 +198,15 @@ def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
     assert worlds_of(suite, task, None, 1) == task.scenarios
     with pytest.raises(BadInput, match='the worlds of the suite "mine" are written out'):
         worlds_of(suite, task, 200, 1)
+
+
+def test_worlds_that_a_suite_makes(suite: Suite, task: Task) -> None:
+    def further(task: Task, count: int, seed: int) -> tuple[Scenario, ...]:
+        return (task.scenarios * count)[seed : seed + count]
+
+    makes = replace(suite, further=further)
+    assert worlds_of(makes, task, 3, 1) == (*task.scenarios[1:], *task.scenarios)
+    assert len(worlds_of(makes, task, None, 0)) == 200
 
 
 def test_a_baseline_keeps_what_its_original_did(suite: Suite, task: Task, lanes: Lanes) -> None:
