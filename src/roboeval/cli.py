@@ -15,6 +15,7 @@ from roboeval.commands.judging import evaluate, export, import_, show
 from roboeval.commands.mutating import mutate
 from roboeval.commands.reporting import compare, report
 from roboeval.commands.resampling import resample
+from roboeval.commands.serving import serve
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -46,6 +47,7 @@ app.command()(resample)
 app.command()(report)
 app.command()(compare)
 app.command()(mutate)
+app.command()(serve)
 app.command()(export)
 app.command("import")(import_)
 
