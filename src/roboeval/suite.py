@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from typing import TypeAlias
 
 from codebotler.badinput import BadInput, YamlFile
 from codebotler.simulator.rules import Rules
@@ -35,6 +36,10 @@ ABLATED = "-ablation"  # at the end of the name of an evaluation's files, and so
 SUITES = Path(__file__).with_name("suites")
 
 
+Further: TypeAlias = Callable[[Task, int, int], tuple[Scenario, ...]]
+"""Makes so many worlds of a task with what they require, from a seed; the same seed makes the same ones."""
+
+
 @dataclass(frozen=True)
 class Suite:
     """Tasks and the rules by which they are judged.
@@ -46,6 +51,7 @@ class Suite:
         rules: how worlds are simulated.
         tasks: by name, sorted.
         digest: a hash of all that verdicts and prompts depend on.
+        further: makes worlds that no file writes out; None where all worlds are written out.
         folder: where it was read from.
         worlds: how many worlds a task has at least, where they are drawn; None if they are written by hand.
         seed: from which they are drawn.
@@ -57,6 +63,7 @@ class Suite:
     rules: Rules
     tasks: Mapping[str, Task]
     digest: str
+    further: Further | None = None
     folder: Path | None = None
     worlds: int | None = None
     seed: int | None = None
@@ -146,10 +153,15 @@ def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed
         rules=head.rules.rules(),
         tasks={task.name: task for task in tasks},
         digest=hashlib.sha256(canonical.encode()).hexdigest(),
+        further=partial(_further, folder, skills) if drawn else None,
         folder=folder,
         worlds=lot.count if drawn else None,
         seed=lot.seed if drawn else None,
     )
+
+
+def _further(folder: Path, skills: SkillTable, task: Task, count: int, seed: int) -> tuple[Scenario, ...]:
+    return _read_suite(folder, skills, count, seed).tasks[task.name].scenarios
 
 
 def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
