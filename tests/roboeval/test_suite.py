@@ -160,7 +160,7 @@ def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
 
 
 def test_an_unknown_suite_gets_a_sentence() -> None:
-    with pytest.raises(BadInput, match='no suite "nonsense": neither one of paper nor a folder'):
+    with pytest.raises(BadInput, match='no suite "nonsense": neither one of paper, plus nor a folder'):
         load_suite("nonsense")
 
 
