@@ -183,19 +183,26 @@ def _line(axes: Axes, points: Sequence[tuple[float, float]], number: int, label:
     _steps(
         axes,
         points,
+        is_marked=True,
         color=look.colour(number),
         linestyle=DASHES[number % len(DASHES)],
         marker=MARKERS[number % len(MARKERS)],
         markersize=3.2,
-        markevery=[0, len(points)],
         label=label,
     )
 
 
-def _steps(axes: Axes, points: Sequence[tuple[float, float]], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-    xs = [threshold for threshold, _ in points]
-    ys = [share for _, share in points]
-    axes.plot([*xs, LOWEST], [*ys, ys[-1]], drawstyle="steps-post", clip_on=False, **style)
+def _steps(
+    axes: Axes,
+    points: Sequence[tuple[float, float]],
+    *,
+    is_marked: bool = False,
+    **style: Any,  # noqa: ANN401 - matplotlib's own
+) -> None:
+    shown = [(threshold, share) for threshold, share in points if threshold >= LOWEST]
+    xs, ys = zip(*shown, (LOWEST, shown[-1][1]), strict=True)
+    ends = [0, len(shown)] if is_marked else None
+    axes.plot(xs, ys, drawstyle="steps-post", clip_on=False, markevery=ends, **style)
 
 
 def _threshold_axes(axes: Axes) -> None:

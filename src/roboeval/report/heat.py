@@ -16,7 +16,7 @@ from roboeval.taxonomy import CLASSES, PYTHON, ROBOT, TASK
 
 FULL = "#00507d"  # the shade of a share of 1; one hue is read by every eye, and in print
 MOST_NUMBERS = 14  # rows or columns up to which each cell says its number
-HALF = 0.5  # the share from which writing is white
+DARK_FROM = 0.74  # the share from which white is read better than black
 PANELS = (
     (PYTHON, "(b) Python errors"),
     (ROBOT, "(c) robot errors"),
@@ -62,7 +62,7 @@ def draw_heat(axes: Axes, heat: Heat, look: Look) -> None:
     for row, shares in enumerate(heat.cells):
         for column, share in enumerate(shares):
             if share is not None:
-                colour = look.faint if share == 0 else look.ink if share < HALF else "white"
+                colour = look.quiet if share == 0 else look.ink if share < DARK_FROM else "white"
                 axes.text(
                     column + 0.5,
                     row + 0.5,

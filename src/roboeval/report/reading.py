@@ -19,6 +19,8 @@ from roboeval.run import load_head
 from roboeval.suite import Suite
 from roboeval.tables import Row
 
+MOST = 10**12  # tokens or seconds; a request of which more is told was not counted
+
 
 @dataclass(frozen=True)
 class Written:
@@ -46,7 +48,7 @@ class JudgedRun:
     Args:
         name: as figures and tables call it; no two runs of a report share it.
         folder: the name of its folder.
-        model: who wrote the completions; None where nobody recorded it, or several did.
+        model: who wrote the completions; None where nobody recorded it, or several wrote them.
         about: what run.json says.
         head: by what it was judged.
         rows: of the evaluation; of their verdicts only that of the world that decided keeps its trace.
@@ -55,6 +57,7 @@ class JudgedRun:
         total: how many completions there are to judge.
         ablated: scores where only common sense is required; None where nobody judged that.
         trials: its completions as the check sees them; None where they were not checked.
+        is_mixed: whether several models wrote the completions.
     """
 
     name: str
@@ -68,6 +71,7 @@ class JudgedRun:
     total: int
     ablated: tuple[TaskScore, ...] | None = None
     trials: tuple[Prompt, ...] | None = None
+    is_mixed: bool = False
 
     @cached_property
     def by_prompt(self) -> dict[tuple[str, int], float]:
@@ -110,7 +114,8 @@ def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> Judge
         key = sys.intern(completion.task), completion.prompt, completion.index
         written[key] = _written(completion)
     folder = evaluation.run.path.resolve().name
-    model = models.pop() if len(models) == 1 else None
+    is_mixed = len(models) > 1
+    model = None if is_mixed or not models else models.pop()
     return JudgedRun(
         name=visible(model or folder),
         folder=folder,
@@ -121,6 +126,7 @@ def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> Judge
         written=written,
         scores=scored(kept, suite),
         total=evaluation.scope.total,
+        is_mixed=is_mixed,
     )
 
 
@@ -146,18 +152,20 @@ def _written(completion: Completion) -> Written:
 
 
 def _whole(value: object) -> int | None:
-    return value if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else None
+    return value if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST else None
 
 
 def _number(value: object) -> float | None:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and value >= 0
-    return float(value) if is_number else None  # type: ignore[arg-type]  # a number, as was just seen
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    return float(value) if 0 <= value <= MOST else None
 
 
 def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
     """The same runs, named so that no two share a name: by folder too where the model does not tell."""
     names = _apart([run.name for run in runs], [f"{run.name} ({run.folder})" for run in runs])
-    names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
+    while len({*names}) < len(names):
+        names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
     return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
 
 
