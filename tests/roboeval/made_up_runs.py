@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,7 @@ def usual() -> list[JudgedRun]:
     ]
 
 
+@cache
 def cases() -> dict[str, list[JudgedRun]]:
     """What has broken figures elsewhere."""
     one = made_up("one", {"Visit": (4,)})

@@ -170,6 +170,7 @@ def thresholds(runs: Sequence[JudgedRun], look: Look) -> Figure:
     if len(runs) > MOST_COLOURS:
         axes.plot([], [], color=look.faint, linewidth=0.7, label=f"{len(runs) - MOST_COLOURS} others")
     _threshold_axes(axes)
+    _threshold_labels(axes)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2, handlelength=3.2)
     return figure
 
@@ -206,12 +207,17 @@ def _steps(
 
 
 def _threshold_axes(axes: Axes) -> None:
+    """Set what axes that share theirs share; to be set once, since each time all of them are set."""
     axes.set_xscale("log")
     axes.set_xlim(1, LOWEST)
     axes.set_xticks([1, 0.1, 0.01, LOWEST], ["1", "0.1", "0.01", "0.001"])
-    axes.tick_params(axis="x", which="minor", length=1.5)
     axes.xaxis.set_minor_formatter(NullFormatter())
     share_axis(axes)
+
+
+def _threshold_labels(axes: Axes) -> None:
+    axes.tick_params(axis="x", which="minor", length=1.5)
+    axes.grid(visible=True, axis="y")
     axes.set_xlabel("threshold of pass@1")
     axes.set_ylabel("prompts that reach it")
 
@@ -228,6 +234,7 @@ def limits(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
     rows = math.ceil(len(found) / columns)
     figure = new_figure(WIDE if columns > 1 else NARROW, 1.75 * rows + 0.55)
     all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    _threshold_axes(all_axes[0, 0])
     for number, axes in enumerate(all_axes.flat):
         if number >= len(found):
             axes.set_visible(False)
@@ -243,7 +250,7 @@ def limits(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
                 linewidth=1.0 if limit == 0 else 1.3,
                 label=label if number == 0 else None,
             )
-        _threshold_axes(axes)
+        _threshold_labels(axes)
         axes.set_title(brief(name), loc="left")
         axes.label_outer()
     handles, labels = all_axes[0, 0].get_legend_handles_labels()

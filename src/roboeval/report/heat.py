@@ -16,7 +16,7 @@ from roboeval.taxonomy import CLASSES, PYTHON, ROBOT, TASK
 
 FULL = "#00507d"  # the shade of a share of 1; one hue is read by every eye, and in print
 MOST_NUMBERS = 14  # rows or columns up to which each cell says its number
-DARK_FROM = 0.74  # the share from which white is read better than black
+DARK_FROM = 0.75  # the share from which white is read better than black
 PANELS = (
     (PYTHON, "(b) Python errors"),
     (ROBOT, "(c) robot errors"),
@@ -126,7 +126,7 @@ def _classes(axes: Axes, causes: Sequence[Causes], look: Look) -> None:
         )
         left = [a + b for a, b in zip(left, shares, strict=True)]
     axes.set_yticks(places, [brief(one.name, 34) for one in causes])
-    axes.invert_yaxis()
+    axes.set_ylim(len(causes) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
     share_axis(axes, along="x")
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 from codebotler.badinput import BadInput
@@ -59,7 +60,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
     yield "page"
 
 
-def _forget_others(out: Path, names: Set[str]) -> None:
+def _forget_others(out: Path, names: AbstractSet[str]) -> None:
     """Remove what an earlier report wrote here that this one has not, such as rejection sampling."""
     for name in OPTIONAL - names:
         for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
