@@ -20,6 +20,7 @@ from roboeval.suite import Suite
 from roboeval.tables import Row
 
 MOST = 10**12  # tokens or seconds; a request of which more is told was not counted
+LONGEST_NAME = 100
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> Judge
     is_mixed = len(models) > 1
     model = None if is_mixed or not models else models.pop()
     return JudgedRun(
-        name=visible(model or folder),
+        name=_readable(model or folder),
         folder=folder,
         model=model,
         about=about,
@@ -128,6 +129,12 @@ def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> Judge
         total=evaluation.scope.total,
         is_mixed=is_mixed,
     )
+
+
+def _readable(name: str) -> str:
+    """A name as text that a line holds: its beginning and its end, by which names are told apart."""
+    name = visible(name)
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 30]}…{name[-29:]}"
 
 
 def scored(rows: Iterable[Row], suite: Suite) -> tuple[TaskScore, ...]:

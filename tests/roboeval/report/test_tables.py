@@ -11,7 +11,7 @@ from roboeval.evaluation import Evaluation
 from roboeval.report import paper
 from roboeval.report.causes import all_causes, beside_notes, causes_of, causes_sheet, kinds_in_order
 from roboeval.report.contents import Wishes, sections
-from roboeval.report.reading import JudgedRun, Written, named_apart, read_run
+from roboeval.report.reading import JudgedRun, Written, _readable, named_apart, read_run
 from roboeval.report.retries import accepted, retries_sheet, steps_sheet
 from roboeval.report.scores import (
     curve,
@@ -216,6 +216,14 @@ def test_runs_are_named_apart() -> None:
         made_up("x", {"Visit": (1,)}),
     ]
     assert [one.name for one in named_apart(runs)] == ["gpt-4 (a)", "gpt-4 (b) #2", "gpt-4 (b) #3", "x"]
+
+
+def test_a_very_long_name_keeps_both_ends() -> None:
+    name = "begin" + "x" * 4_000 + "end"
+    assert _readable(name).startswith("beginx")
+    assert _readable(name).endswith("xend")
+    assert len(_readable(name)) == 100
+    assert _readable("x" * 100) == "x" * 100
 
 
 def test_names_stay_apart_whatever_they_are() -> None:
