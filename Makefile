@@ -83,7 +83,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/report.py
 	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
-	$(BIN)/python bench/page_stop.py
+	$(BIN)/python bench/page.py
 
 $(VENV)/made:
 	@echo "making an environment in $(VENV), which takes some seconds"

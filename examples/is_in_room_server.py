@@ -92,9 +92,11 @@ class Server:
             try:
                 image = self.picture()
                 sighting = self.detector.look(image, label)
-            except (BadInput, PerceptionError) as error:
-                print(visible(f"{label}: {error}"), flush=True)
-                self.end(goal, do="abort", text=str(error))
+            except Exception as error:  # noqa: BLE001 - whatever it is, the robot waits for an answer
+                expected = isinstance(error, BadInput | PerceptionError)
+                why = str(error) if expected else f"{type(error).__name__}: {error}"
+                print(visible(f"{label}: {why}"), flush=True)
+                self.end(goal, do="abort", text=why)
                 continue
             print(visible(f"{label}: {sighting}"), flush=True)
             picture = base64.b64encode(jpeg_of(boxed(image, sighting))).decode()

@@ -39,8 +39,14 @@ def checked(page: Page, program: str) -> None:
     """Type a program that no test before has typed."""
     mark = f"# {next(NUMBERS)}"
     write(page, f"{program}{mark}\n")
+    page.wait_for_function(
+        """async (mark) => {
+            const now = await (await fetch("/api/missions/current")).json();
+            return now.program.includes(mark) && now.state === "checked" && !now.busy;
+        }""",
+        arg=mark,
+    )
     expect(page.locator(".cm-content")).to_contain_text(mark)
-    expect(page.get_by_text("checking")).to_be_hidden()
     expect(page.get_by_text("The check found no problem.")).to_be_visible()
 
 
@@ -120,6 +126,7 @@ def test_every_tab_and_every_reload_shows_the_same(server: PageServer, opened: O
     second, elsewhere = opened(server, beside=first), opened(server, size=PHONE)
     for page in (second, elsewhere):
         expect(page.get_by_text("The check found no problem.")).to_be_visible()
+        expect(page.locator(".cm-content")).to_contain_text("Tea for ann, please")
         assert TEA in text_of(page)
     write(elsewhere, FAR)
     for page in (first, second):
@@ -139,6 +146,8 @@ def test_an_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer
     page.wait_for_selector(".cm-line.problem-line")
     expect(page.locator(".cm-line.problem-line")).to_contain_text('there is no room "cellar"')
     assert page.locator(".cm-line.problem-line").evaluate("e => [...e.parentNode.children].indexOf(e)") == 2
+    page.reload()
+    expect(page.locator(".cm-line.problem-line")).to_have_count(1)
     button = page.get_by_role("button", name="Run it on the robot")
     expect(button).to_be_disabled()
     page.get_by_text("Run it despite the problems").click()
@@ -146,6 +155,55 @@ def test_an_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer
     write(page, BAD.replace("cellar", "kitchen"))
     expect(page.get_by_text("The check found no problem.")).to_be_visible()
     expect(page.locator(".problem-line")).to_have_count(0)
+
+
+def test_only_what_this_browser_shows_is_approved(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    checked(page, TEA)
+    page.evaluate("""() => {
+        const show = programEditor.show;
+        programEditor.show = (what) => what.anyway && show(what);  // no other word of the tool arrives
+        const pane = Object.values(mounted_app.$refs).find((each) => each?.editor);
+        pane.emitting = false;
+        pane.editor.dispatch({changes: {from: 0, insert: "# something else\\n"}});
+        pane.emitting = true;
+    }""")
+    page.get_by_role("button", name="Run it on the robot").click()
+    expect(page.get_by_text("look at it again")).to_be_visible()
+    expect(page.locator(".headline")).to_have_text("Waits for your word")
+    expect(page.locator(".cm-content")).not_to_contain_text("something else")
+
+
+def test_checks_take_nothing_away_that_is_typed_meanwhile(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    write(page, TEA)
+    page.keyboard.press("Control+End")
+    typed = "# words with a pause in which a check begins, and words while it goes on, over and over"
+    for number, letter in enumerate(typed):
+        page.keyboard.type(letter)
+        page.wait_for_timeout(400 if number % 8 == 0 else 30)
+    expect(page.get_by_text("The check found no problem.")).to_be_visible()
+    assert text_of(page).endswith(typed)
+    while not server.call("GET", "/api/missions/current").data["program"].endswith(typed):
+        page.wait_for_timeout(50)
+    assert text_of(page).endswith(typed)
+
+
+def test_two_who_type_at_once_end_with_the_same_text(server: PageServer, opened: OpenPage) -> None:
+    first, second = opened(server), opened(server)
+    checked(first, TEA)
+    expect(second.locator(".cm-content")).to_contain_text("Tea for ann")
+    for page in (first, second):
+        page.locator(".cm-content").click()
+        page.keyboard.press("Control+End")
+    for number in range(12):
+        first.keyboard.type(f"# first {number}\n")
+        second.keyboard.type(f"# second {number}\n")
+        first.wait_for_timeout(150 * (number % 4))
+    first.keyboard.type("# the end of it\n")
+    expect(second.locator(".cm-content")).to_contain_text("the end of it")
+    program = server.call("GET", "/api/missions/current").data["program"]
+    assert text_of(first).rstrip() == text_of(second).rstrip() == program.rstrip()
 
 
 def test_a_despite_is_for_one_program_only(server: PageServer, opened: OpenPage) -> None:

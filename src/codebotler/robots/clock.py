@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 
 from codebotler.badinput import BadInput
+
+FASTEST, SLOWEST = 1e6, 1e-6
+"""Speeds beyond which numbers of seconds stop being exact, and nobody would watch."""
 
 
 class Clock:
     """Time that starts at 0 and goes on by itself, unless nobody waits for it in truth.
 
     Args:
-        speed: how many of its seconds pass in a real one, above 0; None where waiting takes no real time, and
-            time passes only by waiting.
+        speed: how many of its seconds pass in a real one, from 0.000001 to 1,000,000; None where waiting
+            takes no real time, and time passes only by waiting.
 
     Raises:
         BadInput: the speed is out of its range.
     """
 
     def __init__(self, speed: float | None = 1.0) -> None:
-        if speed is not None and not 0 < speed < math.inf:
-            raise BadInput(f"the speed is {speed:g}, but it must be above 0")
+        if speed is not None and not SLOWEST <= speed <= FASTEST:
+            raise BadInput(f"the speed is {speed:g}, but it must be from {SLOWEST:f} to {FASTEST:,.0f}")
         self.speed = speed
         self._start = time.monotonic()
         self._waited = 0.0

@@ -58,7 +58,6 @@ def add(desk: Desk) -> None:
 
         def refresh() -> None:
             nonlocal seen
-            program.send_typed()
             version = desk.board.version
             if version != seen:
                 seen = version
@@ -70,6 +69,5 @@ def add(desk: Desk) -> None:
         ui.timer(EVERY, refresh, immediate=False)
         await ui.context.client.connected()
         await instruct.load()
-        await program.take_colours()
 
     add_past(desk, frame)

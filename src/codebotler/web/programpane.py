@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import re
-import time
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from codebotler.mission import MissionError, State
 from codebotler.problems import Check
@@ -19,21 +20,11 @@ from codebotler.web.strip import Scene, Strip, strips
 from codebotler.web.turn import View
 from codebotler.web.words import Press, Words
 
-PAUSE = 0.3
-"""Seconds without a key after which what was typed is checked."""
-
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
-NAMED = """
-    document.querySelectorAll(".cm-content").forEach((e) => e.setAttribute("aria-label", "Program"));
-    document.querySelectorAll(".cm-scroller").forEach((e) => e.setAttribute("tabindex", "0"));
-"""
-"""What people need who see no screen, or use no mouse, and CodeMirror does not offer."""
-
 MOST_MARKS = 400
 MOST_PROBLEMS = 20
 SPOKEN = frozenset({"say", "ask", "answer"})
-LIGHT: Final = "vscodeLight"
-DARK: Final = "vscodeDark"
+SCRIPT = '<script src="/static/editor.js"></script>'
 
 
 class ProgramPane:
@@ -45,17 +36,20 @@ class ProgramPane:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._known = ""  # as the desk has it, in so far as this browser was told
-        self._typed_at: float | None = None
+        self._heard = 0  # texts from this browser
+        self._told: dict[str, object] = {}
         self._drawn: tuple[object, ...] = ()
+        ui.add_head_html(SCRIPT)
+        ui.on("program-typed", self._typed)
         with ui.element("section").classes("pane program").props("aria-labelledby=h-program"):
             with ui.element("div").classes("head"):
                 Words("h2", "Program").props("id=h-program")
                 self._busy = Words("span", "", "busy").props("role=status")
             self._writer = Words("p", "", "quiet")
-            self._editor = ui.codemirror(
-                "", language="Python", theme=LIGHT, line_wrapping=True, on_change=self._typed
-            ).classes("editor")
+            # Its own properties stay as they are: each update of one would bring its text along, over what
+            # is being typed. The script sets what changes.
+            self._editor = ui.codemirror("", language="Python", line_wrapping=True).classes("editor")
+            self._editor.on("update:value", js_handler="() => programEditor.typed()")
             self._verdict = Words("p", "", "verdict").props("role=status")
             self._problems = ui.element("ul").classes("problems")
             self._word = ui.element("div").classes("word")
@@ -66,24 +60,13 @@ class ProgramPane:
                 self._again_button = Press("Ask again", lambda: self._again(repair=False), "plain")
             self._board = ui.element("div").classes("storyboard")
         self._view = desk.view
-
-    async def take_colours(self) -> None:
-        """Use the colours of the browser's light or dark mode."""
-        if await ui.run_javascript("matchMedia('(prefers-color-scheme: dark)').matches", timeout=5.0):
-            self._editor.theme = DARK
-        ui.run_javascript(NAMED)
+        ui.run_javascript(f"programEditor.start({self._editor.id})")
 
     def show(self, view: View) -> None:
         """Show the program that is at hand."""
         self._view = view
         shown = _for_editor(view.program)
-        if shown != self._known:
-            is_mine = shown == self._editor.value
-            self._known = shown
-            if not is_mine:
-                self._typed_at = None
-                self._editor.value = shown
-        self._editor.set_enabled(view.may_be_edited)
+        self._tell(view, shown)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
         author = view.author
         what = "Recorded: people wrote this." if author.startswith("recorded") else f"Written by {author}."
@@ -93,27 +76,27 @@ class ProgramPane:
         drawn = (view.found, view.problems, view.unknown, shown)
         if drawn != self._drawn:
             self._drawn = drawn
-            self._draw(view, shown)
+            self._draw(view)
 
-    def send_typed(self) -> None:
-        """Have the desk check what was typed, once nothing more was for a moment."""
-        if self._typed_at is None or time.monotonic() - self._typed_at < PAUSE:
-            return
-        self._typed_at = None
-        typed = self._editor.value or ""
-        if typed == self._known:
-            return
-        self._known = typed
-        try:
-            self._desk.edit(typed)
-        except MissionError as error:
-            ui.notify(error.sentence, type="warning", position="top")
-            self._known = ""
-            self.show(self._desk.view)
+    def _tell(self, view: View, shown: str, *, anyway: bool = False) -> None:
+        """Have the browser show a program and its marks; it does not where something newer is typed there."""
+        told: dict[str, object] = {
+            "program": shown,
+            "marks": [*_skills(shown), *_marks(view.found, shown)],
+            "editable": view.may_be_edited,
+            "heard": self._heard,
+            "anyway": anyway,
+        }
+        if told != self._told or anyway:
+            self._told = told
+            ui.run_javascript(f"programEditor.show({json.dumps(told)})")
 
-    def _typed(self) -> None:
-        if self._editor.value != self._known:
-            self._typed_at = time.monotonic()
+    def _typed(self, event: GenericEventArguments) -> None:
+        """Have the desk check what was typed."""
+        typed, self._heard = str(event.args["text"]), int(event.args["number"])
+        if typed != _for_editor(self._desk.view.program):
+            self._try(lambda: self._desk.edit(typed))
+        self.show(self._desk.view)
 
     # --- somebody's word
 
@@ -155,16 +138,23 @@ class ProgramPane:
     async def _approve(self) -> None:
         turn, view = self._desk.turn, self._view
         if self._may_rerun(view):
-            self._known = ""
             self._try(lambda: self._desk.edit(view.program))
-        elif self._typed_at is not None:
-            ui.notify("The program was just changed; wait for its check.", position="top")
-        elif turn is not None:
+        elif turn is not None and await self._is_seen(view):
             try:
                 despite = bool(self._despite.value)
                 await asyncio.to_thread(turn.approve, view.digest, despite_problems=despite)
             except MissionError as error:
                 ui.notify(error.sentence, type="warning", position="top")
+
+    async def _is_seen(self, view: View) -> bool:
+        """Whether this browser shows that very program; two people may type at the same time."""
+        shown = _for_editor(view.program)
+        if await ui.run_javascript("programEditor.text()", timeout=5.0) == shown:
+            return True
+        if self._view is view:
+            self._tell(view, shown, anyway=True)
+        ui.notify("The program was changed meanwhile; look at it again.", type="warning", position="top")
+        return False
 
     def _again(self, *, repair: bool) -> None:
         turn = self._desk.turn
@@ -179,8 +169,7 @@ class ProgramPane:
 
     # --- what was found
 
-    def _draw(self, view: View, shown: str) -> None:
-        self._editor.decorations = [*_skills(shown), *_marks(view.found, shown)]
+    def _draw(self, view: View) -> None:
         self._problems.clear()
         with self._problems:
             for sentence in (*view.problems, *view.unknown)[:MOST_PROBLEMS]:

@@ -104,8 +104,10 @@ class View:
     @property
     def may_be_edited(self) -> bool:
         """Whether another program can take the place of this one."""
-        drafting = self.state in {State.DRAFTING, State.CHECKED}
-        return self.is_over or (drafting and not self.is_written)
+        if self.is_over or self.is_written:
+            return self.is_over
+        waits = self.state is None and bool(self.order.program)  # for the robot; who types on loses nothing
+        return waits or self.state in {State.DRAFTING, State.CHECKED}
 
 
 def digest(program: str) -> str:

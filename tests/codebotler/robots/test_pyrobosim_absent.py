@@ -42,7 +42,7 @@ def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
     assert (robot.name, robot.address, robot.clock.speed) == ("pyrobosim", "", 3)
     with pytest.raises(BadInput, match="--world FILE"):
         open_robot("pyrobosim")
-    with pytest.raises(BadInput, match="must be above 0"):
+    with pytest.raises(BadInput, match=r"must be from 0\.000001 to 1,000,000"):
         open_robot("pyrobosim", Options(world=WORLD, speed=-1))
 
 

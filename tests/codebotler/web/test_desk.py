@@ -157,6 +157,26 @@ def test_an_edited_program_is_checked_again_and_the_last_one_counts(desk: Desk) 
     assert summary_of(desk.home / "missions" / view.id).program == view.program
 
 
+def test_a_program_can_be_edited_while_the_robot_is_connected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on, connect = threading.Event(), Simulated.connect
+
+    def slow(robot: Simulated) -> None:
+        go_on.wait(20)
+        connect(robot)
+
+    monkeypatch.setattr(Simulated, "connect", slow)
+    with desk_of(tmp_path) as desk:
+        desk.begin(Order(program=BAD))
+        until(desk, lambda view: view.busy == "connecting the robot")
+        desk.edit(HELLO)
+        go_on.set()
+        view = until(desk, lambda view: view.found is not None)
+        assert (view.program, view.problems) == (HELLO, ())
+        assert summary_of(desk.home / "missions" / view.id).program == HELLO
+
+
 def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path) -> None:
     author = Author(BAD, HELLO)
     with desk_of(tmp_path, author=author) as desk:

@@ -1,0 +1,96 @@
+"""How long from a click on STOP to the robot, and from the last key to a program's problems?
+
+A simulated robot drives, and STOP is clicked in a browser (the system's Chromium). Printed are the worst of
+STOPS=20 and the middle one, in milliseconds: until the robot was told, and until what it did had ended, by
+the time in the mission's events. As often a program with a problem is typed, until that stands at its line.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from statistics import median
+
+from playwright.sync_api import Page, sync_playwright
+
+from codebotler.missionlog import EVENTS, events_of
+
+STOPS = int(os.environ.get("STOPS", "20"))
+AIM, AIM_OF_CHECKS = 150.0, 1000.0
+WORLD = "robot: here\nrooms: [here, {name: far away, footprint: [[90000, 0], [90009, 0], [90000, 9]]}]\n"
+PROGRAM = "def task_program():\n    go_to('far away')\n"
+CLICK = "() => { const now = Date.now(); document.getElementById('stop').click(); return now / 1000; }"
+
+
+def stopped(page: Page, home: Path, number: int) -> tuple[float, float]:
+    """Have the robot drive and stop it: seconds until it was told, and until it had ended that."""
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(f"{PROGRAM}# {number}\n")
+    page.locator(".cm-content", has_text=f"# {number}").wait_for()
+    page.locator(".go:not([disabled])", has_text="Run it on the robot").click()
+    page.locator(".doing", has_text="Drives").wait_for()
+    time.sleep(0.2)
+    start = page.evaluate(CLICK)
+    page.locator(".headline.stopped").wait_for()
+    last = max((home / "missions").glob(f"*/{EVENTS}"), key=lambda path: path.stat().st_mtime)
+    events = {line["event"]: line["time"] for line in events_of(last.parent)}
+    return events["stop"] - start, events["cancelled"] - start
+
+
+def rechecked(page: Page, number: int) -> float:
+    """Seconds from a program's last key until its problem, another one each time, stands at its line."""
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(f"def task_program():\n    go_to('cellar {number}')\n")
+    typed = time.monotonic()
+    page.locator(".problem-line .problem-words", has_text=f"cellar {number}").wait_for()
+    return time.monotonic() - typed
+
+
+@contextmanager
+def served(home: Path) -> Iterator[str]:
+    """The link to a page for a simulated robot whose missions are in a folder."""
+    (home / "world.yaml").write_text(WORLD)
+    command = [sys.executable, "-m", "codebotler.cli", "serve", "--port", "0", "--world", "world.yaml"]
+    environment = {**os.environ, "CODEBOTLER_HOME": str(home)}
+    with subprocess.Popen(command, cwd=home, stderr=subprocess.PIPE, text=True, env=environment) as tool:
+        assert tool.stderr is not None
+        try:
+            yield next(line.strip() for line in tool.stderr if "token=" in line)
+        finally:
+            tool.terminate()
+
+
+def main() -> int:
+    """Print both; 1 if what is aimed at is missed."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        sync_playwright() as playwright,
+        served(Path(folder)) as link,
+        playwright.chromium.launch(
+            executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+        ) as browser,
+    ):
+        page = browser.new_page()
+        page.goto(link)
+        times = [stopped(page, Path(folder), number) for number in range(STOPS)]
+        checks = [1000 * rechecked(page, number) for number in range(STOPS)]
+    told, ended = ([1000 * each for each in some] for some in zip(*times, strict=True))
+    print(f"from a click on STOP to the robot, worst of {STOPS}, in ms (aim: ended in less than {AIM:.0f})")
+    for what, each in (("told", told), ("ended", ended)):
+        print(f"{what:6} {max(each):7.2f} (middle {median(each):.2f})")
+    print(f"from the last key to the problem at its line (aim: less than {AIM_OF_CHECKS:.0f})")
+    print(f"{'shown':6} {max(checks):7.2f} (middle {median(checks):.2f})")
+    holds = max(ended) < AIM and max(checks) < AIM_OF_CHECKS
+    print("as aimed at" if holds else "NOT as aimed at")
+    return 0 if holds else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
