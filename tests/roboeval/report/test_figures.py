@@ -85,6 +85,14 @@ def test_other_numbers_look_different() -> None:
     assert np.abs(one - two).mean() / 255 > TOLERANCE
 
 
+def test_the_line_through_a_bar_reaches_from_the_worst_prompt_to_the_best() -> None:
+    with looking(LIGHT):
+        (axes,) = bars([made_up("a", {"Visit": (1, 5, 9), "CountMugs": (4,)})], SUITE, LIGHT).axes
+    ends = [np.asarray(line)[:, 1] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
+    assert np.allclose(ends, [(0.1, 0.9), (0.4, 0.4)])
+    assert np.allclose([bar.get_height() for bar in axes.patches], [0.5, 0.4])  # type: ignore[attr-defined]  # bars are rectangles
+
+
 def test_lines_end_where_the_axis_ends() -> None:
     good, bad = Trial(accepted=True, ran=True, passed=False), Trial(accepted=False, ran=False, passed=True)
     trials = (Prompt("Visit", 0, (good, bad)),)  # whose pass@1 is half, after 100 retries nearly nothing
@@ -105,9 +113,9 @@ def test_numbers_stand_out_from_their_shades(look: Look) -> None:
         axes = figure.add_subplot()
         draw_heat(axes, Heat([[share] for share in shares], [""] * len(shares), [""]), look)
         figure.draw_without_rendering()
-        shades = axes.collections[0].get_facecolor()
+        shades = np.asarray(axes.collections[0].get_facecolor())
     for text, shade in zip(axes.texts, shades, strict=True):
-        one, other = sorted((light(to_rgb(text.get_color())), light(to_rgb(tuple(shade)))))
+        one, other = sorted((light(to_rgb(text.get_color())), light((shade[0], shade[1], shade[2]))))
         assert (other + 0.05) / (one + 0.05) > 4
 
 

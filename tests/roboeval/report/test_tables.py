@@ -8,6 +8,7 @@ import pytest
 
 from made_up_runs import HOSTILE, SUITE, made_up, usual
 from roboeval.evaluation import Evaluation
+from roboeval.records import to_line
 from roboeval.report import paper
 from roboeval.report.causes import all_causes, beside_notes, causes_of, causes_sheet, kinds_in_order
 from roboeval.report.contents import Wishes, sections
@@ -216,6 +217,30 @@ def test_runs_are_named_apart() -> None:
         made_up("x", {"Visit": (1,)}),
     ]
     assert [one.name for one in named_apart(runs)] == ["gpt-4 (a)", "gpt-4 (b) #2", "gpt-4 (b) #3", "x"]
+
+
+def test_a_run_as_it_is_read(paper_suite: Suite, tmp_path: Path) -> None:
+    rows = [
+        {
+            "task": "LunchTime",
+            "prompt": 0,
+            "index": n,
+            "model": model,
+            "program": "def task_program():\n    1\n",
+        }
+        for n, model in enumerate(("gpt-4", "other"))
+    ]
+    (tmp_path / "a.jsonl").write_bytes(b"".join(map(to_line, rows)))
+    run = Run(tmp_path / "gpt-4")
+    run.keep(open_source(str(tmp_path / "a.jsonl"), paper_suite))
+    for _ in evaluate_run(run, paper_suite, tasks=None, ablated=False, redo=False, workers=1):
+        pass
+    evaluation = Evaluation(run, "paper")
+    read = read_run(evaluation, evaluation.rows(), paper_suite)
+    assert (read.is_mixed, read.model, read.name) == (True, None, "gpt-4")
+    for row in read.rows:  # held in memory, all of them
+        kept = [number for number, verdict in enumerate(row["verdicts"]) if "trace" in verdict]
+        assert kept == [row["failure"]["world"]]
 
 
 def test_a_very_long_name_keeps_both_ends() -> None:
