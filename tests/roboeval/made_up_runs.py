@@ -130,5 +130,8 @@ def cases() -> dict[str, list[JudgedRun]]:
         "all failures": [made_up("hopeless", {"Visit": (0, 0), "CountMugs": (0,)}, trials=None)],
         "unfinished": [replace(one, total=500), *usual()[:1]],
         "40 models": many,
+        "long names": [
+            made_up(f"openai-chat:somebody/model-34b-hf-{n}", {"Visit": (n, 5)}) for n in range(7)
+        ],
         "hostile": [made_up(HOSTILE, {"Visit": (4, 5)})],
     }

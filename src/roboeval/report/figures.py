@@ -33,6 +33,7 @@ from roboeval.suite import Suite
 LOWEST = 1e-3  # where the paper ends its axis
 A_ROW = 8  # tasks that stand beside each other
 FEWEST = 4  # tasks for which there is room, lest a single bar fill a page
+SHORT_NAME = 16  # letters up to which two names stand beside each other below a narrow figure
 BAR = 0.82  # of the room that a task has
 
 
@@ -152,7 +153,9 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 
 def thresholds(runs: Sequence[JudgedRun], look: Look) -> Figure:
     """The share of prompts by threshold of pass@1, one line a model, on the paper's axis."""
-    figure = new_figure(NARROW if len(runs) <= MOST_COLOURS else WIDE, 2.75 + 0.13 * math.ceil(len(runs) / 2))
+    columns = _legend_columns([run.name for run in runs])
+    width = NARROW if len(runs) <= MOST_COLOURS else WIDE
+    figure = new_figure(width, 2.75 + 0.13 * math.ceil(len(runs) / columns))
     axes = figure.add_subplot()
     best = sorted(range(len(runs)), key=lambda i: -_mean_of(runs[i]))[:MOST_COLOURS]
     for number, run in enumerate(runs):
@@ -171,8 +174,16 @@ def thresholds(runs: Sequence[JudgedRun], look: Look) -> Figure:
         axes.plot([], [], color=look.faint, linewidth=0.7, label=f"{len(runs) - MOST_COLOURS} others")
     _threshold_axes(axes)
     _threshold_labels(axes)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2, handlelength=3.2)
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, handlelength=3.2
+    )
     return figure
+
+
+def _legend_columns(names: Sequence[str]) -> int:
+    """In how many columns a legend fits below a narrow figure."""
+    is_narrow = len(names) <= MOST_COLOURS
+    return 1 if is_narrow and max(len(brief(name)) for name in names) > SHORT_NAME else 2
 
 
 def _mean_of(run: JudgedRun) -> float:
@@ -263,9 +274,9 @@ def at_the_limit(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
     found = retries.checked(runs)
     if not found:
         return None
-    figure = new_figure(
-        NARROW if len(found) <= MOST_COLOURS else WIDE, 2.6 + 0.13 * math.ceil(len(found) / 2)
-    )
+    columns = _legend_columns([name for name, _ in found])
+    width = NARROW if len(found) <= MOST_COLOURS else WIDE
+    figure = new_figure(width, 2.6 + 0.13 * math.ceil(len(found) / columns))
     axes = figure.add_subplot()
     shares = [(name, retries.accepted(prompts)) for name, prompts in found]
     best = sorted(range(len(shares)), key=lambda i: (-shares[i][1][-1], i))[:MOST_COLOURS]
@@ -294,5 +305,7 @@ def at_the_limit(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
     share_axis(axes)
     axes.set_xlabel("retries at most")
     axes.set_ylabel("programs that are accepted")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2, handlelength=3.2)
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, handlelength=3.2
+    )
     return figure

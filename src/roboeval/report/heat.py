@@ -87,7 +87,9 @@ def causes_figure(causes: Sequence[Causes], look: Look) -> Figure:
     kinds = [kinds_in_order(causes, name) for name, _ in PANELS]
     tallest = max(3, *map(len, kinds))
     many = len(causes) > MOST_NUMBERS
+    longest = 0 if many else max(len(brief(one.name, 18)) for one in causes)
     heights = _heights(len(causes), tallest, many=many)
+    heights[1] += 0.04 * max(0, longest - 8)  # names of models stand aslant below the panels
     figure = new_figure(WIDE, sum(heights))
     above, below = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
     axes = above.add_subplot()
