@@ -64,7 +64,10 @@ def bars(runs: Sequence[JudgedRun], suite: Suite, look: Look) -> Figure:
         if line == 0:
             axes.set_title("(b) common sense only", loc="left")
     handles = [Patch(color=look.colour(i), label=brief(run.name)) for i, run in enumerate(runs)]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(runs), 5), handlelength=1.0)
+    columns = 5 if max(len(brief(run.name)) for run in runs) <= SHORT_NAME else 3
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=min(len(runs), columns), handlelength=1.0
+    )
     return figure
 
 

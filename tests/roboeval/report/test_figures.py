@@ -93,6 +93,18 @@ def test_the_line_through_a_bar_reaches_from_the_worst_prompt_to_the_best() -> N
     assert np.allclose([bar.get_height() for bar in axes.patches], [0.5, 0.4])  # type: ignore[attr-defined]  # bars are rectangles
 
 
+@pytest.mark.parametrize("name", ["tasks", "thresholds", "accepted", "rejection-sampling"])
+def test_long_names_fit_into_legends(name: str) -> None:
+    with looking(LIGHT):
+        figure = DRAWINGS[name](cases()["long names"], LIGHT)
+        assert figure is not None
+        figure.draw_without_rendering()
+        (legend,) = figure.legends
+        box = legend.get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.x1
+
+
 def test_lines_end_where_the_axis_ends() -> None:
     good, bad = Trial(accepted=True, ran=True, passed=False), Trial(accepted=False, ran=False, passed=True)
     trials = (Prompt("Visit", 0, (good, bad)),)  # whose pass@1 is half, after 100 retries nearly nothing
