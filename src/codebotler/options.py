@@ -25,3 +25,19 @@ BaseUrlOption = Annotated[
 ]
 RosPythonOption = Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")]
 ROS_PYTHON = Path("/usr/bin/python3")
+RobotOption = Annotated[
+    str, typer.Option(help="Which robot: sim, or another that `codebotler robots` lists.")
+]
+SpeedOption = Annotated[
+    float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
+]
+AddressOption = Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")]
+HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
+PortOption = Annotated[int, typer.Option(min=0, max=65535, help="The port; 0 takes a free one.")]
+NameOption = Annotated[
+    list[str] | None, typer.Option(help="A name by which the page is called, besides its address.")
+]
+TokenOption = Annotated[str | None, typer.Option(help="What opens the page; a new one by default.")]
+NoTokenOption = Annotated[
+    bool, typer.Option("--no-token", help="Let everybody on this machine in; not with --host.")
+]

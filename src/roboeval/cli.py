@@ -14,6 +14,7 @@ from roboeval.commands.generating import generate, run
 from roboeval.commands.judging import evaluate, export, import_, show
 from roboeval.commands.reporting import compare, report
 from roboeval.commands.resampling import resample
+from roboeval.commands.serving import serve
 
 app = typer.Typer(
     rich_markup_mode=None,
@@ -44,6 +45,7 @@ app.command()(tasks)
 app.command()(resample)
 app.command()(report)
 app.command()(compare)
+app.command()(serve)
 app.command()(export)
 app.command("import")(import_)
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TypeAlias
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from pageserver import PageServer
-from viewing import DESK, PHONE, TABLET, OpenPage
+from viewing import SCREENS, OpenPage, Screen, expect_no_grave_fault
 
 OFFICE = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
 PROBLEMS = """def task_program():
@@ -24,25 +22,12 @@ PROBLEMS = """def task_program():
     answer = ask("alice", "Shall I order one?", ["Yes", "No"])
     say("You said " + answer)
 """
-GRAVE = {"serious", "critical"}
-Screen: TypeAlias = tuple[str, tuple[int, int], bool]
-SCREENS: list[Screen] = [
-    (f"{name}-{'dark' if dark else 'light'}", size, dark)
-    for name, size in (("desk", DESK), ("tablet", TABLET), ("phone", PHONE))
-    for dark in (False, True)
-]
 
 
 @pytest.fixture(scope="module")
 def office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
     with PageServer(tmp_path_factory.mktemp("office"), "--speed", "10", world=OFFICE) as server:
         yield server
-
-
-def expect_no_grave_fault(page: Page) -> None:
-    found = Axe().run(page).response["violations"]
-    grave = [fault for fault in found if fault["impact"] in GRAVE]
-    assert [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in grave] == []
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])

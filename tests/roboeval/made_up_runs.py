@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -9,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.simulator.rules import Rules
+from roboeval.records import to_line
 from roboeval.report.reading import JudgedRun, Written, scored
 from roboeval.resampling import Trial, by_prompt
+from roboeval.run import Run
 from roboeval.suite import Suite
 from roboeval.tables import Row
 from small_run import TASK
@@ -135,3 +138,16 @@ def cases() -> dict[str, list[JudgedRun]]:
         ],
         "hostile": [made_up(HOSTILE, {"Visit": (4, 5)})],
     }
+
+
+def grown(run: Path, times: int) -> None:
+    """Let a run on the disk have each of its completions so many times, with other indices."""
+    found = Run(run)
+    for path in (found.completions, found.rows("paper")):
+        rows = [json.loads(line) for line in path.read_bytes().splitlines()]
+        most = 1 + max(row["index"] for row in rows)
+        with path.open("wb") as file:
+            for n in range(times):
+                file.writelines(to_line({**row, "index": row["index"] + n * most}) for row in rows)
+    hashes = found.programs("paper")
+    hashes.write_bytes(hashes.read_bytes() * times)

@@ -13,7 +13,7 @@ PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>CodeBotler: the API</title>
 <link rel="stylesheet" href="/static/api.css"></head><body><main><h1>The API</h1>
 <p>Everything the page does. Show the token with each request: <code>Authorization: Bearer TOKEN</code>.
-For machines: <a href="/api/openapi.json">openapi.json</a>. <a href="/">Back to the robot</a></p>
+For machines: <a href="/api/openapi.json">openapi.json</a>. <a href="/">Back to the page</a></p>
 {calls}</main></body></html>"""
 
 
@@ -29,7 +29,17 @@ def _calls(about: dict[str, Any]) -> Iterator[str]:
     for path, methods in about["paths"].items():
         for method, call in methods.items():
             yield f"<section><h2><b>{method.upper()}</b> {escape(path)}</h2>"
-            yield f"<p>{escape(call.get('description', ''))}</p>{_body(call, about)}</section>"
+            yield f"<p>{escape(call.get('description', ''))}</p>"
+            yield f"{_queries(call)}{_body(call, about)}</section>"
+
+
+def _queries(call: dict[str, Any]) -> str:
+    rows = [
+        f"<li><code>?{escape(one['name'])}=</code> {escape(one['description'])}</li>"
+        for one in call.get("parameters", ())
+        if one["in"] == "query" and "description" in one
+    ]
+    return f"<ul>{''.join(rows)}</ul>" if rows else ""
 
 
 def _body(call: dict[str, Any], about: dict[str, Any]) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from datetime import datetime
 
 from nicegui import html, ui
@@ -14,17 +13,18 @@ from codebotler.missionlog import Line, Summary, events_of
 from codebotler.missionview import told
 from codebotler.terminal import shortened
 from codebotler.web.desk import Desk
+from codebotler.web.frame import Frame
 from codebotler.web.words import Words
 
 MOST, MOST_EVENTS = 200, 1_000
 
 
-def add(desk: Desk, frame: Callable[[str, str], None]) -> None:
+def add(desk: Desk, frame: Frame) -> None:
     """Put the pages at their addresses.
 
     Args:
         desk: whose missions.
-        frame: what all pages have, given the title and the address.
+        frame: what all pages have.
     """
 
     @ui.page("/missions")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from codebotler.badinput import BadInput
@@ -57,3 +58,23 @@ class Place:
         named = {name.lower() for name in (self.host, *self.names)}
         hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
         return Rules(access, frozenset(hosts), not self.is_loopback, f"codebotler-{port}")
+
+
+def entrance(
+    host: str, port: int, names: Sequence[str], token: str | None, face: str | None = None, *, no_token: bool
+) -> tuple[Place, Access]:
+    """Where a page is and who may open it, as somebody asked for it.
+
+    Args:
+        host: the address to listen on.
+        port: the port, from 0, which takes a free one.
+        names: under which the page may be called besides.
+        token: that opens it; a new one by default.
+        face: the token that opens a robot's face; a new one by default.
+        no_token: whether everybody on this machine may open it.
+
+    Raises:
+        BadInput: more people than that would get in.
+    """
+    place = Place(host, port, tuple(names))
+    return place, Access.asked_for(token, face, open_to_all=no_token, is_loopback=place.is_loopback)

@@ -16,14 +16,14 @@ from codebotler.problems import Check
 from codebotler.skills import SKILLS
 from codebotler.terminal import shortened
 from codebotler.web.desk import Desk
-from codebotler.web.strip import Scene, Strip, strips
+from codebotler.web.sceneview import draw_scene
+from codebotler.web.strip import Strip, strips
 from codebotler.web.turn import View
 from codebotler.web.words import Press, Words
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
 MOST_MARKS = 400
 MOST_PROBLEMS = 20
-SPOKEN = frozenset({"say", "ask", "answer"})
 SCRIPT = '<script src="/static/editor.js"></script>'
 
 
@@ -215,14 +215,5 @@ def _draw_strips(shown: list[Strip]) -> None:
                 Words("p", f"Where {strip.world}", "world")
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for scene in strip.scenes:
-                    _draw_scene(scene)
+                    draw_scene(scene)
             Words("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
-
-
-def _draw_scene(scene: Scene) -> None:
-    with ui.element("li").classes("scene" if scene.deeds or not scene.is_found else "scene passing"):
-        Words("b", scene.room, "room")
-        if not scene.is_found:
-            Words("span", "there is no such room", "deed missing")
-        for deed in scene.deeds:
-            Words("span", deed.text, f"deed deed-{deed.kind}" if deed.kind in SPOKEN else "deed")

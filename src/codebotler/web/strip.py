@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from codebotler.problems import Check, Sample
 from codebotler.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, steps_of
@@ -21,10 +22,12 @@ class Deed:
     Args:
         kind: `say` and `ask` for what is spoken, `answer` for what is heard; else the event's.
         text: it, in words; any text.
+        step: its number in the trace, counted from 1; 0 for what is none.
     """
 
     kind: str
     text: str
+    step: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,13 @@ class Scene:
         room: its name; for a drive that fails what was asked for.
         deeds: what happens there, in order.
         is_found: whether there is such a room.
+        step: the number of the drive there, counted from 1; 0 where the robot was at first.
     """
 
     room: str
     deeds: tuple[Deed, ...] = ()
     is_found: bool = True
+    step: int = field(default=0, compare=False)
 
 
 @dataclass(frozen=True)
@@ -86,29 +91,47 @@ def _strip(sample: Sample, found: Check) -> Strip:
 
 
 def _scenes(sample: Sample, found: Check) -> tuple[Scene, ...]:
-    steps = steps_of(sample.outcome.trace, found.plan.room)
-    scenes: list[Scene] = [Scene(shortened(found.plan.start, MOST_TEXT))]
+    return scenes(steps_of(sample.outcome.trace, found.plan.room), found.plan.start)
+
+
+def scenes(
+    steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int] = frozenset()
+) -> tuple[Scene, ...]:
+    """What happens, room by room; of a long trace its ends, and the steps that somebody speaks of.
+
+    Args:
+        steps: of the trace, with the rooms that drives find.
+        start: the room where the robot is at first.
+        needed: numbers of steps that are not left out.
+    """
+    found: list[Scene] = [Scene(shortened(start, MOST_TEXT))]
     cut = len(steps) > MOST_STEPS
+    hidden = 0
     for number, step in enumerate(steps):
-        if cut and FIRST_STEPS <= number < len(steps) - LAST_STEPS:
-            if number == FIRST_STEPS:
-                hidden = len(steps) - FIRST_STEPS - LAST_STEPS
-                scenes.append(Scene("…", (Deed("more", f"{hidden:,} more steps"),)))
-        elif step["kind"] == "goto":
+        if cut and FIRST_STEPS <= number < len(steps) - LAST_STEPS and step["step"] not in needed:
+            hidden += 1
+            continue
+        found += _left_out(hidden)
+        hidden = 0
+        if step["kind"] == "goto":
             to = step["to"]
-            scenes.append(Scene(shortened(to or step["text"], MOST_TEXT), is_found=to is not None))
+            room = shortened(to or step["text"], MOST_TEXT)
+            found.append(Scene(room, is_found=to is not None, step=step["step"]))
         else:
-            last = scenes[-1]
-            scenes[-1] = Scene(last.room, (*last.deeds, *_deeds(step)), last.is_found)
-    return tuple(scenes)
+            found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_deeds(step)))
+    return tuple(found)
 
 
-def _deeds(step: dict[str, object]) -> Sequence[Deed]:
-    kind, text = str(step["kind"]), shortened(str(step["text"]), MOST_TEXT)
+def _left_out(count: int) -> list[Scene]:
+    return [Scene("…", (Deed("more", f"{count:,} more steps"),))] if count else []
+
+
+def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
+    kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
     if kind == "ask":
         answer = step["answer"]
         heard = "no answer" if answer is None else shortened(str(answer), MOST_TEXT)
-        return (Deed("ask", text), Deed("answer", heard))
+        return (Deed("ask", text, number), Deed("answer", heard))
     if kind == "check":
-        return (Deed("check", f"looks for {text}: {'found' if step.get('found') else 'not found'}"),)
-    return (Deed(kind, text if kind == "say" else f"{WORDS.get(kind, kind)} {text}"),)
+        return (Deed("check", f"looks for {text}: {'found' if step.get('found') else 'not found'}", number),)
+    return (Deed(kind, text if kind == "say" else f"{WORDS.get(kind, shortened(kind))} {text}", number),)

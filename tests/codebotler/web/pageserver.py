@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +22,8 @@ rooms: [hall, kitchen, study]
 objects: {kitchen: [mug]}
 people: {study: [{name: ann, answers: ["yes"]}]}
 """
+
+SERVE = ("codebotler.cli", "serve", "--world", "world.yaml")
 
 
 @dataclass(frozen=True)
@@ -48,12 +51,16 @@ class PageServer:
     Args:
         folder: where the world file and the missions lie.
         arguments: further ones.
+        world: what the world file says.
+        serve: another command that serves a page.
     """
 
-    def __init__(self, folder: Path, *arguments: str, world: str = WORLD) -> None:
+    def __init__(
+        self, folder: Path, *arguments: str, world: str = WORLD, serve: Sequence[str] = SERVE
+    ) -> None:
         self.home = folder / "home"
         (folder / "world.yaml").write_text(world)
-        command = [sys.executable, "-m", "codebotler.cli", "serve", "--port", "0", "--world", "world.yaml"]
+        command = [sys.executable, "-m", *serve, "--port", "0"]
         self._said = folder / "said.txt"
         with self._said.open("w") as file:
             self._process = subprocess.Popen(
@@ -66,6 +73,15 @@ class PageServer:
             assert self._process.poll() is None, self.said
             time.sleep(0.02)
         self.link, self.port, self.token = link[0].strip(), int(link[1]), link[2] or ""
+
+    @property
+    def face_token(self) -> str:
+        """The token of the robot's face, where it has one."""
+        ends = time.monotonic() + 10
+        while (found := re.search(r"/face\?token=(\S+)\n", self.said)) is None:
+            assert time.monotonic() < ends, self.said
+            time.sleep(0.02)
+        return found[1]
 
     @property
     def said(self) -> str:
@@ -109,6 +125,27 @@ class PageServer:
     def call(self, method: str, path: str, body: object = None) -> Answer:
         """Send a request as the API's clients do, with the token."""
         return self.ask(method, path, body, authorization=f"Bearer {self.token}")
+
+    @property
+    def face_link(self) -> str:
+        """What opens the robot's face, where it has one."""
+        return f"http://localhost:{self.port}/face?token={self.face_token}"
+
+    def face(self, method: str, path: str, body: object = None) -> Answer:
+        """Send a request with the token of the robot's face."""
+        return self.ask(method, path, body, authorization=f"Bearer {self.face_token}")
+
+    def run(self, program: str, *, despite_problems: bool = False) -> None:
+        """Have the robot run a program, as the API's clients do."""
+        begun = self.call("POST", "/api/missions", {"program": program})
+        assert begun.status == 201, begun.text
+        ends = time.monotonic() + 20
+        while (view := self.call("GET", "/api/missions/current").data)["check"] is None:
+            assert time.monotonic() < ends, view
+            time.sleep(0.01)
+        approval = {"program": view["digest"], "despite_problems": despite_problems}
+        approved = self.call("POST", "/api/missions/current/approve", approval)
+        assert approved.status == 200, approved.text
 
     @property
     def cookie(self) -> str:

@@ -5,9 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeAlias
 
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page
 
 DESK, TABLET, PHONE = (1440, 900), (820, 1180), (390, 844)
 """Width and height of screens, in pixels."""
 
 OpenPage: TypeAlias = Callable[..., Page]
+
+GRAVE = {"serious", "critical"}
+Screen: TypeAlias = tuple[str, tuple[int, int], bool]
+SCREENS: list[Screen] = [
+    (f"{name}-{'dark' if dark else 'light'}", size, dark)
+    for name, size in (("desk", DESK), ("tablet", TABLET), ("phone", PHONE))
+    for dark in (False, True)
+]
+
+
+def expect_no_grave_fault(page: Page) -> None:
+    """Have axe look for what shuts somebody out."""
+    found = Axe().run(page).response["violations"]
+    grave = [fault for fault in found if fault["impact"] in GRAVE]
+    assert [(fault["id"], [node["html"] for node in fault["nodes"]]) for fault in grave] == []

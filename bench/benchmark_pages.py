@@ -1,0 +1,138 @@
+"""How long does it take to open a run of 4,000 completions in a browser, and to scroll through it?
+
+A run is made up: verdicts on the programs that ship with the package, repeated. `roboeval serve` shows it in
+the system's Chromium. Printed are the worst of OPENS=10 and the middle one, in milliseconds, once all pages
+were opened before: until the heat map and the first completions of a run stand there, the same of the page of
+all runs, of a filter, and of one completion; and until the completions at a place stand there after a jump to
+it. The first opening, for which the files are read, is printed besides.
+"""
+
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+from playwright.sync_api import Page, sync_playwright
+
+from report import made_up
+from roboeval.suite import load_suite
+
+OPENS = int(os.environ.get("OPENS", "10"))
+AIM, AIM_OF_A_JUMP = 1_000.0, 100.0
+FRAMES = """async () => {
+  const view = document.querySelector(".completions-view");
+  let worst = 0, last = performance.now(), empty = 0, frames = 0;
+  while (view.scrollTop + view.clientHeight < view.scrollHeight - 1 && frames < 240) {
+    view.scrollTop += 180;
+    await new Promise(requestAnimationFrame);
+    const now = performance.now();
+    worst = Math.max(worst, now - last);
+    last = now;
+    frames++;
+    const [top, bottom] = [view.getBoundingClientRect().top, view.getBoundingClientRect().bottom];
+    empty += [...view.querySelectorAll("[role=row]")].some((row) => {
+      const place = row.getBoundingClientRect();
+      return place.bottom > top && place.top < bottom && !row.querySelector("a");
+    });
+  }
+  return [worst, empty, frames];
+}"""
+JUMP = """async (share) => {
+  const view = document.querySelector(".completions-view");
+  const began = performance.now();
+  view.scrollTop = share * (view.scrollHeight - view.clientHeight);
+  const wanted = Math.floor(view.scrollTop / 44) + 2;
+  for (;;) {
+    const row = view.querySelector(`[aria-rowindex="${wanted}"] a`);
+    if (row) return performance.now() - began;
+    await new Promise(requestAnimationFrame);
+  }
+}"""
+
+
+def timed(do: Callable[[], object]) -> float:
+    """Milliseconds that something takes."""
+    began = time.perf_counter()
+    do()
+    return 1000 * (time.perf_counter() - began)
+
+
+def opened(page: Page, address: str, *there: str) -> float:
+    """Open a page: milliseconds until all of it stands there."""
+
+    def open_it() -> None:
+        page.goto(address)
+        for one in there:
+            page.locator(one).first.wait_for()
+
+    return timed(open_it)
+
+
+def chosen(page: Page) -> float:
+    """Choose what failed by some kind, and all again: milliseconds of the first."""
+
+    def choose() -> None:
+        page.locator(".kind", has_text="SayAtLocation").click()
+        page.locator("h2", has_text="that failed by SayAtLocation").wait_for()
+        page.locator(".completions-view .completion", has_text="SayAtLocation").first.wait_for()
+
+    took = timed(choose)
+    page.locator("button", has_text="Show all").click()
+    page.locator("h2", has_text=re.compile("^Completions$")).wait_for()
+    page.locator("#count", has_text="4,000").wait_for()
+    return took
+
+
+def main() -> int:
+    """Print all; 1 if what is aimed at is missed."""
+    with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
+        folder = Path(name)
+        run = made_up(folder, 0, load_suite())
+        size = sum(path.stat().st_size for path in run.path.rglob("*") if path.is_file())
+        command = [sys.executable, "-m", "roboeval.cli", "serve", str(folder), "--port", "0"]
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tool:
+            assert tool.stderr is not None
+            link = next(line.strip() for line in tool.stderr if "token=" in line)
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+            )
+            page = browser.new_page(viewport={"width": 1440, "height": 900})
+            page.goto(link)
+            base = link.partition("?")[0]
+            whole = (f"{base}runs/{run.path.name}", ".heat td a", ".completions-view a")
+            one = (f"{base}runs/{run.path.name}/LunchBreak/0/7", ".program .line", ".world-of")
+            first = opened(page, *whole)
+            opened(page, *one)
+            found = {"all runs": [opened(page, f"{base}runs", ".runs tbody a") for _ in range(OPENS)]}
+            found["one completion"] = [opened(page, *one) for _ in range(OPENS)]
+            found["one run"] = [opened(page, *whole) for _ in range(OPENS)]
+            page.locator("#count", has_text="4,000").wait_for()
+            found["a filter"] = [chosen(page) for _ in range(OPENS)]
+            places = random.Random(0)
+            found["a jump"] = [page.evaluate(JUMP, places.random()) for _ in range(OPENS)]
+            page.evaluate(JUMP, 0.0)
+            worst, empty, frames = page.evaluate(FRAMES)
+            browser.close()
+            tool.terminate()
+    print(f"a run of 4,000 completions, {size / 1e6:.0f} MB: its first opening took {first:.0f} ms")
+    print(f"worst of {OPENS} in ms (aim: a page in {AIM:.0f}, a jump in {AIM_OF_A_JUMP:.0f})")
+    for what, each in found.items():
+        print(f"{what:15} {max(each):7.1f} (middle {median(each):.1f})")
+    print(
+        f"scrolling: {frames} frames, the longest {worst:.0f} ms, {empty} of them with a row still waited for"
+    )
+    aims = {what: AIM_OF_A_JUMP if what == "a jump" else AIM for what in found}
+    missed = [what for what, each in found.items() if max(each) > aims[what]]
+    print(f"NOT as aimed at: {', '.join(missed)}" if missed else "as aimed at")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

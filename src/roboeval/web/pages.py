@@ -1,0 +1,39 @@
+"""The pages of the benchmark, as `codebotler serve` finds them and `roboeval serve` opens them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fastapi.responses import RedirectResponse
+from fastapi.staticfiles import StaticFiles
+
+from codebotler.web.further import Pages, Site
+from roboeval.suite import Suite
+from roboeval.web import api, oneprogram, onerun, overview, sidebyside
+from roboeval.web.shelf import Shelf
+
+STATIC = Path(__file__).with_name("static")
+
+
+def pages(suites: Sequence[Suite] = ()) -> Pages:
+    """The pages.
+
+    Args:
+        suites: by which runs may have been judged, besides those that ship with the package.
+    """
+
+    def add(site: Site) -> None:
+        shelf = Shelf(site.runs, suites)
+        site.app.include_router(api.router(shelf))
+        site.app.mount("/static/benchmark", StaticFiles(directory=STATIC))
+        for page in (overview, onerun, sidebyside, oneprogram):
+            page.add(shelf, site.frame)
+        if not site.frame.has_robot:
+            site.app.get("/", include_in_schema=False)(lambda: RedirectResponse("/runs"))
+
+    return Pages("Benchmark", "RoboEval", "/runs", add)
+
+
+PAGES = pages()
+"""What the entry point names."""

@@ -1,0 +1,411 @@
+"""The benchmark in a real browser: from all runs to one failed check, filtered, live, and safe from texts."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from command_line import roboeval
+from made_up_runs import grown
+from pageserver import PageServer
+from roboeval.records import to_line
+from roboeval.run import Run
+from runs_server import serving
+from viewing import PHONE, SCREENS, OpenPage, Screen, expect_no_grave_fault
+
+TASKS = "SayGoodDay,LunchBreak,StaplerSupply"
+EVIL = [
+    "<script>window.owned = 1</script>",
+    '<img src=x onerror="window.owned = 1">',
+    "[a link](javascript:window.owned=1) **bold** `code`",
+    "{{ constructor.constructor('window.owned = 1')() }} ${window.owned = 1}",
+    "</textarea></script><svg onload=window.owned=1>'\"`--></style>",
+    "שלום עולם \u202e gnp.exe \u2066 مرحبا",
+    "\x1b[31mred\x00\u2028\ud800\U0001f916",
+    "long " * 20_000,
+]
+NAMES = ["script", "img", "markdown", "template", "tags", "bidi", "odd", "long"]
+OWN_TAGS = "script, img, iframe, object, embed, a[href^='javascript'], svg [onload], [onerror]"
+
+
+def made(folder: Path, model: str, *arguments: str) -> Path:
+    """A run that is made on the spot."""
+    path = folder / model
+    ended = roboeval(
+        "run", "--model", f"recorded:{model}", "--num-completions", "3", *arguments, "--out", path
+    )
+    assert ended.status == 0, ended.err
+    return path
+
+
+@pytest.fixture(scope="module")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two real runs of all tasks."""
+    folder = tmp_path_factory.mktemp("real") / "runs"
+    folder.mkdir()
+    for model in ("hasty", "careful"):
+        made(folder, model)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def served(real: Path) -> Iterator[PageServer]:
+    with serving(real) as server:
+        yield server
+
+
+@pytest.fixture
+def runs(real: Path, tmp_path: Path) -> Path:
+    """A folder with a copy of one, to be changed at will."""
+    folder = tmp_path / "runs"
+    shutil.copytree(real / "hasty", folder / "hasty")
+    return folder
+
+
+def test_from_all_runs_to_one_failed_check(served: PageServer, opened: OpenPage) -> None:
+    page = opened(served)
+    expect(page.locator(".runs tbody tr")).to_have_count(2)
+    expect(page.locator(".runs tbody tr", has_text="hasty")).to_contain_text("programs written by hand")
+    for box in page.get_by_role("checkbox").all():
+        box.check()
+    page.get_by_role("button", name="Show side by side").click()
+    expect(page.locator(".heat").first.get_by_role("row")).to_have_count(2 + 16)
+    cells = page.locator(".heat").first.locator("tbody tr", has_text="LunchBreak").locator("td")
+    expect(cells).to_have_count(12)
+    cell = page.get_by_role("link", name=re.compile("^LunchBreak, prompt 0: 33 % passed, 1 of 3"))
+    expect(cell).to_have_text("33")
+    cell.click()
+    expect(page.get_by_role("heading", name="Completions of LunchBreak, prompt 0")).to_be_visible()
+    listed = page.locator(".completions-view a")
+    expect(listed).to_have_text(["LunchBreak/0/0", "LunchBreak/0/1", "LunchBreak/0/2"])
+    page.locator(".kind", has_text="SayAtLocation").click()
+    page.get_by_role("button", name="Show all").click()
+    page.locator(".kind", has_text="SayAtLocation").click()
+    expect(page.get_by_role("heading", name="Completions that failed by SayAtLocation")).to_be_visible()
+    expect(page.get_by_role("heading", name="Where they fail by SayAtLocation")).to_be_visible()
+    expect(page.locator("#count")).to_have_text("18 completions")
+    expect(page.locator(".completions-view b").first).to_have_text("SayAtLocation")
+    listed.first.click()
+    expect(page.locator(".failed-check").first).to_contain_text("at step")
+    expect(page.locator(".world-of")).not_to_have_count(0)
+    expect(page.locator(".wrong").first).to_be_visible()
+    page.locator("summary", has_text="Every step").first.click()
+    expect(page.locator(".unfolded pre").first).to_contain_text("drives to")
+    page.locator("summary", has_text="The world").first.click()
+    expect(page.locator(".unfolded .floorplan").first).to_be_visible()
+    before = page.locator("h1").inner_text()
+    page.get_by_role("link", name="Next").click()
+    expect(page.locator("h1")).not_to_have_text(before)
+    page.get_by_role("link", name="hasty").click()
+    expect(page.locator("#count")).to_have_text("18 completions")
+
+
+def test_the_page_tells_what_show_tells(served: PageServer, real: Path, opened: OpenPage) -> None:
+    shown = json.loads(roboeval("show", real / "hasty", "CountSavory/0/1", "--json").out)
+    page = opened(served, "runs/hasty/CountSavory/0/1")
+    expect(page.locator(".instruction")).to_have_text(shown["instruction"])
+    program = "\n".join(page.locator(".program .line .text").all_inner_texts())
+    assert program == shown["program"].rstrip("\n")
+    for number, world in enumerate(shown["worlds"]):
+        article = page.locator(".world-of").nth(number)
+        expect(article.locator("h2")).to_have_text(f"World {number + 1} of 4: {world['world']}")
+        expect(article.locator(".state")).to_have_text("satisfied" if world["satisfied"] else "not satisfied")
+        for check in world["failed_checks"]:
+            expect(article.locator(".failed-check")).to_contain_text(check["check"])
+            expect(article.locator(".failed-check")).to_contain_text(check["explanation"])
+
+
+def test_a_line_that_ends_a_program_is_marked(served: PageServer, opened: OpenPage) -> None:
+    page = opened(served, "runs/hasty/LunchBreak/0/0")
+    expect(page.locator(".program .marked")).to_contain_text("go_to")
+    expect(page.locator(".world-of .trouble").first).to_contain_text("there is no room")
+
+
+def test_what_is_chosen_stands_in_the_address(served: PageServer, opened: OpenPage) -> None:
+    page = opened(served, "runs/hasty")
+    page.get_by_role("link", name=re.compile("^SayGoodDay, prompt 3")).click()
+    expect(page.locator(".completions-view a")).to_have_text([f"SayGoodDay/3/{n}" for n in range(3)])
+    assert page.url.endswith("/runs/hasty?task=SayGoodDay&prompt=3")
+    page.reload()
+    expect(page.locator(".completions-view a")).to_have_text([f"SayGoodDay/3/{n}" for n in range(3)])
+    expect(page.locator("[aria-current=true]", has_text=re.compile(r"^\d+$"))).to_have_count(1)
+
+
+def test_everything_is_reached_with_the_keyboard(served: PageServer, opened: OpenPage) -> None:
+    page = opened(served, "runs/hasty")
+    page.get_by_role("link", name=re.compile("^LunchBreak, prompt 1")).focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("#count")).to_have_text("3 completions")
+    kind = page.get_by_role("button", name=re.compile("^passed"))
+    kind.focus()
+    page.keyboard.press("Enter")
+    expect(
+        page.get_by_role("heading", name="Completions of LunchBreak, prompt 1, that passed")
+    ).to_be_visible()
+    expect(kind).to_be_focused()
+    expect(kind).to_have_attribute("aria-pressed", "true")
+    page.get_by_role("button", name="Show all").focus()
+    page.keyboard.press("Space")
+    expect(page.locator("#count")).to_have_text("240 completions")
+    page.locator(".completions-view").focus()
+    page.keyboard.press("End")
+    expect(page.locator("[aria-rowindex='241'] a")).to_be_visible()
+    page.locator("[aria-rowindex='241'] a").focus()
+    page.keyboard.press("Enter")
+    expect(page.locator("h1")).to_have_text("WeatherPoll/4/2")
+
+
+def test_a_long_list_has_few_rows_in_the_page(runs: Path, opened: OpenPage) -> None:
+    grown(runs / "hasty", 17)
+    with serving(runs) as server:
+        page = opened(server, "runs/hasty")
+        expect(page.locator("#count")).to_have_text("4,080 completions")
+        for share, wanted in ((1.0, 4081), (0.5, None), (0.0, 2)):
+            page.locator(".completions-view").evaluate(
+                "(view, share) => { view.scrollTop = share * view.scrollHeight; }", share
+            )
+            if wanted is not None:
+                expect(page.locator(f"[aria-rowindex='{wanted}'] a")).to_be_visible()
+            expect(page.locator(".completions-view .quiet")).to_have_count(0)
+            assert page.locator(".completions-view .completion").count() < 60
+        expect(page.locator(".completions-view a").first).to_have_text("CountSavory/0/0")
+        page.context.close()
+
+
+def test_a_run_is_followed_while_it_is_made(runs: Path, opened: OpenPage) -> None:
+    """The test writes what a model's slow replies would, line by line, under the lock of a writer."""
+    whole, run = Run(runs / "hasty"), Run(runs / "growing")
+    lines = {
+        path: (whole.path / path).read_bytes().splitlines(keepends=True)
+        for path in ("completions.jsonl", "evaluations/paper.sha256", "evaluations/paper.jsonl")
+    }
+
+    def write(path: str, start: int, end: int) -> None:
+        (run.path / path).parent.mkdir(exist_ok=True)
+        with (run.path / path).open("ab") as file:
+            file.writelines(lines[path][start:end])
+
+    run.path.mkdir()
+    shutil.copy(whole.about, run.about)
+    with serving(runs) as server:
+        with run.writing():
+            write("completions.jsonl", 0, 60)
+            everything, page = opened(server), opened(server, "runs/growing")
+            row = everything.locator(".runs tbody tr", has_text="growing")
+            expect(row.locator(".state")).to_have_text("being generated")
+            expect(row).to_contain_text("60 of 240 written")
+            expect(page.locator(".facts .state")).to_have_text("being generated")
+            expect(page.locator("progress")).to_have_attribute("value", "0.250")
+            write("completions.jsonl", 60, 240)
+            expect(page.locator("#count")).to_have_text("240 completions")
+            shutil.copytree(whole.path / "evaluations", run.path / "evaluations")
+            (run.path / "evaluations" / "paper.jsonl").write_bytes(b"")
+            (run.path / "evaluations" / "paper.sha256").write_bytes(b"")
+            write("evaluations/paper.sha256", 0, 240)
+            write("evaluations/paper.jsonl", 0, 100)
+            expect(row.locator(".state")).to_have_text("being judged")
+            expect(row).to_contain_text("100 of 240 judged")
+            expect(page.locator(".facts .state")).to_have_text("being judged")
+            expect(page.locator(".heat td.mean").first).not_to_have_text("-")
+        expect(row.locator(".state")).to_have_text("unfinished")
+        write("evaluations/paper.jsonl", 100, 240)
+        expect(row.locator(".state")).to_have_text("judged")
+        expect(page.locator(".facts .state")).to_have_text("judged")
+        expect(page.locator(".facts b").first).to_contain_text("pass@1 0.279")
+        expect(page.locator("progress")).to_be_hidden()
+        for each in (page, everything):
+            each.context.close()
+
+
+def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> None:
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    with serving(folder) as server:
+        page = opened(server)
+        expect(page.get_by_text("There is no run here yet.")).to_be_visible()
+        command = ["run", "--model", "recorded:hasty", "--num-completions", "2", "--tasks", TASKS]
+        made = subprocess.Popen(
+            [sys.executable, "-m", "roboeval.cli", *command, "--out", folder / "new"],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        row = page.locator(".runs tbody tr")
+        expect(row).to_have_count(1)
+        assert made.wait() == 0
+        expect(row.locator(".state")).to_have_text("judged")
+        expect(row.locator(".count")).to_have_text("30")
+        expect(page.get_by_text("There is no run here yet.")).to_be_hidden()
+        page.context.close()
+
+
+def test_a_run_that_is_deleted_while_it_is_looked_at(runs: Path, opened: OpenPage) -> None:
+    with serving(runs) as server:
+        page = opened(server, "runs/hasty")
+        expect(page.locator("#count")).to_have_text("240 completions")
+        shutil.rmtree(runs / "hasty")
+        expect(page.get_by_role("alert")).to_have_text(
+            "This run is gone: its folder was deleted or renamed. What is below was read before."
+        )
+        expect(page.locator(".heat td").first).to_be_visible()
+        page.reload()
+        expect(page.get_by_role("alert")).to_contain_text('there is no run "hasty" in this folder')
+        page.get_by_role("link", name="All runs").click()
+        expect(page.get_by_text("There is no run here yet.")).to_be_visible()
+        page.context.close()
+
+
+def test_a_damaged_row_is_said_and_the_others_are_shown(runs: Path, opened: OpenPage) -> None:
+    rows = Run(runs / "hasty").rows("paper")
+    lines = rows.read_bytes().splitlines(keepends=True)
+    rows.write_bytes(b"".join([*lines[:10], b"{broken\n", *lines[11:]]))
+    with serving(runs) as server:
+        page = opened(server, "runs/hasty")
+        expect(page.locator(".notes")).to_contain_text("paper.jsonl, line 11: this line is no row")
+        expect(page.locator(".facts .state")).to_have_text("damaged")
+        expect(page.locator("#count")).to_have_text("240 completions")
+        page.context.close()
+
+
+def test_an_address_of_nothing_says_so(served: PageServer, opened: OpenPage) -> None:
+    for path, sentence in (
+        ("runs/none", 'there is no run "none" in this folder; perhaps it was deleted'),
+        ("runs/hasty/LunchBreak/0/99", 'this run has no completion "LunchBreak/0/99"'),
+        ("runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
+    ):
+        page = opened(served)
+        page.goto(f"http://localhost:{served.port}/{path}")
+        expect(page.get_by_role("alert")).to_have_text(sentence)
+
+
+# --- texts
+
+
+def changed(run: Run, change: Callable[[dict[str, Any], dict[str, Any]], None]) -> None:
+    """Rewrite a run's completions and their rows."""
+    completions = [json.loads(line) for line in run.completions.read_bytes().splitlines()]
+    rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
+    for completion, row in zip(completions, rows, strict=True):
+        change(completion, row)
+    run.completions.write_bytes(b"".join(map(to_line, completions)))
+    run.rows("paper").write_bytes(b"".join(map(to_line, rows)))
+
+
+def expect_unharmed(page: Page, before: int) -> None:
+    page.wait_for_timeout(300)
+    assert page.evaluate("window.owned") is None
+    assert page.locator(OWN_TAGS).count() == before
+    size = page.viewport_size
+    assert size is not None
+    assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+
+
+@pytest.mark.parametrize("evil", EVIL, ids=NAMES)
+def test_no_text_becomes_more_than_text(runs: Path, opened: OpenPage, evil: str) -> None:
+    """A program, a model, an instruction, an error, a check, a world, a room, a task, a run, a file."""
+    name = "".join(c for c in evil if c.isprintable()).replace("/", "|")[:80].strip()
+    whole = evil.encode(errors="replace").decode()  # a name in an address holds no half character
+    run = Run(runs / name)
+    (runs / "hasty").rename(run.path)
+
+    def make_evil(completion: dict[str, Any], row: dict[str, Any]) -> None:
+        completion |= {"program": evil * 3, "model": evil, "instruction": evil}
+        if completion["task"] == "LunchBreak":
+            completion["task"] = row["task"] = f"{whole[:200]} LunchBreak"
+        for verdict in row["verdicts"]:
+            verdict["world"] = evil
+            verdict["trace"] = [
+                ["goto", evil],
+                ["say", evil],
+                ["check", evil, True],
+                ["ask", evil, [evil], evil],
+            ]
+            verdict["failed_checks"] = [evil] * len(verdict["failed_checks"])
+            if verdict["error"]:
+                verdict["error"] = {"kind": evil, "message": evil}
+        if row["failure"]:
+            check = row["failure"]["check"] and evil
+            row["failure"] |= {"class": whole[:300], "kind": whole[:300], "check": check}
+
+    changed(run, make_evil)
+    head = json.loads(run.head("paper").read_text())
+    shutil.copy(run.rows("paper"), run.rows(name))
+    with serving(runs) as server:
+        before = opened(server)
+        expect(before.locator(".runs tbody tr")).to_have_count(1)
+        count = before.locator(OWN_TAGS).count()
+        expect_unharmed(before, count)
+        for size in ((1440, 900), PHONE):
+            page = opened(server, size=size)
+            page.locator(".runs tbody a").click()
+            expect(page.locator("#count")).to_have_text("240 completions")
+            expect_unharmed(page, count)
+            page.locator(".kind").nth(2).click()
+            expect(page.get_by_role("button", name="Show all")).to_be_visible()
+            expect_unharmed(page, count)
+            page.locator(".completions-view a").first.click()
+            expect(page.locator(".world-of").first).to_be_visible()
+            page.locator("summary", has_text="Every step").first.click()
+            expect(page.locator(".unfolded pre")).to_be_visible()
+            shown = page.locator(".program").inner_text()
+            assert "".join(shown.split())[1:8] == "".join(visible(evil).split())[:7]
+            expect_unharmed(page, count)
+            page.goto(f"http://localhost:{server.port}/runs")
+            page.get_by_role("checkbox").check()
+            page.get_by_role("button", name="Show side by side").click()
+            expect(page.locator(".heat td").first).to_be_visible()
+            expect_unharmed(page, count)
+            page.context.close()
+        before.context.close()
+    assert head["suite"] == "paper"
+
+
+def visible(text: str) -> str:
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+# --- looks
+
+
+@pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
+def test_pages(served: PageServer, opened: OpenPage, shots: Path, screen: Screen) -> None:
+    which, size, dark = screen
+    page = opened(served, size=size, dark=dark)
+
+    def look(name: str) -> None:
+        page.evaluate("scrollTo(0, 0)")
+        page.wait_for_timeout(300)
+        page.screenshot(path=shots / f"{name}-{which}.png", full_page=True)
+        expect_no_grave_fault(page)
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+
+    expect(page.locator(".runs tbody tr")).to_have_count(2)
+    look("runs")
+    for box in page.get_by_role("checkbox").all():
+        box.check()
+    page.get_by_role("button", name="Show side by side").click()
+    expect(page.locator(".heat").nth(1).locator("td").first).to_be_visible()
+    look("side-by-side")
+    page.locator(".beside-list a", has_text="hasty").click()
+    expect(page.locator(".completions-view a").first).to_be_visible()
+    look("run")
+    page.locator(".kind", has_text="SayAtLocation").click()
+    expect(page.locator("#count")).to_have_text("18 completions")
+    look("run-filtered")
+    page.locator(".completions-view a").first.click()
+    expect(page.locator(".failed-check").first).to_be_visible()
+    page.locator("summary", has_text="Every step").first.click()
+    page.locator("summary", has_text="The world").first.click()
+    expect(page.locator(".unfolded .floorplan")).to_be_visible()
+    look("completion")
+    page.goto(f"http://localhost:{served.port}/api")
+    expect(page.locator("h1")).to_be_visible()
+    look("runs-api")

@@ -1,0 +1,291 @@
+"""Runs over HTTP, as another program sees them: the numbers of `roboeval show`, and refusals in words."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+from starlette.types import Message, Receive, Scope, Send
+
+from codebotler.web.access import Access
+from codebotler.web.guard import Guard, Rules
+from command_line import roboeval
+from pageserver import PageServer
+from roboeval.records import to_line
+from roboeval.run import Run
+from runs_server import serving
+
+HOSTILE = "<script>window.owned=1</script>[x](javascript:owned)\u202e\ud800\x00'\"&"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, hasty: Path) -> Path:
+    folder = tmp_path_factory.mktemp("served") / "runs"
+    shutil.copytree(hasty, folder / "hasty")
+    odd = folder / "a <b>&? #%2F ü"
+    shutil.copytree(hasty, odd)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[PageServer]:
+    with serving(folder) as server:
+        yield server
+
+
+def told(server: PageServer, path: str) -> Any:  # noqa: ANN401 - JSON has no types
+    answer = server.call("GET", path)
+    assert answer.status == 200, answer.text
+    return answer.data
+
+
+def test_all_runs(server: PageServer) -> None:
+    runs = told(server, "/api/runs")
+    assert [run["run"] for run in runs] == ["a <b>&? #%2F ü", "hasty"]
+    hasty = runs[1]
+    assert (hasty["state"], hasty["completions"], hasty["wanted"], hasty["judged"]) == ("judged", 45, 45, 45)
+    assert (hasty["models"], hasty["by_hand"]) == (["recorded:hasty"], True)
+    assert (hasty["suite"], hasty["evaluations"], hasty["notes"]) == ("paper", ["paper"], [])
+
+
+def test_one_run_has_the_numbers_of_show(server: PageServer, folder: Path) -> None:
+    shown = json.loads(roboeval("show", folder / "hasty", "--json").out)
+    run = told(server, "/api/runs/hasty")
+    assert run["pass@1"] == pytest.approx(shown["pass@1"])
+    assert (run["judged"], run["passed"]) == (shown["completions"], shown["passed"])
+    assert [task["task"] for task in run["tasks"]] == [task["task"] for task in shown["tasks"]]
+    for ours, theirs in zip(run["tasks"], shown["tasks"], strict=True):
+        assert ours["pass@1"] == pytest.approx(theirs["pass@1"]["mean"])
+        assert [p["passed"] for p in ours["prompts"]] == [p["passed"] for p in theirs["prompts"]]
+    failed = {
+        (each["class"], kind["kind"]): kind["count"]
+        for each in shown["failures"]
+        for kind in each["kinds"]
+        if kind["count"]
+    }
+    assert {(each["class"], each["kind"]): each["count"] for each in run["failures"]} == failed
+
+
+def test_completions_come_in_parts(server: PageServer) -> None:
+    path = "/api/runs/hasty/completions"
+    whole = told(server, f"{path}?limit=1000")
+    assert whole["total"] == len(whole["completions"]) == 45
+    parts = [told(server, f"{path}?offset={n}&limit=7")["completions"] for n in range(0, 45, 7)]
+    assert [one for part in parts for one in part] == whole["completions"]
+    assert told(server, f"{path}?offset=45")["completions"] == []
+    for wrong in ("limit=0", "limit=1001", "offset=-1", "prompt=x", "passed=maybe"):
+        assert server.call("GET", f"{path}?{wrong}").status == 422, wrong
+
+
+def test_completions_are_chosen(server: PageServer) -> None:
+    path = "/api/runs/hasty/completions"
+    whole = told(server, f"{path}?limit=1000")["completions"]
+    for query, holds in (
+        ("task=LunchBreak", lambda one: one["task"] == "LunchBreak"),
+        ("task=LunchBreak&prompt=2", lambda one: (one["task"], one["prompt"]) == ("LunchBreak", 2)),
+        ("passed=true", lambda one: one["passed"]),
+        ("passed=false", lambda one: not one["passed"]),
+        ("failure=PythonError", lambda one: one["failure"] and one["failure"]["class"] == "PythonError"),
+        (
+            "failure=RobotExecutionError&kind=GoToInvalidLocation",
+            lambda one: one["failure"] and one["failure"]["kind"] == "GoToInvalidLocation",
+        ),
+        ("task=%3Cscript%3E", lambda _: False),
+    ):
+        found = told(server, f"{path}?limit=1000&{query}")
+        assert found["completions"] == [one for one in whole if holds(one)], query
+        assert found["total"] == len(found["completions"])
+
+
+def test_one_completion_has_what_show_tells(server: PageServer, folder: Path) -> None:
+    for place in ("LunchBreak/0/0", "SayGoodDay/2/1", "StaplerSupply/1/2"):
+        shown = json.loads(roboeval("show", folder / "hasty", place, "--json").out)
+        found = told(server, f"/api/runs/hasty/completions/{place}")
+        assert shown.pop("ablation") is False
+        assert {name: found[name] for name in shown} == shown
+        assert (found["evaluation"], found["stale"]) == ("paper", False)
+        assert any(check["explanation"] for world in found["worlds"] for check in world["failed_checks"]) or (
+            found["failure"] is None or found["failure"]["check"] is None
+        )
+
+
+def test_a_name_of_any_letters_is_found(server: PageServer) -> None:
+    name = quote("a <b>&? #%2F ü", safe="")
+    assert told(server, f"/api/runs/{name}")["judged"] == 45
+    assert server.call("GET", f"/runs/{name}").status == 200
+
+
+@pytest.mark.parametrize(
+    "name", ["..", "%2e%2e", "..%2fserved", "%2e%2e%2fruns%2fhasty", "%2fetc", "none", "hasty%00", "hasty%2f"]
+)
+def test_names_that_lead_elsewhere_are_no_runs(server: PageServer, name: str) -> None:
+    for path in (f"/api/runs/{name}", f"/api/runs/{name}/completions"):
+        answer = server.call("GET", path)
+        assert answer.status == 404, answer.text
+    page = server.call("GET", f"/runs/{name}")
+    assert "recorded:hasty" not in page.text
+
+
+def test_what_is_not_there_is_said_in_a_sentence(server: PageServer) -> None:
+    for path, sentence in (
+        ("/api/runs/none", 'there is no run "none" in this folder; perhaps it was deleted'),
+        ("/api/runs/hasty?evaluation=none", '"hasty" has no evaluation "none"'),
+        ("/api/runs/hasty/completions/LunchBreak/0/99", "this run has no such completion"),
+    ):
+        answer = server.call("GET", path)
+        assert answer.status in {404, 422}
+        assert answer.data["detail"] == sentence
+
+
+def test_a_run_that_is_deleted_is_not_found_any_more(runs: Path) -> None:
+    with serving(runs) as server:
+        assert told(server, "/api/runs/hasty")["judged"] == 45
+        shutil.rmtree(runs / "hasty")
+        assert server.call("GET", "/api/runs/hasty").status == 404
+        assert told(server, "/api/runs") == []
+
+
+def test_damaged_rows_are_said_and_the_others_are_there(runs: Path) -> None:
+    rows = Run(runs / "hasty").rows("paper")
+    lines = rows.read_bytes().splitlines(keepends=True)
+    at = next(n for n, line in enumerate(lines) if json.loads(line)["failure"])
+    row = json.loads(lines[at])
+    forged = {**row, "verdicts": [{**verdict, "trace": [["goto"]]} for verdict in row["verdicts"]]}
+    rows.write_bytes(b"".join([*lines[:at], to_line(forged), *lines[at + 1 :], b"nonsense\n"]))
+    with serving(runs) as server:
+        (run,) = told(server, "/api/runs")
+        assert (run["state"], run["judged"]) == ("damaged", 45)
+        assert run["notes"][0].startswith("paper.jsonl, line 46: this line is no row of an evaluation")
+        place = f"{row['task']}/{row['prompt']}/{row['index']}"
+        answer = server.call("GET", f"/api/runs/hasty/completions/{place}")
+        assert answer.status == 422
+        assert answer.data["detail"].endswith(f"the row of {place} is damaged; --redo judges it again")
+        assert server.call("GET", f"/runs/hasty/{place}").status == 200
+
+
+def test_hostile_texts_come_as_they_are(runs: Path) -> None:
+    run = Run(runs / "hasty")
+    lines = run.completions.read_bytes().splitlines(keepends=True)
+    row = {**json.loads(lines[0]), "model": HOSTILE, "program": HOSTILE * 3_000}
+    run.completions.write_bytes(to_line(row) + b"".join(lines[1:]))
+    with serving(runs) as server:
+        place = f"{row['task']}/{row['prompt']}/{row['index']}"
+        found = told(server, f"/api/runs/hasty/completions/{place}")
+        assert (found["model"], found["program"]) == (HOSTILE, HOSTILE * 3_000)
+        assert found["stale"]
+        page = server.call("GET", f"/runs/hasty/{place}")
+        assert page.status == 200
+        assert "<script>window" not in page.text
+
+
+def test_a_suite_of_ones_own_is_named(runs: Path, tmp_path: Path) -> None:
+    head = Run(runs / "hasty").head("paper")
+    head.write_text(json.dumps({**json.loads(head.read_text()), "suite": "mine"}))
+    with serving(runs) as server:
+        run = told(server, "/api/runs/hasty")
+        assert "`roboeval serve --suite FOLDER` names it." in run["notes"][0]
+        failed = told(server, "/api/runs/hasty/completions?failure=TaskCompletionError")["completions"][0]
+        place = f"{failed['task']}/{failed['prompt']}/{failed['index']}"
+        told_of = told(server, f"/api/runs/hasty/completions/{place}")
+        checks = [check for world in told_of["worlds"] for check in world["failed_checks"]]
+        assert checks
+        assert all(check["explanation"] is None for check in checks)
+    mine = tmp_path / "mine"
+    shutil.copytree(Path(sys.modules["roboeval"].__path__[0]) / "suites" / "paper", mine)
+    suite = mine / "suite.yaml"
+    suite.write_text(suite.read_text().replace("name: paper", "name: mine"))
+    shutil.rmtree(tmp_path / "runs-served")
+    with serving(runs, "--suite", mine) as server:
+        told_of = told(server, f"/api/runs/hasty/completions/{place}")
+        checks = [check for world in told_of["worlds"] for check in world["failed_checks"]]
+        assert all(check["explanation"] for check in checks)
+
+
+# --- the guard, and where the pages are
+
+
+def test_nothing_is_answered_without_the_token(server: PageServer) -> None:
+    for path in (
+        "/runs",
+        "/runs/hasty",
+        "/side-by-side",
+        "/api/runs",
+        "/static/benchmark/benchmark.css",
+        "/",
+    ):
+        assert server.ask("GET", path).status == 401, path
+
+
+@pytest.mark.parametrize("path", ["/runs", "/runs/hasty", "/side-by-side", "/api/runs", "/api/runs/hasty"])
+def test_a_face_cannot_see_runs(path: str) -> None:
+    sent: list[Message] = []
+
+    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI has it
+        await send({"type": "http.response.start", "status": 200, "headers": []})
+        await send({"type": "http.response.body", "body": b""})
+
+    async def send(message: Message) -> None:
+        sent.append(message)
+
+    async def receive() -> Message:
+        return {"type": "http.request", "body": b""}
+
+    def status(token: str) -> int:
+        sent.clear()
+        headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
+        scope = {"type": "http", "method": "GET", "path": path, "scheme": "http", "headers": headers}
+        asyncio.run(Guard(behind, Rules(Access("an operator's", "a face's")))(scope, receive, send))
+        return int(sent[0]["status"])
+
+    assert (status("a face's"), status("an operator's")) == (403, 200)
+
+
+def test_the_api_is_described(server: PageServer) -> None:
+    paths = told(server, "/api/openapi.json")["paths"]
+    assert set(paths) == {
+        "/api/runs",
+        "/api/runs/{run}",
+        "/api/runs/{run}/completions",
+        "/api/runs/{run}/completions/{task}/{prompt}/{index}",
+    }
+    page = server.call("GET", "/api").text
+    assert "/api/runs/{run}/completions" in page
+    assert "Only of this task." in page
+
+
+def test_without_a_robot_there_is_nothing_to_stop(server: PageServer) -> None:
+    assert server.call("GET", "/").headers["location"] == "/runs"
+    for path in ("/api/robot", "/missions", "/api/missions"):
+        assert server.call("GET", path).status == 404
+    assert "stop.js" not in server.call("GET", "/runs").text
+    assert "stops the robot" not in server.said
+
+
+def test_the_operators_page_has_the_benchmark_too(tmp_path: Path, runs: Path) -> None:
+    with PageServer(tmp_path, "--runs", str(runs)) as server:
+        assert told(server, "/api/runs")[0]["run"] == "hasty"
+        for path in ("/runs", "/runs/hasty"):
+            page = server.call("GET", path)
+            assert page.status == 200
+            assert "stop.js" in page.text, "STOP is on every page where there is a robot"
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    ended = roboeval("serve", tmp_path / "none")
+    assert ended.status == 2
+    assert ended.err.endswith("none: there is no such folder; `roboeval run` makes the first run in runs/\n")
+
+
+def test_help_needs_none_of_the_pages() -> None:
+    """Start-up counts, so that NiceGUI is imported by what serves a page alone."""
+    code = "import sys, roboeval.cli, codebotler.cli; print('nicegui' in sys.modules)"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout == "False\n"
