@@ -6,7 +6,8 @@
 # robot in pyrobosim, in an environment of its own, too. `make test-faults` asks a server that fails
 # one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
-# Chromium; SHOTS names a folder for its screenshots.
+# Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make pictures` makes those of the
+# guide anew.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -22,7 +23,7 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo serve test test-ros1 test-browser test-transformers test-pyrobosim test-faults fuzz lint bench clean
+.PHONY: demo serve test test-ros1 test-browser pictures test-transformers test-pyrobosim test-faults fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -51,6 +52,11 @@ test-ros1: $(VENV)/tested
 
 test-browser: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 2 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
+
+pictures: $(VENV)/tested
+	@shots=$$(mktemp -d) && \
+	$(BIN)/python -m pytest --no-skips --shots "$$shots" -k "desk-light or tablet-light" tests/browser && \
+	$(BIN)/python tests/browser/pictures.py "$$shots" docs/pictures && rm -r "$$shots"
 
 test-transformers: $(TORCH_VENV)/tested
 	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py \

@@ -1,7 +1,7 @@
-"""Have a robot carry out a program over the API: begin a mission, look at its check, approve it, listen.
+"""Have a robot carry out a program over the API: begin a mission, look at its check, approve it, answer.
 
-Give it the link that `codebotler serve` printed; without one it starts a page of its own, with a simulated
-robot.
+Give it the link that `codebotler serve --face` printed for operators; without one it starts its own page,
+with a simulated robot.
 """
 
 import http.client
@@ -14,7 +14,11 @@ import time
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
-PROGRAM = "def task_program():\n    go_to('kitchen')\n    say('Tea is ready')\n"
+PROGRAM = """def task_program():
+    go_to('kitchen')
+    if ask('anybody', 'Is the tea ready?', ['Yes', 'No']) == 'Yes':
+        say('Tea is ready')
+"""
 WORLD = "robot: hall\nrooms: [hall, kitchen]\n"
 
 
@@ -50,6 +54,14 @@ class Robot:
             if line.startswith(b"data: "):
                 event = json.loads(line.removeprefix(b"data: "))
                 print(event["event"], event.get("state") or event.get("arguments") or "")
+                if (event["event"], event.get("skill")) == ("skill", "ask"):
+                    self.answer()
+
+    def answer(self) -> None:
+        """Choose the first option of what the robot asks, as somebody in front of its face could."""
+        while (question := json.load(self.ask("GET", "/api/face"))["question"]) is None:
+            time.sleep(0.1)
+        self.ask("POST", "/api/face/answer", {"question": question["number"], "option": 0})
 
 
 def main() -> None:
@@ -60,7 +72,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "world.yaml").write_text(WORLD)
         command = [sys.executable, "-m", "codebotler.cli", "serve"]
-        command += ["--port", "0", "--speed", "0", "--world", "world.yaml"]
+        command += ["--port", "0", "--speed", "0", "--world", "world.yaml", "--face"]
         home = {**os.environ, "CODEBOTLER_HOME": folder}
         with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=home) as page:
             assert page.stderr is not None

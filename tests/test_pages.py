@@ -3,6 +3,7 @@
 import csv
 import os
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -118,6 +119,16 @@ def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
 def test_pages_are_linked(page: str) -> None:
     assert f"]({page})" in (DOCS / "index.md").read_text()
     assert f"](docs/{page})" in (DOCS.parent / "README.md").read_text()
+
+
+def test_pictures_come_from_tests_and_are_quickly_loaded() -> None:
+    chosen = runpy.run_path(str(DOCS.parent / "tests" / "browser" / "pictures.py"))["CHOSEN"]
+    pictures = {path.stem: path for path in (DOCS / "pictures").iterdir()}
+    assert sorted(pictures) == sorted(chosen)
+    page = (DOCS / "serve.md").read_text()
+    for name, path in pictures.items():
+        assert path.stat().st_size < 150_000, name
+        assert f"](pictures/{name}.png)" in page
 
 
 def test_links_lead_somewhere() -> None:

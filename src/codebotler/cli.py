@@ -14,6 +14,7 @@ import typer
 from codebotler import __version__
 from codebotler.options import (
     ROS_PYTHON,
+    AddressOption,
     BaseUrlOption,
     HostOption,
     MaxTokensOption,
@@ -21,8 +22,10 @@ from codebotler.options import (
     NameOption,
     NoTokenOption,
     PortOption,
+    RobotOption,
     RosPythonOption,
     SeedOption,
+    SpeedOption,
     TemperatureOption,
     TimeoutOption,
     TokenOption,
@@ -138,19 +141,15 @@ def run(
     program: Annotated[
         str, typer.Argument(metavar="PROGRAM|INSTRUCTION", help="A file, -, or what to do in plain words.")
     ],
-    robot: Annotated[
-        str, typer.Option(help="Which robot: sim, or another that `codebotler robots` lists.")
-    ] = "sim",
+    robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file of a simulated robot.")] = None,
     model: Annotated[str, typer.Option(help="Who writes the program for an instruction.")] = "recorded",
     yes: Annotated[bool, typer.Option("--yes", help="Run it without asking.")] = False,
     despite_problems: Annotated[
         bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
     ] = False,
-    speed: Annotated[
-        float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
-    ] = 1.0,
-    address: Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")] = "",
+    speed: SpeedOption = 1.0,
+    address: AddressOption = "",
     ros_python: RosPythonOption = ROS_PYTHON,
 ) -> None:
     """Check a program, ask, and run it on a robot; Ctrl-C stops the robot, with status 130."""
@@ -227,21 +226,25 @@ def serve(
     name: NameOption = None,
     token: TokenOption = None,
     no_token: NoTokenOption = False,
-    robot: Annotated[
-        str, typer.Option(help="Which robot: sim, or another that `codebotler robots` lists.")
-    ] = "sim",
+    robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file, for the robot and for the map.")] = None,
     model: Annotated[
         list[str] | None, typer.Option(help="Who may write programs; more than one may be named.")
     ] = None,
     base_url: BaseUrlOption = None,
-    speed: Annotated[
-        float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
-    ] = 1.0,
-    address: Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")] = "",
-    ros_python: Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")] = Path(
-        "/usr/bin/python3"
-    ),
+    speed: SpeedOption = 1.0,
+    address: AddressOption = "",
+    ros_python: RosPythonOption = ROS_PYTHON,
+    face: Annotated[
+        bool, typer.Option("--face", help="Have the robot speak and ask on a page of its own, /face.")
+    ] = False,
+    face_timeout: Annotated[
+        float, typer.Option(min=1, help="Seconds that people have to answer there.")
+    ] = 60.0,
+    face_token: Annotated[str | None, typer.Option(help="What opens the face; a new one by default.")] = None,
+    stop_when_alone: Annotated[
+        float | None, typer.Option(min=1, help="Stop the robot so many seconds after the last page closed.")
+    ] = None,
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
 ) -> None:
     """Serve the page from which a robot is operated, until Ctrl-C, which also stops the robot."""
@@ -249,26 +252,27 @@ def serve(
     from codebotler.models.base import Settings
     from codebotler.models.open import kind_of, open_model
     from codebotler.robots.base import Options
-    from codebotler.robots.open import open_robot
+    from codebotler.robots.face import Face
+    from codebotler.robots.open import open_faced, open_robot
     from codebotler.web.desk import Desk
     from codebotler.web.place import entrance
     from codebotler.world import World
 
-    place, access = entrance(host, port, name or (), token, no_token=no_token)
+    place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)
     known = None if world is None else World.read(world)
     models = tuple(model or ("recorded:careful", "recorded:hasty"))
     for each in models:
         kind_of(each)
     settings = Settings(base_url=base_url)
-    options = Options(world=known, speed=speed or None, address=address, ros_python=ros_python)
-    desk = Desk(
-        open_robot(robot, options), home(), lambda m: open_model(m, settings), models=models, world=known
-    )
+    options = Options(known, speed or None, address, ros_python)
+    shown = Face(face_timeout) if face else None
+    body = open_robot(robot, options) if shown is None else open_faced(robot, options, shown)
+    desk = Desk(body, home(), lambda m: open_model(m, settings), models=models, world=known, face=shown)
 
     from codebotler.web.further import installed
     from codebotler.web.serving import serve as serve_page
 
-    serve_page(desk, place, access, installed(), runs)
+    serve_page(desk, place, access, installed(), runs, alone_for=stop_when_alone)
 
 
 @app.command("virtual-robot")

@@ -25,6 +25,13 @@ BaseUrlOption = Annotated[
 ]
 RosPythonOption = Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")]
 ROS_PYTHON = Path("/usr/bin/python3")
+RobotOption = Annotated[
+    str, typer.Option(help="Which robot: sim, or another that `codebotler robots` lists.")
+]
+SpeedOption = Annotated[
+    float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
+]
+AddressOption = Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[int, typer.Option(min=0, max=65535, help="The port; 0 takes a free one.")]
 NameOption = Annotated[

@@ -47,8 +47,10 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
     """Opens pages in browsers of their own, and takes amiss whatever any of them complains about."""
     complaints: list[str] = []
 
+    expected: list[str] = []
+
     def heard(message: ConsoleMessage) -> None:
-        if message.type in {"error", "warning"}:
+        if message.type in {"error", "warning"} and not any(each in message.text for each in expected):
             complaints.append(f"{message.text} at {message.location}")
 
     with ExitStack() as contexts:
@@ -60,7 +62,11 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
             size: tuple[int, int] = DESK,
             dark: bool = False,
             beside: Page | None = None,
+            link: str = "",
+            script: str = "",
+            expecting: str = "",
         ) -> Page:
+            expected.extend([expecting] if expecting else [])
             if beside is None:
                 context = browser.new_context(
                     viewport={"width": size[0], "height": size[1]}, color_scheme="dark" if dark else "light"
@@ -70,9 +76,10 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
                 context = beside.context
             context.set_default_timeout(SECONDS * 1000)
             page = context.new_page()
+            page.add_init_script(script)
             page.on("console", heard)
             page.on("pageerror", lambda error: complaints.append(str(error)))
-            page.goto(server.link.replace("/?", f"/{path}?"))
+            page.goto(link or server.link.replace("/?", f"/{path}?"))
             return page
 
         yield open_page

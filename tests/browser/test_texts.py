@@ -10,26 +10,13 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer
 from server import Server
 from viewing import PHONE, OpenPage
 
-EVIL = [
-    "<script>window.owned = 1</script>",
-    '<img src=x onerror="window.owned = 1">',
-    "[a link](javascript:window.owned=1) **bold** `code`",
-    "{{ constructor.constructor('window.owned = 1')() }} ${window.owned = 1}",
-    "</textarea></script><svg onload=window.owned=1>'\"`--></style>",
-    "שלום עולם \u202e gnp.exe \u2066 مرحبا",
-    "\x1b[31mred\x00\u2028\ud800\U0001f916",
-    "long " * 20_000,
-]
 LONGEST = 9_000
 """A program may say no more at once."""
-
-OWN_TAGS = (
-    "script, img:not(.cm-widgetBuffer), iframe, object, embed, a[href^='javascript'], svg [onload], [onerror]"
-)
 
 
 def world_of(text: str) -> str:
@@ -67,9 +54,7 @@ def expect_unharmed(page: Page, before: int) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]  # type: ignore[index]  # it has one
 
 
-@pytest.fixture(
-    params=range(len(EVIL)), ids=["script", "img", "markdown", "template", "tags", "bidi", "odd", "long"]
-)
+@pytest.fixture(params=range(len(EVIL)), ids=NAMES)
 def evil(request: pytest.FixtureRequest) -> str:
     number: int = request.param
     return EVIL[number]

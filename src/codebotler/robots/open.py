@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, cast
 
 from codebotler.badinput import BadInput
 from codebotler.robots.base import Options, Readiness, Robot
+from codebotler.robots.face import Face
+from codebotler.robots.faced import Faced, unspoken
 
 KINDS = {
     "sim": "simulated",
@@ -61,6 +64,21 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
     if kind is None:
         raise BadInput(f"there is no robot {name} here: {ABSENT}")
     return kind.robot(options or Options())
+
+
+def open_faced(name: str, options: Options, face: Face) -> Robot:
+    """The robot that a user means, with a face; it need not speak itself.
+
+    Args:
+        name: of the kind.
+        options: what the user says about it.
+        face: on which it speaks.
+
+    Raises:
+        BadInput: there is no such kind, or what the user says is missing or wrong.
+    """
+    silent = open_robot(name, replace(options, skills=unspoken(options.skills)))
+    return Faced(silent, face, options.skills)
 
 
 def all_readiness(ros_python: Path = Options.ros_python) -> list[Readiness]:

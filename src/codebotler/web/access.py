@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from codebotler.badinput import BadInput
+
 TRIES, WINDOW = 10, 60.0
 """So many wrong tokens may come from an address in so many seconds."""
 
@@ -27,6 +29,9 @@ class Role(StrEnum):
 
 class TooManyTriesError(Exception):
     """An address has tried too many wrong tokens; the right one is not looked at either, for a while."""
+
+
+SHORTEST_TOKEN = 16
 
 
 def new_token() -> str:
@@ -49,6 +54,32 @@ class Access:
     now: Callable[[], float] = time.monotonic
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
     _lock: threading.Lock = field(default_factory=threading.Lock)
+
+    @classmethod
+    def asked_for(
+        cls, operator: str | None, face: str | None, *, open_to_all: bool, is_loopback: bool
+    ) -> Access:
+        """What a user wants.
+
+        Args:
+            operator: the token of operators; None for a new one.
+            face: that of the face; None for a new one.
+            open_to_all: whether operators need none.
+            is_loopback: whether only this machine gets there.
+
+        Raises:
+            BadInput: that would let in whoever should not be.
+        """
+        if open_to_all and (operator or face or not is_loopback):
+            raise BadInput("--no-token is only for this machine; leave out --host and all tokens")
+        for token in (operator, face):
+            if token is not None and len(token) < SHORTEST_TOKEN:
+                raise BadInput(
+                    f"this token can be guessed; take {SHORTEST_TOKEN} characters or more, or none"
+                )
+        if operator is not None and operator == face:
+            raise BadInput("the face's token would open the operator's page; take another one")
+        return cls(None if open_to_all else operator or new_token(), face or new_token())
 
     def of_token(self, token: str, address: str) -> Role | None:
         """The role that a token gives; None for a wrong one, which is counted.

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import io
 import json
-import threading
 from collections.abc import AsyncIterator, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
+from http import HTTPStatus
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, HTTPException
-from fastapi.responses import Response, StreamingResponse
+from fastapi import APIRouter, Header, HTTPException, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.archive import find, missions, summary_of
@@ -20,10 +21,13 @@ from codebotler.mission import MissionError
 from codebotler.missionlog import EVENTS, Line, Summary, events_of
 from codebotler.missionmcap import write_mcap
 from codebotler.web.desk import MOST_PROGRAM, Desk
-from codebotler.web.turn import Order, View
+from codebotler.web.turn import Order, Turn, View
 
 HERE = "current"
 """Names the mission at hand in an address."""
+
+STOPS = "the page"
+"""Who stops a mission over the API, in words."""
 
 QUIET = 15.0
 """Seconds after which a stream says that it is still there."""
@@ -56,10 +60,31 @@ class Approval(_Form):
     despite_problems: bool = False
 
 
+class Again(_Form):
+    """Another program is wanted of the model."""
+
+    repair: bool = Field(default=False, description="Whether it is told the program and its problems.")
+
+
 class ProgramToCheck(_Form):
     """A program that is only checked."""
 
     program: Text
+
+
+class AnyText(JSONResponse):
+    """JSON in ASCII, which holds texts that no encoding takes, such as half characters of a program."""
+
+    def render(self, content: object) -> bytes:
+        """As bytes."""
+        return json.dumps(content, separators=(",", ":")).encode("ascii")
+
+
+def refused(_request: Request, error: Exception) -> AnyText:
+    """Say what is wrong with a request, without sending all of it back."""
+    assert isinstance(error, RequestValidationError), "it is called for no other"
+    told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
+    return AnyText({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(desk: Desk) -> APIRouter:
@@ -68,7 +93,7 @@ def router(desk: Desk) -> APIRouter:
     Args:
         desk: what they speak of.
     """
-    api = APIRouter(prefix="/api", tags=["missions"])
+    api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AnyText)
     _add_missions(api, desk)
     _add_changes(api, desk)
     _add_events(api, desk)
@@ -122,16 +147,22 @@ def _add_changes(api: APIRouter, desk: Desk) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Put another program in the place of the one at hand; it is checked meanwhile."""
-        _expect_at_hand(desk, mission)
+        _at_hand(desk, mission)
         with _refusing():
             return view_data(desk.edit(new.program).view)
+
+    @api.post("/missions/{mission}/again", status_code=202)
+    def ask_again(mission: str, again: Again) -> dict[str, Any]:
+        """Have the model write another program; it is checked afterwards."""
+        turn = _at_hand(desk, mission)
+        with _refusing():
+            turn.ask_again(repair=again.repair)
+        return view_data(turn.view)
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
         """Let the robot run the program that was looked at, and no other."""
-        _expect_at_hand(desk, mission)
-        turn = desk.turn
-        assert turn is not None, "it is at hand"
+        turn = _at_hand(desk, mission)
         with _refusing():
             turn.approve(approval.program, despite_problems=approval.despite_problems)
         return view_data(turn.view)
@@ -139,27 +170,22 @@ def _add_changes(api: APIRouter, desk: Desk) -> None:
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
         """Stop the mission at hand; `state` says when it has stopped."""
-        _expect_at_hand(desk, mission)
-        _stop(desk)
+        _at_hand(desk, mission)
+        desk.stop_soon(STOPS)
         return view_data(desk.view)
 
     @api.post("/stop", status_code=202)
     async def stop(*, only_moving: bool = False) -> dict[str, Any]:
         """Stop whatever goes on, or only a robot that runs; whether there is anything to stop."""
-        view = desk.view
-        stopping = view.is_running if only_moving else not view.is_over
-        if stopping:
-            _stop(desk)
-        return {"stopping": stopping}
+        return {"stopping": desk.stop_soon(STOPS, only_moving=only_moving)}
 
 
 def _add_events(api: APIRouter, desk: Desk) -> None:
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
         """The events as they happen (server-sent), from the first one on or after `Last-Event-ID`."""
-        _expect_at_hand(desk, mission)
         return StreamingResponse(
-            _stream(desk, last_event_id),
+            _stream(desk, _at_hand(desk, mission), last_event_id),
             media_type="text/event-stream",
             headers={"cache-control": "no-store"},
         )
@@ -181,6 +207,8 @@ def _add_rest(api: APIRouter, desk: Desk) -> None:
             "skills": [skill.signature for skill in desk.robot.skills.values()],
             "missing": dict(desk.robot.missing),
             "models": list(desk.models),
+            "has_face": desk.face is not None,
+            "interrupted": [asdict(summary) for summary in desk.interrupted],
             "mission": view.id,
             "state": view.state,
             "reason": view.reason,
@@ -188,15 +216,8 @@ def _add_rest(api: APIRouter, desk: Desk) -> None:
         }
 
 
-def _stop(desk: Desk) -> None:
-    """On a thread of its own: a stop waits for nothing, and holds nothing up."""
-    threading.Thread(target=desk.stop, args=("the page",), daemon=True).start()
-
-
-async def _stream(desk: Desk, known: int) -> AsyncIterator[str]:
+async def _stream(desk: Desk, turn: Turn, known: int) -> AsyncIterator[str]:
     """Lines of a server-sent stream. Who reads slowly is sent what there is by then; nothing waits for it."""
-    turn = desk.turn
-    assert turn is not None, "it is at hand"
 
     def has_more() -> bool:
         return bool(turn.events(known)) or turn.view.is_over
@@ -234,9 +255,11 @@ def view_data(view: View) -> dict[str, Any]:
     }
 
 
-def _expect_at_hand(desk: Desk, mission: str) -> None:
-    if not desk.view.id or mission not in {HERE, desk.view.id}:
+def _at_hand(desk: Desk, mission: str) -> Turn:
+    turn = desk.turn
+    if turn is None or not turn.view.id or mission not in {HERE, turn.view.id}:
         raise HTTPException(409, "that is not the mission at hand")
+    return turn
 
 
 def _past(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:

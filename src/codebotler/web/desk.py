@@ -15,6 +15,7 @@ from codebotler.missionlog import Line, Summary
 from codebotler.models.base import Model
 from codebotler.problems import Check
 from codebotler.robots.base import Robot
+from codebotler.robots.face import Face
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.imagined import Plan
 from codebotler.web.board import Board
@@ -39,6 +40,7 @@ class Desk:
         open_model: gives a model by its name.
         models: the names that are offered, the first one by default.
         world: where the robot is, if somebody has measured it.
+        face: on which the robot speaks, if it does.
     """
 
     def __init__(
@@ -49,9 +51,12 @@ class Desk:
         *,
         models: Sequence[str] = ("recorded:careful", "recorded:hasty"),
         world: World | None = None,
+        face: Face | None = None,
     ) -> None:
         self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
-        self.board = Board()
+        self.board, self.face = Board(), face
+        if face is not None:
+            face.changed = self.board.change
         self.interrupted: tuple[Summary, ...] = ()
         self._means = Means(robot, home, open_model, self.check, self.board.change)
         self._lock = threading.Lock()  # held for moments
@@ -139,6 +144,22 @@ class Desk:
         if turn is None or turn.view.is_over:
             return False
         turn.stop(by)
+        return True
+
+    def stop_soon(self, by: str, *, only_moving: bool = False) -> bool:
+        """Have the mission at hand stopped by a thread of its own, so that nothing slow delays it; at once.
+
+        Args:
+            by: who wants it, in words.
+            only_moving: whether a mission whose robot does not run goes on.
+
+        Returns:
+            whether there is anything to stop.
+        """
+        view = self.view
+        if view.is_over or (only_moving and not view.is_running):
+            return False
+        threading.Thread(target=self.stop, args=(by,), daemon=True).start()
         return True
 
     def check(self, program: str, plan: Plan | None = None) -> Check:

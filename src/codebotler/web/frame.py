@@ -11,6 +11,7 @@ BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assert
 <button id="stop" type="button" aria-keyshortcuts="Escape"><b>STOP</b><small>Esc</small></button></div>
 <script src="/static/stop.js"></script>"""
 ROBOT = (("Robot", "/"), ("Missions", "/missions"))
+FACE = ("Face", "/face")
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ MOST_BYTES = 2_000_000
 """Of a request's body."""
 
 CHANGES_NOTHING = frozenset({"GET", "HEAD", "OPTIONS"})
-FOR_FACES = ("/face", "/api/face", "/_nicegui", "/_nicegui_ws", "/static", "/favicon.ico")
-"""Where a face may go."""
+FOR_FACES = ("/face", "/api/face", "/static", "/favicon.ico")
+"""Where a face may go: not to NiceGUI's websocket, which takes messages for any page by its number."""
 
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
 
@@ -224,7 +224,7 @@ def _expect_allowed(role: Role | None, path: str) -> None:
             HTTPStatus.UNAUTHORIZED, "open the link that codebotler serve printed; it has the token"
         )
     if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in FOR_FACES):
-        raise RefusedError(HTTPStatus.FORBIDDEN, "the robot's face may only speak and ask")
+        raise RefusedError(HTTPStatus.FORBIDDEN, "this link is for the robot's face; it opens nothing else")
 
 
 def _expect_small(headers: Headers) -> None:

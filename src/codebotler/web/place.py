@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from codebotler.badinput import BadInput
-from codebotler.web.access import Access, new_token
+from codebotler.web.access import Access
 from codebotler.web.guard import LOOPBACK, Rules
 
 WAITING = 128
 """So many may wait to be let in."""
-
-SHORTEST_TOKEN = 16
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ class Place:
 
 
 def entrance(
-    host: str, port: int, names: Sequence[str], token: str | None, *, no_token: bool
+    host: str, port: int, names: Sequence[str], token: str | None, face: str | None = None, *, no_token: bool
 ) -> tuple[Place, Access]:
     """Where a page is and who may open it, as somebody asked for it.
 
@@ -72,14 +70,11 @@ def entrance(
         port: the port, from 0, which takes a free one.
         names: under which the page may be called besides.
         token: that opens it; a new one by default.
+        face: the token that opens a robot's face; a new one by default.
         no_token: whether everybody on this machine may open it.
 
     Raises:
         BadInput: more people than that would get in.
     """
     place = Place(host, port, tuple(names))
-    if no_token and (token or not place.is_loopback):
-        raise BadInput("--no-token is only for this machine; leave out --host and --token")
-    if token is not None and len(token) < SHORTEST_TOKEN:
-        raise BadInput(f"this token can be guessed; take at least {SHORTEST_TOKEN} characters, or none")
-    return place, Access(None if no_token else token or new_token())
+    return place, Access.asked_for(token, face, open_to_all=no_token, is_loopback=place.is_loopback)

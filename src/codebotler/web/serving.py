@@ -6,32 +6,48 @@ import logging
 import socket
 import threading
 from contextlib import nullcontext
+from functools import partial
+from http import HTTPStatus
 from pathlib import Path
 from types import FrameType
+from urllib.parse import urlencode
 
 import nicegui
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
+from starlette.types import ASGIApp
 
 from codebotler import __version__
 from codebotler.terminal import note
-from codebotler.web import api, apipage, operate
+from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
 from codebotler.web.desk import Desk
-from codebotler.web.frame import ROBOT, Frame
+from codebotler.web.frame import FACE, ROBOT, Frame
 from codebotler.web.further import Further, Site
-from codebotler.web.guard import Guard
+from codebotler.web.guard import MOST_BYTES, REFUSAL, Guard
 from codebotler.web.place import Place
+from codebotler.web.presence import Presence
 
 STATIC = Path(__file__).with_name("static")
+LEAVING = "the leaving of the last operator"
 RUNS = Path("runs")
 LINGER = 3
 """Seconds that streams have to end when the tool does."""
 
 
-def serve(desk: Desk | None, place: Place, access: Access, further: Further = (), runs: Path = RUNS) -> None:
+def serve(
+    desk: Desk | None,
+    place: Place,
+    access: Access,
+    further: Further = (),
+    runs: Path = RUNS,
+    *,
+    alone_for: float | None = None,
+) -> None:
     """Serve the page until Ctrl-C; a robot that runs is stopped then.
 
     Args:
@@ -40,6 +56,7 @@ def serve(desk: Desk | None, place: Place, access: Access, further: Further = ()
         access: who may open it.
         further: pages that other packages add.
         runs: the folder of runs for those.
+        alone_for: a robot that runs is stopped so many seconds after the last operator left; None: never.
 
     Raises:
         BadInput: nobody can listen there.
@@ -47,7 +64,9 @@ def serve(desk: Desk | None, place: Place, access: Access, further: Further = ()
     """
     with place.listening() as bound, desk or nullcontext():
         port = bound.getsockname()[1]
-        app = application(desk, further, runs)
+        app: ASGIApp = application(desk, further, runs)
+        if desk and alone_for is not None:
+            app = Presence(app, alone_for, partial(desk.stop_soon, LEAVING, only_moving=True))
         guard = Guard(app, place.rules(access, port))
         settings = uvicorn.Config(
             guard,
@@ -55,18 +74,29 @@ def serve(desk: Desk | None, place: Place, access: Access, further: Further = ()
             access_log=False,
             proxy_headers=False,
             server_header=False,
-            ws_max_size=2_000_000,
+            ws_max_size=MOST_BYTES,
             timeout_graceful_shutdown=LINGER,
         )
         for summary in desk.interrupted if desk else ():
             note(f"mission {summary.id} was interrupted: {summary.reason}")
-        shown = "localhost" if place.is_loopback else socket.gethostname()
-        address = f"http://{shown}:{port}/"
-        query = "" if access.operator is None else f"?token={access.operator}"
-        ends = "ends the page and stops the robot" if desk else "ends the page"
-        note(f"open this link in a browser; Ctrl-C {ends}:\n")
-        note(f"    {address}{query}\n")
+        _tell_links(place, port, access, desk)
         _Server(settings, desk).run([bound])
+
+
+def _tell_links(place: Place, port: int, access: Access, desk: Desk | None) -> None:
+    shown = "localhost" if place.is_loopback else socket.gethostname()
+    address = f"http://{shown}:{port}/"
+
+    def query(token: str) -> str:
+        return "" if access.operator is None else f"?{urlencode({'token': token})}"
+
+    ends = "ends the page and stops the robot" if desk else "ends the page"
+    note(f"open this link in a browser; Ctrl-C {ends}:\n")
+    note(f"    {address}{query(access.operator or '')}\n")
+    if desk and desk.face is not None:
+        where = "here; --host lets other machines in" if place.is_loopback else "on the robot's tablet"
+        note(f"the robot's face, which can run nothing, to be opened {where}:\n")
+        note(f"    {address}face{query(access.face)}\n")
 
 
 def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> FastAPI:
@@ -78,7 +108,8 @@ def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> 
         runs: the folder of runs for those.
     """
     links = tuple((pages.name, pages.address) for pages in further)
-    frame = Frame((*ROBOT, *links)) if desk else Frame(links, further[0].brand, has_robot=False)
+    face = (FACE,) if desk and desk.face else ()
+    frame = Frame((*ROBOT, *face, *links)) if desk else Frame(links, further[0].brand, has_robot=False)
     app = FastAPI(
         title="CodeBotler",
         version=__version__,
@@ -89,13 +120,17 @@ def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> 
     )
     if desk:
         app.include_router(api.router(desk))
+        if desk.face is not None:
+            app.include_router(facepage.router(desk, desk.face))
         operate.add(desk, frame)
     for pages in further:
         pages.add(Site(app, frame, runs))
+    app.add_exception_handler(RequestValidationError, api.refused)
     apipage.add(app)
     app.mount("/static", StaticFiles(directory=STATIC))
     core.sio.eio.cors_allowed_origins = []  # NiceGUI invites all pages; the guard lets in ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]
+    nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, _not_found)
     ui.run_with(
         app,
         title="CodeBotler",
@@ -108,6 +143,14 @@ def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> 
         show_welcome_message=False,
     )
     return app
+
+
+def _not_found(request: Request, _error: Exception) -> Response:
+    """In a sentence, as a person or a program wants it."""
+    sentence = "there is no such page"
+    if "text/html" in request.headers.get("accept", ""):
+        return HTMLResponse(REFUSAL.format(sentence=sentence), HTTPStatus.NOT_FOUND)
+    return JSONResponse({"detail": sentence}, HTTPStatus.NOT_FOUND)
 
 
 class _Server(uvicorn.Server):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from codebotler.mission import State
+from codebotler.web.asking import Asking
 from codebotler.web.desk import Desk
 from codebotler.web.floorplan import floorplan
 from codebotler.web.progress import Moment
@@ -47,6 +48,7 @@ class Status:
             self._state = Words("p", "", "headline").props("role=status aria-live=polite")
             self._doing = Words("p", "", "doing")
             self._where = Words("p", "", "quiet")
+            self._asking = None if desk.face is None else Asking(desk.face)
             self._reason = Words("p", "", "reason")
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
@@ -61,13 +63,16 @@ class Status:
             headline = "About to begin"
         self._state.say(headline)
         self._state.classes(replace=f"headline {state or 'none'}")
-        self._doing.say(progress.doing.capitalize() if view.is_running else "")
+        doing = progress.doing
+        self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
         where = [f"line {progress.line}"] if progress.line is not None else []
         where += (
             [f"{progress.clock:.1f} s by the robot's clock"] if progress.moments and progress.clock else []
         )
         self._where.say(" · ".join(where))
         self._reason.say(view.reason)
+        if self._asking is not None:
+            self._asking.show(is_over=view.is_over)
         self._draw_map(view)
         self._draw_moments(progress.moments)
 

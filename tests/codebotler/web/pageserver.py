@@ -75,6 +75,15 @@ class PageServer:
         self.link, self.port, self.token = link[0].strip(), int(link[1]), link[2] or ""
 
     @property
+    def face_token(self) -> str:
+        """The token of the robot's face, where it has one."""
+        ends = time.monotonic() + 10
+        while (found := re.search(r"/face\?token=(\S+)\n", self.said)) is None:
+            assert time.monotonic() < ends, self.said
+            time.sleep(0.02)
+        return found[1]
+
+    @property
     def said(self) -> str:
         """What it has told whoever started it."""
         return self._said.read_text()
@@ -116,6 +125,27 @@ class PageServer:
     def call(self, method: str, path: str, body: object = None) -> Answer:
         """Send a request as the API's clients do, with the token."""
         return self.ask(method, path, body, authorization=f"Bearer {self.token}")
+
+    @property
+    def face_link(self) -> str:
+        """What opens the robot's face, where it has one."""
+        return f"http://localhost:{self.port}/face?token={self.face_token}"
+
+    def face(self, method: str, path: str, body: object = None) -> Answer:
+        """Send a request with the token of the robot's face."""
+        return self.ask(method, path, body, authorization=f"Bearer {self.face_token}")
+
+    def run(self, program: str, *, despite_problems: bool = False) -> None:
+        """Have the robot run a program, as the API's clients do."""
+        begun = self.call("POST", "/api/missions", {"program": program})
+        assert begun.status == 201, begun.text
+        ends = time.monotonic() + 20
+        while (view := self.call("GET", "/api/missions/current").data)["check"] is None:
+            assert time.monotonic() < ends, view
+            time.sleep(0.01)
+        approval = {"program": view["digest"], "despite_problems": despite_problems}
+        approved = self.call("POST", "/api/missions/current/approve", approval)
+        assert approved.status == 200, approved.text
 
     @property
     def cookie(self) -> str:

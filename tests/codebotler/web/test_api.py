@@ -16,6 +16,7 @@ import pytest
 
 from codebotler.archive import missions
 from pageserver import PageServer
+from server import Server
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
 BAD = "def task_program():\n    go_to('cellar')\n"
@@ -92,6 +93,23 @@ def test_problems_need_a_word_and_the_program_that_was_seen(server: PageServer) 
     assert (mended["problems"], mended["program"]) == ([], HELLO)
 
 
+def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None:
+    with (
+        Server(answer=lambda asked: HELLO if "cellar" in json.dumps(asked.body) else BAD) as model,
+        PageServer(tmp_path, "--model", "completions:m", "--base-url", model.url) as server,
+    ):
+        assert server.call("POST", "/api/missions/current/again", {}).status == 409
+        server.call("POST", "/api/missions", {"instruction": "say hello"})
+        for repair, problems in ((True, 1), (False, 0), (False, 1)):
+            now = until(server, lambda now: now["check"] is not None and not now["busy"])
+            assert len(now["problems"]) == problems
+            again = server.call("POST", f"/api/missions/{now['id']}/again", {"repair": repair})
+            assert (again.status, again.data["busy"]) == (202, "asking completions:m")
+    with PageServer(tmp_path) as server:
+        begun(server, HELLO)
+        assert server.call("POST", "/api/missions/current/again", {}).status == 409, "nobody wrote it"
+
+
 def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:
     view = begun(server, FAR)
     server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
@@ -118,9 +136,18 @@ def test_a_check_alone_begins_nothing(server: PageServer) -> None:
     assert len(missions(server.home)) == before
 
 
+def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
+    view = begun(server, "def task_program():\n    say('\\ud800')\n    go_to('\\udfff')\n")
+    assert "\\udfff" in json.dumps(view["problems"])
+    raw = server.call("POST", "/api/missions", {"program": "def task_program():\n    say('\ud800')\n"})
+    assert (raw.status, raw.data["detail"][0]["loc"]) == (422, ["body", "program"])
+    assert len(server.call("POST", "/api/check", {"program": "x" * 300_000}).text) < 1_000
+
+
 @pytest.mark.parametrize(
     ("method", "path", "body", "status"),
     [
+        ("GET", "/api/nothing", None, 404),
         ("GET", "/api/missions/20200101-000000", None, 404),
         ("GET", "/api/missions/..%2f..%2fetc/events.jsonl", None, 404),
         ("POST", "/api/missions/20200101-000000/stop", None, 409),
@@ -161,6 +188,8 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
         server.end(signal.SIGKILL)
     with PageServer(tmp_path) as server:
         assert "was interrupted: the tool died during go_to" in server.said
+        (interrupted,) = server.call("GET", "/api/robot").data["interrupted"]
+        assert "the tool died during go_to" in interrupted["reason"]
         assert missions(tmp_path / "home")[-1].state == "interrupted"
 
 

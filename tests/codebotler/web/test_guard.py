@@ -80,6 +80,13 @@ def test_wrong_tokens_and_cookies_open_nothing(server: PageServer) -> None:
     assert server.ask("GET", "/", cookie="{=;;=").status == 401
 
 
+def test_a_token_in_the_address_opens_pages_only(server: PageServer) -> None:
+    """Where programs ask, it would stand in logs."""
+    for path in ("/api/robot", "/_nicegui/x"):
+        answer = server.ask("GET", f"{path}?token={server.token}")
+        assert (answer.status, "set-cookie" in answer.headers) == (401, False)
+
+
 def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
     with PageServer(tmp_path) as server:
         cookie = server.cookie
@@ -101,6 +108,14 @@ def test_tries_are_counted_by_address_and_for_a_while() -> None:
     assert access.of_token("a token", "there") is Role.OPERATOR
     now[0] = WINDOW
     assert access.of_token("a token", "here") is Role.OPERATOR
+
+
+def test_addresses_that_tried_are_not_kept_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.web.access.MOST_ADDRESSES", 3)
+    access = Access("a token", "a face")
+    for number in range(9):
+        access.of_token("wrong", f"address {number}")
+    assert len(access._wrong) == 3
 
 
 def test_a_token_is_made_for_each_start() -> None:
@@ -236,7 +251,10 @@ def test_every_answer_has_the_headers(server: PageServer) -> None:
     ):
         assert answer.headers["x-content-type-options"] == "nosniff"
         assert answer.headers["x-frame-options"] == "DENY"
+        assert answer.headers["referrer-policy"] == "no-referrer"
+        assert answer.headers["cross-origin-opener-policy"] == "same-origin"
         assert answer.headers["cross-origin-resource-policy"] == "same-origin"
+        assert {"camera=()", "microphone=(self)"} <= set(answer.headers["permissions-policy"].split(", "))
         assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
         assert "server" not in answer.headers
 

@@ -2,6 +2,7 @@
 (() => {
   const button = document.getElementById("stop");
   const told = document.getElementById("stop-told");
+  const { stop: stopAt = "/api/stop", robot: robotAt = "/api/robot" } = document.currentScript.dataset;
   const LOST = "The tool cannot be reached. Use the robot's emergency stop.";
   const ENDS = {
     stopped: "The robot has stopped.",
@@ -17,10 +18,10 @@
 
   const watch = async (which) => {
     for (;;) {
-      const now = await (await fetch("/api/robot")).json();
+      const now = await (await fetch(robotAt)).json();
       if (which !== pressed) return;
       if (now.is_over) {
-        const text = ENDS[now.state] ?? `The mission failed: ${now.reason}`;
+        const text = ENDS[now.state] ?? (now.reason ? `The mission failed: ${now.reason}` : "The mission failed.");
         say(text, now.state === "failed" ? "bad" : "good");
         return;
       }
@@ -32,7 +33,7 @@
     const which = ++pressed;
     if (!onlyMoving) say("Telling the robot to stop …", "busy");
     try {
-      const answer = await fetch(`/api/stop?only_moving=${onlyMoving}`, { method: "POST" });
+      const answer = await fetch(`${stopAt}?only_moving=${onlyMoving}`, { method: "POST" });
       if (!answer.ok) throw new Error(answer.status);
       const { stopping } = await answer.json();
       if (stopping) {

@@ -1,0 +1,150 @@
+"""The robot's face: its page, and what it needs of the API. Nobody runs or reads a program by it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from fastapi import APIRouter, HTTPException, WebSocket, WebSocketDisconnect
+from fastapi.responses import FileResponse
+from pydantic import BaseModel, ConfigDict, Field
+
+from codebotler.mission import UNCONFIRMED
+from codebotler.robots.face import AnswerError, Ended, Face, Question
+from codebotler.terminal import visible
+from codebotler.web.desk import Desk
+
+PAGE = Path(__file__).with_name("static") / "face.html"
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
+)
+"""Stricter than that of other pages, since there is no NiceGUI: no script can make markup of a text."""
+
+STOPS = "somebody at the face"
+MOST_TEXT, MOST_OPTION, MOST_OPTIONS = 2_000, 300, 50
+"""Characters and options that people can read on a screen."""
+
+
+class Answer(BaseModel):
+    """What somebody answers."""
+
+    model_config = ConfigDict(extra="forbid")
+    question: int = Field(ge=1, description="The number of the question.")
+    option: int = Field(ge=0, description="The position of the chosen option, from 0.")
+
+
+def router(desk: Desk, face: Face) -> APIRouter:
+    """The addresses of the face.
+
+    Args:
+        desk: whose robot speaks there.
+        face: on which it speaks.
+    """
+    here = APIRouter(tags=["face"])
+
+    @here.get("/face", include_in_schema=False)
+    def page() -> FileResponse:
+        headers = {"content-security-policy": POLICY, "cache-control": "no-store"}
+        return FileResponse(PAGE, media_type="text/html", headers=headers)
+
+    @here.get("/api/face")
+    def show() -> dict[str, Any]:
+        """What the face shows: what the robot does, said and asks. `question` has the number to answer."""
+        return face_data(desk, face)
+
+    @here.post("/api/face/answer")
+    def answer(given: Answer) -> dict[str, Any]:
+        """Answer the question; the first answer counts, and one that is too late is refused."""
+        try:
+            face.answer(given.question, given.option)
+        except AnswerError as error:
+            raise HTTPException(409, error.sentence) from None
+        return face_data(desk, face)
+
+    @here.post("/api/face/stop", status_code=202)
+    async def stop() -> dict[str, Any]:
+        """Stop a robot that runs, and nothing else; whether there is one."""
+        return {"stopping": desk.stop_soon(STOPS, only_moving=True)}
+
+    @here.websocket("/api/face/live")
+    async def live(socket: WebSocket) -> None:
+        """Send what the face shows, again at each change. Nothing that comes from there is heeded."""
+        await socket.accept()
+        with face.watched():
+            telling = asyncio.create_task(_tell(socket, desk, face))
+            try:
+                with suppress(WebSocketDisconnect, KeyError):  # it sent something else than text
+                    while True:
+                        await socket.receive_text()
+            finally:
+                telling.cancel()
+
+    return here
+
+
+async def _tell(socket: WebSocket, desk: Desk, face: Face) -> None:
+    """Whoever reads slowly is sent what there is by then; nothing queues up."""
+    sent: object = None
+    with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
+        while True:
+            seen = desk.board.version
+            data = face_data(desk, face)
+            told = {**data, "seconds_left": None}
+            if told != sent:
+                sent = told
+                await socket.send_json(data)
+            await desk.board.until(lambda: desk.board.version != seen)  # noqa: B023 - looked at before the next round
+
+
+def face_data(desk: Desk, face: Face) -> dict[str, Any]:
+    """What a face shows, as plain data."""
+    view, shown = desk.view, face.shown
+    question = shown.question
+    is_moving = view.is_running and view.progress.is_driving
+    doing = "asking" if question else "moving" if is_moving else "working" if view.is_running else "idle"
+    return {
+        "doing": doing,
+        "to": words(view.progress.room, MOST_OPTION) if is_moving else "",
+        "said": [{"number": said.number, "text": words(said.text)} for said in shown.said],
+        "question": None if question is None else question_data(question),
+        "seconds_left": None if question is None else _left(question),
+        "ended": None if shown.ended is None else _ended_data(shown.ended),
+        "screens": face.screens,
+        "state": view.state,
+        "is_over": view.is_over,
+        "reason": UNCONFIRMED if view.reason == UNCONFIRMED else "",
+    }
+
+
+def _left(question: Question) -> float | None:
+    """Seconds in which it can be answered; None for ever."""
+    left = question.until - time.monotonic()
+    return round(max(0.0, left), 1) if math.isfinite(left) else None
+
+
+def question_data(question: Question) -> dict[str, Any]:
+    """A question as plain data."""
+    return {
+        "number": question.number,
+        "person": words(question.person, MOST_OPTION),
+        "text": words(question.text),
+        "options": [words(option, MOST_OPTION) for option in question.options[:MOST_OPTIONS]],
+        "more_options": max(0, len(question.options) - MOST_OPTIONS),
+    }
+
+
+def words(text: str, most: int = MOST_TEXT) -> str:
+    """A text as people read it: with its lines, but without what hides or turns its letters."""
+    left = len(text) - most
+    shown = "\n".join(map(visible, text[:most].splitlines()))
+    return shown if left <= 0 else f"{shown}... {left:,} more characters"
+
+
+def _ended_data(ended: Ended) -> dict[str, Any]:
+    answer = None if ended.answer is None else words(ended.question.options[ended.answer], MOST_OPTION)
+    return {"number": ended.question.number, "how": ended.how, "answer": answer}

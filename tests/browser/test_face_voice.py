@@ -1,0 +1,150 @@
+"""The robot's face speaks aloud, and hears; by stand-ins, since a browser under test can do neither."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from faces import ASKS, HEARING, MUTE, SPEAKING, TWICE, face_of, option, said, until
+from pageserver import PageServer
+from viewing import OpenPage
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    with PageServer(tmp_path_factory.mktemp("face"), "--face", "--speed", "2") as server:
+        yield server
+
+
+@pytest.fixture(autouse=True)
+def at_rest(server: PageServer) -> None:
+    """Every test begins with a robot that does nothing."""
+    server.call("POST", "/api/stop")
+    ends = time.monotonic() + 20
+    while not server.call("GET", "/api/robot").data["is_over"]:
+        assert time.monotonic() < ends
+        time.sleep(0.02)
+
+
+# --- aloud
+
+
+def test_muting_is_remembered(server: PageServer, opened: OpenPage) -> None:
+    face = face_of(server, opened)
+    aloud = face.get_by_role("switch", name="Speak aloud")
+    expect(aloud).to_be_checked()
+    aloud.click()
+    expect(aloud).not_to_be_checked()
+    face.reload()
+    expect(aloud).not_to_be_checked()
+    server.run(ASKS)
+    face.keyboard.press("1")
+    expect(option(face, "Yes")).to_be_enabled()
+    assert face.evaluate("window.spoken") == []
+    aloud.click()
+    face.keyboard.press("1")
+    expect(said(face)).to_have_text("She says Yes")
+    expect(aloud).to_be_checked()
+    until(face, "window.spoken.includes('She says Yes')")
+
+
+def test_a_browser_that_waits_for_a_touch_says_so(server: PageServer, opened: OpenPage) -> None:
+    """With the browser's own speech synthesis, which nobody hears here."""
+    face = face_of(server, opened, script="")
+    expect(face.locator("#hint")).to_have_text("Touch the screen once, so that the robot can be heard.")
+    face.locator("h1").click(force=True)
+    expect(face.locator("#hint")).to_be_hidden()
+
+
+def test_a_browser_without_a_voice_still_shows_all(server: PageServer, opened: OpenPage) -> None:
+    face = face_of(server, opened, script=MUTE)
+    expect(face.locator("#aloud")).to_be_hidden()
+    expect(face.locator("#voice")).to_be_hidden()
+    expect(face.locator("#hint")).to_be_hidden()
+    server.run(ASKS)
+    option(face, "Yes").click()
+    expect(said(face)).to_have_text("She says Yes")
+
+
+# --- by voice, with a stand-in for the browser's speech recognition
+
+
+def hearing(server: PageServer, opened: OpenPage) -> Page:
+    return face_of(server, opened, script=SPEAKING + HEARING)
+
+
+def test_nobody_is_listened_to_before_somebody_switches_it_on(server: PageServer, opened: OpenPage) -> None:
+    face = hearing(server, opened)
+    voice = face.get_by_role("switch", name="Answer by voice")
+    expect(voice).not_to_be_checked()
+    expect(voice).to_have_accessible_description(
+        re.compile("many browsers send what they hear to their maker")
+    )
+    expect(face.locator("#voice-about")).to_be_visible()
+    server.run(ASKS)
+    expect(option(face, "Yes")).to_be_enabled()
+    assert face.evaluate("window.listening.length") == 0
+    voice.click()
+    expect(voice).to_be_checked()
+    until(face, "window.listening.length === 1")
+    face.reload()
+    expect(voice).not_to_be_checked()
+    expect(option(face, "Yes")).to_be_enabled()
+    assert face.evaluate("window.listening.length") == 0, "who comes next has not agreed"
+
+
+def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, opened: OpenPage) -> None:
+    face = hearing(server, opened)
+    face.get_by_role("switch", name="Answer by voice").click()
+    server.run(ASKS)
+    until(face, "window.listening.length === 1")
+    face.evaluate("hear('I would rather have coffee')")
+    expect(face.locator("#heard-text")).to_contain_text("which is none of the answers")
+    expect(face.locator("#take")).to_be_hidden()
+    face.evaluate("hear('oh yes or no thank you', 'yes')")
+    expect(face.locator("#heard-text")).to_have_text(
+        "I heard “oh yes or no thank you”. Is your answer “Yes”?"
+    )
+    assert face.evaluate("window.listening.length") == 0
+    assert server.call("GET", "/api/face").data["question"] is not None
+    face.get_by_role("button", name="No, listen again").click()
+    expect(face.locator("#heard")).to_be_hidden()
+    until(face, "window.listening.length === 1")
+    face.evaluate("hear('No. Thank you!')")
+    expect(face.locator("#heard-text")).to_contain_text("Is your answer “No, thank you”?")
+    face.get_by_role("button", name="Yes, that is my answer").click()
+    expect(said(face)).to_have_text("She says No, thank you")
+    assert face.evaluate("window.listening.length") == 0
+
+
+def test_a_spoken_answer_is_not_taken_for_another_question(server: PageServer, opened: OpenPage) -> None:
+    face = hearing(server, opened)
+    face.get_by_role("switch", name="Answer by voice").click()
+    server.run(TWICE)
+    until(face, "window.listening.length === 1")
+    face.evaluate("hear('yes')")
+    expect(face.locator("#take")).to_be_visible()
+    option(face, "No").click()
+    expect(face.locator("#question")).to_have_text("Are you sure?")
+    expect(face.locator("#heard")).to_be_hidden()
+
+
+def test_a_browser_that_may_not_listen_says_so(server: PageServer, opened: OpenPage) -> None:
+    face = hearing(server, opened)
+    voice = face.get_by_role("switch", name="Answer by voice")
+    voice.click()
+    server.run(ASKS)
+    until(face, "window.listening.length === 1")
+    face.evaluate("fail('no-speech')")
+    expect(voice).to_be_checked()
+    face.evaluate("fail('not-allowed')")
+    expect(face.locator("#ended")).to_have_text(
+        "The browser does not let this page listen. Please choose by touch."
+    )
+    expect(voice).not_to_be_checked()
+    option(face, "Yes").click()
+    expect(said(face)).to_have_text("She says Yes")

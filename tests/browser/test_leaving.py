@@ -1,0 +1,91 @@
+"""The robot works on when the last operator's page closes, unless it was asked to stop then."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from codebotler.archive import missions
+from pageserver import PageServer
+from viewing import PHONE, OpenPage
+
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
+
+GRACE = 10  # seconds; a page takes some to load where many tests run at the same time
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[PageServer]:
+    with PageServer(tmp_path, "--face", "--stop-when-alone", str(GRACE)) as server:
+        yield server
+
+
+def state(server: PageServer) -> str:
+    return str(server.call("GET", "/api/robot").data["state"])
+
+
+def until_over(server: PageServer) -> None:
+    ends = time.monotonic() + 20
+    while not server.call("GET", "/api/robot").data["is_over"]:
+        assert time.monotonic() < ends
+        time.sleep(0.02)
+
+
+def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, opened: OpenPage) -> None:
+    first, second = opened(server), opened(server, size=PHONE)
+    face = opened(server, link=server.face_link)
+    server.run(FAR)
+    for page in (first, second):
+        expect(page.locator(".headline")).to_have_text("Running")
+    first.context.close()
+    second.reload()
+    expect(second.locator(".headline")).to_have_text("Running")
+    second.goto(f"http://localhost:{server.port}/missions")
+    expect(second.locator("h1")).to_have_text("Missions")
+    second.wait_for_timeout(1000 * (GRACE + 1))
+    assert state(server) == "running", "somebody is there"
+    second.context.close()
+    expect(face.locator("#doing")).to_have_text("I was stopped.")
+    until_over(server)
+    assert missions(server.home)[-1].reason == "stopped by the leaving of the last operator"
+
+
+def test_who_comes_back_in_time_finds_it_running(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    expect(page.locator(".headline")).to_be_visible()
+    server.run(FAR)
+    page.goto("about:blank")
+    page.goto(server.link)
+    expect(page.locator(".headline")).to_have_text("Running")
+    page.wait_for_timeout(1000 * (GRACE + 1))
+    assert state(server) == "running"
+
+
+def test_a_mission_that_only_waits_is_left_alone(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    expect(page.locator(".headline")).to_be_visible()
+    server.call("POST", "/api/missions", {"program": FAR})
+    expect(page.locator(".headline")).to_have_text("Waits for your word")
+    page.context.close()
+    time.sleep(GRACE + 1)
+    assert state(server) == "checked"
+
+
+def test_a_browser_that_is_cut_off_holds_nothing_up_and_catches_up(
+    server: PageServer, opened: OpenPage
+) -> None:
+    away, here = opened(server, expecting="ERR_INTERNET_DISCONNECTED"), opened(server)
+    expect(away.locator(".headline")).to_be_visible()
+    server.run(FAR)
+    expect(away.locator(".headline")).to_have_text("Running")
+    away.context.set_offline(True)
+    here.locator("#stop").click()
+    expect(here.locator("#stop-told")).to_have_text("The robot has stopped.")
+    away.locator("#stop").click()
+    expect(away.locator("#stop-told")).to_contain_text("The tool cannot be reached.")
+    away.context.set_offline(False)
+    expect(away.locator(".headline")).to_have_text("Stopped")

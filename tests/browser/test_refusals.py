@@ -1,0 +1,25 @@
+"""The pages that say no: they can be read by everybody, too."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import expect
+
+from pageserver import PageServer
+from viewing import SCREENS, OpenPage, Screen, expect_no_grave_fault
+
+
+@pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
+def test_pages_that_refuse(server: PageServer, opened: OpenPage, screen: Screen) -> None:
+    _, size, dark = screen
+    address = f"http://localhost:{server.port}/"
+    page = opened(server, size=size, dark=dark, link=address, expecting="Failed to load resource")
+    expect(page.locator("p")).to_contain_text("open the link that codebotler serve printed")
+    expect_no_grave_fault(page)
+    page.goto(f"{server.link}x")
+    expect(page.locator("p")).to_have_text("this is not the token")
+    expect_no_grave_fault(page)
+    page.goto(server.link)
+    page.goto(f"{address}nothing")
+    expect(page.locator("p")).to_have_text("there is no such page")
+    expect_no_grave_fault(page)

@@ -1,0 +1,292 @@
+"""A robot with a face: what is spoken goes there, all else to the robot; a stop takes back what is asked."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from codebotler.mission import Mission, State
+from codebotler.missionlog import events_of
+from codebotler.robots.base import Argument, CancelledError, Options
+from codebotler.robots.face import SILENCE, AnswerError, Ending, Face, Question
+from codebotler.robots.faced import SPOKEN, Faced, unspoken
+from codebotler.robots.open import KINDS, open_faced
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.simulated import Simulated
+from codebotler.running import beyond
+from codebotler.simulator.robot import RobotError
+from codebotler.skills import SKILLS
+from codebotler.world import Room, World
+from doubles import Answering
+
+TEA = """def task_program():
+    say("Good morning")
+    answer = ask("ann", "Tea?", ["Yes", "No"])
+    say("She says " + answer)
+"""
+PATIENT = """def task_program():
+    try:
+        ask("ann", "Tea?", ["Yes", "No"])
+    except Exception as error:
+        say(type(error).__name__ + ": " + str(error))
+"""
+WORLD = World((Room("hall"), Room("kitchen")), "hall")
+LONG = 30.0
+
+
+def faced(seconds: float = LONG) -> tuple[Faced, Face]:
+    face = Face(seconds)
+    return Faced(Simulated(WORLD, speed=None, skills=unspoken()), face), face
+
+
+def question_of(face: Face, number: int = 0) -> Question:
+    """The first question with a number above this one."""
+    ends = time.monotonic() + LONG
+    while (question := face.shown.question) is None or question.number <= number:
+        assert time.monotonic() < ends
+        time.sleep(0.002)
+    return question
+
+
+@contextmanager
+def going(does: Callable[[], object]) -> Iterator[list[object]]:
+    """Something that goes on in a thread; what it returned or raised is there at the end."""
+    ended: list[object] = []
+
+    def go() -> None:
+        try:
+            ended.append(does())
+        except Exception as error:  # noqa: BLE001 - looked at by the test
+            ended.append(error)
+
+    thread = threading.Thread(target=go, daemon=True)
+    thread.start()
+    yield ended
+    thread.join(LONG)
+    assert not thread.is_alive()
+
+
+def test_what_is_spoken_goes_to_the_face_and_all_else_to_the_robot() -> None:
+    inner, face = Answering(lambda skill, _: ["hall"] if skill == "get_all_rooms" else None), Face()
+    robot = Faced(inner, face)
+    robot.connect()
+    assert robot.perform("get_all_rooms", []) == ["hall"]
+    robot.perform("go_to", ["kitchen"])
+    robot.perform("say", ["hello"])
+    assert inner.done == ["get_all_rooms", "kitchen"]
+    assert [said.text for said in face.shown.said] == ["hello"]
+    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No", "Yes")])) as ended:
+        question = question_of(face)
+        assert (question.person, question.text, question.options) == ("ann", "Tea?", ("Yes", "No", "Yes"))
+        face.answer(question.number, 2)
+    assert ended == ["Yes"]
+    assert (robot.name, robot.address, robot.if_tool_dies) == (inner.name, inner.address, inner.if_tool_dies)
+    robot.disconnect()
+    assert inner.connections == 0
+
+
+def test_the_last_things_that_were_said_stay_until_another_mission() -> None:
+    robot, face = faced()
+    robot.connect()
+    for text in "abcd":
+        robot.perform("say", [text])
+    assert [said.text for said in face.shown.said] == ["b", "c", "d"]
+    robot.disconnect()
+    assert face.shown.said
+    robot.connect()
+    assert not face.shown.said
+
+
+def test_what_the_face_has_the_robot_may_lack() -> None:
+    inner = Answering()
+    inner.missing = {"say": "no server", "ask": "no server", "pick": "no arm"}
+    robot = Faced(inner, Face())
+    assert robot.missing == {"pick": "no arm"}
+    assert beyond(TEA, robot) == []
+    assert len(beyond(f"{TEA}    pick('mug')\n", robot)) == 1
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "pyrobosim"])
+def test_the_robot_behind_a_face_is_asked_for_nothing_that_is_spoken(kind: str) -> None:
+    robot = open_faced(kind, Options(world=WORLD), Face())
+    assert isinstance(robot, Faced)
+    assert robot.skills == SKILLS
+    assert set(robot._robot.skills) == set(SKILLS) - SPOKEN
+
+
+def test_saying_takes_time_by_the_robots_clock() -> None:
+    robot, _ = faced()
+    robot.connect()
+    for text, seconds in (("hi", 1.0), ("x" * 60, 4.0), ("x" * 5_000, 14.0)):
+        robot.perform("say", [text])
+        assert robot.clock.now == seconds
+
+
+def test_nobody_answers() -> None:
+    robot, face = faced(seconds=0.05)
+    robot.connect()
+    with pytest.raises(RobotError, match=r'nobody answered "Tea\?" within 0.05 s') as error:
+        robot.perform("ask", ["ann", "Tea?", ("Yes",)])
+    assert error.value.kind == SILENCE
+    ended = face.shown.ended
+    assert ended is not None
+    assert (ended.how, face.shown.question) == (Ending.UNANSWERED, None)
+    with pytest.raises(AnswerError, match="its time was over"):
+        face.answer(ended.question.number, 0)
+
+
+def test_a_question_without_options_is_an_error_and_not_shown() -> None:
+    robot, face = faced()
+    robot.connect()
+    with pytest.raises(RobotError) as error:
+        robot.perform("ask", ["ann", "Tea?", ()])
+    assert (error.value.kind, face.shown.ended) == ("AskEmptyOptions", None)
+
+
+def test_the_first_answer_counts_and_the_others_are_told_so() -> None:
+    robot, face = faced()
+    robot.connect()
+    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])) as ended:
+        number = question_of(face).number
+        for position in (-1, 2):
+            with pytest.raises(AnswerError, match="none of the answers"):
+                face.answer(number, position)
+        with pytest.raises(AnswerError, match="not asked any more"):
+            face.answer(number + 1, 0)
+        face.answer(number, 1)
+        with pytest.raises(AnswerError, match='somebody has answered already: "No"'):
+            face.answer(number, 0)
+    assert ended == ["No"]
+
+
+def test_an_answer_to_the_question_before_answers_no_other() -> None:
+    robot, face = faced()
+    robot.connect()
+    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])):
+        first = question_of(face).number
+        face.answer(first, 0)
+    with going(lambda: robot.perform("ask", ["ann", "Sure?", ("Yes", "No")])) as ended:
+        second = question_of(face, first).number
+        with pytest.raises(AnswerError):
+            face.answer(first, 0)
+        face.answer(second, 1)
+    assert ended == ["No"]
+
+
+def test_a_stop_takes_the_question_back_at_once_and_nothing_more_is_spoken() -> None:
+    robot, face = faced()
+    robot.connect()
+    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])) as ended:
+        number = question_of(face).number
+        robot.cancel()
+        assert face.shown.question is None
+        assert face.shown.ended is not None
+        assert face.shown.ended.how is Ending.WITHDRAWN
+        with pytest.raises(AnswerError, match="it was withdrawn"):
+            face.answer(number, 0)
+    assert isinstance(ended[0], CancelledError)
+    calls: list[tuple[str, list[Argument]]] = [
+        ("say", ["hello"]),
+        ("ask", ["ann", "Tea?", ("Yes",)]),
+        ("go_to", ["kitchen"]),
+    ]
+    for skill, arguments in calls:
+        with pytest.raises(CancelledError):
+            robot.perform(skill, arguments)
+    assert not face.shown.said
+    robot.connect()
+    robot.perform("say", ["hello"])
+
+
+def test_a_stop_ends_what_is_being_said() -> None:
+    face = Face()
+    robot = Faced(Simulated(WORLD, skills=unspoken()), face)
+    robot.connect()
+    with going(lambda: robot.perform("say", ["x" * 5_000])) as ended:
+        while not face.shown.said:
+            time.sleep(0.002)
+        robot.cancel()
+    assert isinstance(ended[0], CancelledError)
+
+
+def test_the_robot_is_stopped_even_if_the_face_cannot_be() -> None:
+    inner, face = Answering(), Face()
+    robot = Faced(inner, face)
+    robot.connect()
+
+    def broken() -> None:
+        raise OSError("full")
+
+    face.changed = broken
+    with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes",)])), pytest.raises(OSError, match="full"):
+        robot.cancel()
+    assert inner.cancels == 1
+
+
+def test_who_shows_it_is_counted_and_told() -> None:
+    robot, face = faced()
+    robot.connect()
+    told: list[object] = []
+    changes: list[int] = []
+    face.changed = lambda: changes.append(face.screens)
+    robot.perform("say", ["a"], told.append)
+    with face.watched(), face.watched():
+        robot.perform("say", ["b"], told.append)
+    with face.watched():
+        robot.perform("say", ["c"], told.append)
+    assert told == ["no face is open", "shown on 2 faces", "shown on 1 face"]
+    assert face.screens == 0
+    assert changes == [0, 1, 2, 2, 1, 0, 1, 1, 0]
+
+
+# --- missions
+
+
+def run(home: Path, program: str, seconds: float, does: Callable[[Mission, Face], None]) -> Mission:
+    robot, face = faced(seconds)
+    with Reservation(robot, home) as reserved, Mission(home, robot.name) as mission:
+        mission.draft(program)
+        mission.check([])
+        mission.approve()
+        with going(lambda: mission.run(reserved)):
+            does(mission, face)
+        return mission
+
+
+def test_a_mission_speaks_and_hears(tmp_path: Path) -> None:
+    mission = run(tmp_path, TEA, LONG, lambda _, face: face.answer(question_of(face).number, 0))
+    assert mission.state is State.DONE
+    assert [(event.kind, event.text, event.answer) for event in mission.trace] == [
+        ("say", "Good morning", None),
+        ("ask", "Tea?", "Yes"),
+        ("say", "She says Yes", None),
+    ]
+    events = [line["event"] for line in events_of(mission.folder) if line["event"] not in {"state", "log"}]
+    assert events == ["skill", "feedback", "result"] * 3
+
+
+def test_a_mission_that_is_stopped_while_it_asks(tmp_path: Path) -> None:
+    def stop(mission: Mission, face: Face) -> None:
+        question_of(face)
+        mission.stop("a test")
+        assert face.shown.question is None
+
+    mission = run(tmp_path, TEA, LONG, stop)
+    assert (mission.state, mission.summary.reason) == (State.STOPPED, "stopped by a test")
+    assert "cancelled" in [line["event"] for line in events_of(mission.folder)]
+
+
+def test_a_program_can_catch_that_nobody_answers(tmp_path: Path) -> None:
+    mission = run(tmp_path, PATIENT, 0.05, lambda _mission, _face: None)
+    assert mission.state is State.DONE
+    assert mission.trace[-1].text == f'{SILENCE}: nobody answered "Tea?" within 0.05 s'
+    failed = run(tmp_path, TEA, 0.05, lambda _mission, _face: None)
+    assert failed.state is State.FAILED
+    assert failed.summary.reason == f'{SILENCE}: nobody answered "Tea?" within 0.05 s'
+    (error,) = [line for line in events_of(failed.folder) if line["event"] == "error"]
+    assert error["kind"] == SILENCE

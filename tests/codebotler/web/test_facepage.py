@@ -1,0 +1,299 @@
+"""The face over HTTP: it shows what the robot says and asks, takes an answer, and may do nothing else."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosedError, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from codebotler.archive import missions
+from codebotler.mission import UNCONFIRMED, State
+from codebotler.missionlog import events_of
+from codebotler.robots.face import Face, Question
+from codebotler.robots.simulated import Simulated
+from codebotler.web.access import SHORTEST_TOKEN
+from codebotler.web.desk import Desk
+from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
+from codebotler.web.guard import MOST_BYTES
+from codebotler.web.turn import View
+from codebotler.world import Room, World
+from pageserver import PageServer
+
+TEA = """def task_program():
+    say("Good morning")
+    answer = ask("ann", "Tea?", ["Yes", "No"])
+    say("She says " + answer)
+"""
+FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
+SECRET = "def task_program():\n    secret = 'in the program'\n    go_to('kitchen')\n    undefined_name()\n"
+LIVE = "/api/face/live"
+NICEGUI = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
+    with PageServer(tmp_path_factory.mktemp("face"), "--face", "--speed", "2") as server:
+        yield server
+
+
+@pytest.fixture(autouse=True)
+def at_rest(server: PageServer) -> None:
+    server.call("POST", "/api/stop")
+    until(server, lambda now: now["is_over"])
+
+
+def until(server: PageServer, holds: Callable[[dict[str, Any]], object], seconds: float = 20.0) -> Any:  # noqa: ANN401 - JSON
+    """What the face shows as soon as something holds of it."""
+    ends = time.monotonic() + seconds
+    while not holds(now := server.call("GET", "/api/face").data):
+        assert time.monotonic() < ends, now
+        time.sleep(0.01)
+    return now
+
+
+def opened(server: PageServer, path: str = LIVE, **headers: str) -> ClientConnection:
+    return connect(
+        f"ws://127.0.0.1:{server.port}{path}", additional_headers=headers, proxy=None, open_timeout=5
+    )
+
+
+def watching(server: PageServer) -> ClientConnection:
+    """The websocket of a face, as its page opens it."""
+    cookie = server.ask("GET", f"/face?token={server.face_token}").headers["set-cookie"].partition(";")[0]
+    return opened(server, cookie=cookie, origin=f"http://127.0.0.1:{server.port}")
+
+
+def heard(socket: ClientConnection, holds: Callable[[dict[str, Any]], object]) -> Any:  # noqa: ANN401 - JSON
+    """The first message of which something holds."""
+    while True:
+        now = json.loads(socket.recv(timeout=20))
+        if holds(now):
+            return now
+
+
+def ending(socket: ClientConnection, number: int) -> Any:  # noqa: ANN401 - JSON
+    """How a question ended, as soon as that is told."""
+    return heard(socket, lambda now: (now["ended"] or {}).get("number") == number)["ended"]
+
+
+def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
+    with watching(server) as one, watching(server) as other:
+        heard(one, lambda now: now["screens"] == 2)
+        server.run(TEA)
+        asked, same = (heard(socket, lambda now: now["question"]) for socket in (one, other))
+        assert asked["question"] == same["question"]
+        assert (asked["doing"], asked["question"]["person"]) == ("asking", "ann")
+        assert (asked["question"]["text"], asked["question"]["options"]) == ("Tea?", ["Yes", "No"])
+        assert 0 < asked["seconds_left"] <= 60
+        answer = {"question": asked["question"]["number"], "option": 1}
+        taken = server.face("POST", "/api/face/answer", answer)
+        assert (taken.status, taken.data["question"]) == (200, None)
+        for socket in (one, other):
+            ended = heard(socket, lambda now: (now["ended"] or {}).get("number") == answer["question"])[
+                "ended"
+            ]
+            assert (ended["how"], ended["answer"]) == ("answered", "No")
+        again = server.face("POST", "/api/face/answer", answer)
+        assert (again.status, again.data["detail"]) == (409, 'somebody has answered already: "No"')
+        over = heard(one, lambda now: now["is_over"])
+        assert [said["text"] for said in over["said"]] == ["Good morning", "She says No"]
+    assert until(server, lambda now: now["screens"] == 0)
+
+
+def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> None:
+    with watching(server) as one, watching(server) as other:
+        server.run(TEA)
+        number = until(server, lambda now: now["question"])["question"]["number"]
+        server.call("POST", "/api/stop")
+        for socket in (one, other):
+            assert ending(socket, number)["how"] == "withdrawn"
+        late = server.face("POST", "/api/face/answer", {"question": number, "option": 0})
+        assert (late.status, late.data["detail"]) == (409, "that is not asked any more: it was withdrawn")
+
+
+def test_nobody_answers_in_time(tmp_path: Path) -> None:
+    with PageServer(tmp_path, "--face", "--speed", "0", "--face-timeout", "1") as server:
+        server.run(TEA)
+        assert until(server, lambda now: now["is_over"])["ended"]["how"] == "unanswered"
+        (mission,) = missions(server.home)
+        assert (mission.state, mission.reason) == ("failed", 'AskTimeout: nobody answered "Tea?" within 1 s')
+        events = events_of(server.home / "missions" / mission.id)
+        assert "no face is open" in [line.get("text") for line in events]
+
+
+def test_the_face_tells_what_the_robot_does_and_nothing_of_its_program(server: PageServer) -> None:
+    assert server.face("GET", "/api/face").data["doing"] == "idle"
+    server.run(SECRET, despite_problems=True)
+    moving = until(server, lambda now: now["doing"] == "moving")
+    assert moving["to"] == "kitchen"
+    over = until(server, lambda now: now["is_over"])
+    assert (over["state"], over["reason"]) == ("failed", "")
+    assert "secret" not in server.face("GET", "/api/face").text
+
+
+def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path: Path) -> None:
+    """It concerns whoever stands beside it."""
+    face = Face()
+    desk = Desk(Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face)
+    desk._turn = type("Ended", (), {"view": View(1, "m", State.FAILED, reason=UNCONFIRMED)})()
+    assert face_data(desk, face)["reason"] == UNCONFIRMED
+
+
+def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> None:
+    server.run(FAR)
+    until(server, lambda now: now["doing"] == "moving")
+    assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": True}
+    assert until(server, lambda now: now["is_over"])["state"] == "stopped"
+    assert missions(server.home)[-1].reason == "stopped by somebody at the face"
+    server.call("POST", "/api/missions", {"program": FAR})
+    while server.call("GET", "/api/robot").data["state"] != "checked":
+        time.sleep(0.01)
+    assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": False}
+    assert server.call("GET", "/api/robot").data["state"] == "checked"
+
+
+@pytest.mark.parametrize(
+    "answer", [{}, {"question": 1}, {"question": 1, "option": -1}, {"question": 1, "option": "x"}]
+)
+def test_an_answer_that_is_none_is_refused(server: PageServer, answer: object) -> None:
+    assert server.face("POST", "/api/face/answer", answer).status == 422
+
+
+def test_a_face_that_reads_nothing_holds_nothing_up(tmp_path: Path) -> None:
+    """Its messages would fill all buffers many times over."""
+    talks = "def task_program():\n    for n in range(400):\n        say(str(n) + chr(8987) * 5000)\n"
+    with PageServer(tmp_path, "--face", "--speed", "0") as server, watching(server) as slow:
+        heard(slow, lambda now: now["screens"] == 1)
+        with watching(server) as quick:
+            server.run(talks, despite_problems=True)
+            over = heard(quick, lambda now: now["state"] == "done")
+            assert over["said"][-1]["text"].startswith("399")
+
+
+def test_what_a_face_sends_has_a_limit(server: PageServer) -> None:
+    with watching(server) as socket:
+        socket.send("x" * (MOST_BYTES + 1))
+        with pytest.raises(ConnectionClosedError) as closed:
+            heard(socket, lambda _: False)
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1009
+        assert server.call("GET", "/api/face").status == 200
+
+
+# --- what a face may
+
+
+def test_a_face_may_do_nothing_but_be_one(server: PageServer) -> None:
+    described = server.call("GET", "/api/openapi.json").data["paths"]
+    theirs = {"/api/face", "/api/face/answer", "/api/face/stop"}
+    assert theirs < described.keys()
+    for path, methods in described.items():
+        if path not in theirs:
+            for method in methods:
+                asked = server.face(method.upper(), path.format(mission="current"), {})
+                assert asked.status == 403, (method, path)
+    for path in ("/", "/missions", "/api", "/api/openapi.json", "/_nicegui/x.js", "/face/../api/missions"):
+        assert server.face("GET", path).status in {403, 404}, path
+    assert server.face("GET", "/face").status == 200
+
+
+def test_a_face_reaches_no_page_of_an_operator_over_the_websocket(server: PageServer) -> None:
+    """NiceGUI takes messages for any page whose number they bear, whoever sends them."""
+    link = server.ask("GET", f"/face?token={server.face_token}")
+    here = f"http://127.0.0.1:{server.port}"
+    with pytest.raises(InvalidStatus) as refused:
+        opened(server, NICEGUI, cookie=link.headers["set-cookie"].partition(";")[0], origin=here)
+    assert refused.value.response.status_code == 403
+    with opened(server, NICEGUI, cookie=server.cookie, origin=here):
+        pass  # an operator's page gets there
+    polling = NICEGUI.replace("websocket", "polling")
+    assert server.face("GET", polling).status == 403
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", ""])
+def test_no_other_page_listens_to_the_face(server: PageServer, origin: str) -> None:
+    cookie = server.ask("GET", f"/face?token={server.face_token}").headers["set-cookie"].partition(";")[0]
+    for headers in ({"cookie": cookie, "origin": origin}, {"cookie": cookie}, {"origin": origin}):
+        with pytest.raises(InvalidStatus):
+            opened(server, **headers)
+    asked = server.ask("POST", "/api/face/answer", {"question": 1, "option": 0}, cookie=cookie, origin=origin)
+    assert asked.status == 403
+
+
+def test_nobody_sees_the_face_without_its_token(server: PageServer) -> None:
+    for method, path in (("GET", "/face"), ("GET", "/api/face"), ("POST", "/api/face/answer")):
+        assert server.ask(method, path, {}).status == 401
+    with suppress(InvalidStatus), opened(server, origin=f"http://127.0.0.1:{server.port}"):
+        pytest.fail("it was let in")
+
+
+def test_the_page_of_the_face_has_a_stricter_policy(server: PageServer) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.request("GET", "/face", headers={"Authorization": f"Bearer {server.face_token}"})
+    answer = connection.getresponse()
+    policies = answer.headers.get_all("content-security-policy") or []
+    connection.close()
+    assert len(policies) == 2, "that of all pages, and its own"
+    (own,) = [policy for policy in policies if "require-trusted-types-for 'script'" in policy]
+    assert "unsafe" not in own
+    assert "script-src 'self';" in own
+
+
+def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
+    with PageServer(tmp_path, "--speed", "0") as server:
+        assert "face" not in server.said
+        assert server.call("GET", "/face").status == 404
+        assert server.call("GET", "/api/face").status == 404
+        server.run("def task_program():\n    say('hello')\n")
+        while not server.call("GET", "/api/robot").data["is_over"]:
+            time.sleep(0.01)
+        assert missions(server.home)[-1].state == "done"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--face-token", "short"], f"take {SHORTEST_TOKEN} characters or more"),
+        (["--token", "x" * 20, "--face-token", "x" * 20], "would open the operator's page"),
+        (["--no-token", "--face-token", "x" * 20], "only for this machine"),
+        (["--face-timeout", "0"], "greater than or equal to 1"),
+        (["--stop-when-alone", "0"], "greater than or equal to 1"),
+    ],
+)
+def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
+    (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
+    command = [sys.executable, "-m", "codebotler.cli", "serve", "--world", "world.yaml", "--face", *arguments]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
+    assert ended.returncode == 2
+    assert told in ended.stderr
+
+
+def test_tokens_can_be_named_so_that_a_tablets_link_stays(tmp_path: Path) -> None:
+    with PageServer(tmp_path, "--face", "--face-token", "the tablet's token") as server:
+        assert "/face?token=the+tablet%27s+token" in server.said
+        found = server.ask("GET", "/api/face", authorization="Bearer the tablet's token")
+        assert found.status == 200
+
+
+# --- texts
+
+
+def test_texts_are_cut_and_made_visible_but_keep_their_lines() -> None:
+    assert words("one\ntwo\r\n\u202ethree") == "one\ntwo\n\\u202ethree"
+    assert words("x" * (MOST_TEXT + 1_000)) == f"{'x' * MOST_TEXT}... 1,000 more characters"
+    assert words("\ud800") == "\\ud800"
+
+
+def test_more_options_than_a_screen_holds_are_counted() -> None:
+    data = question_data(Question(1, "ann", "Which?", tuple(map(str, range(MOST_OPTIONS + 7)))))
+    assert (len(data["options"]), data["more_options"]) == (MOST_OPTIONS, 7)
