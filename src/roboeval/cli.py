@@ -12,6 +12,7 @@ from roboeval.commands.catalogue import tasks
 from roboeval.commands.finding import find
 from roboeval.commands.generating import generate, run
 from roboeval.commands.judging import evaluate, export, import_, show
+from roboeval.commands.mutating import mutate
 from roboeval.commands.reporting import compare, report
 from roboeval.commands.resampling import resample
 from roboeval.commands.serving import serve
@@ -45,6 +46,7 @@ app.command()(tasks)
 app.command()(resample)
 app.command()(report)
 app.command()(compare)
+app.command()(mutate)
 app.command()(serve)
 app.command()(export)
 app.command("import")(import_)

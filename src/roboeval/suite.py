@@ -6,10 +6,11 @@ import ast
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import TypeAlias
 
 from codebotler.badinput import BadInput, Place, YamlFile
 from codebotler.rtl import Formula, RtlSyntaxError, parse
@@ -126,6 +127,10 @@ class Task:
         return (self.ablation or ()) if ablated else self.scenarios
 
 
+Further: TypeAlias = Callable[[Task, int, int], tuple[Scenario, ...]]
+"""Makes so many worlds of a task with what they require, from a seed; the same seed makes the same ones."""
+
+
 @dataclass(frozen=True)
 class Suite:
     """Tasks and the rules by which they are judged.
@@ -137,6 +142,7 @@ class Suite:
         rules: how worlds are simulated.
         tasks: by name, sorted.
         digest: a hash of all that verdicts and prompts depend on.
+        further: makes worlds that no file writes out; None where all worlds are written out.
     """
 
     name: str
@@ -145,6 +151,7 @@ class Suite:
     rules: Rules
     tasks: Mapping[str, Task]
     digest: str
+    further: Further | None = None
 
     def task(self, name: str) -> Task:
         """A task by name.

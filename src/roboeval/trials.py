@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeAlias
 
-from codebotler.models.recorded import NAMES, read_replies, recorded_model
+from codebotler.models.recorded import NAMES, Reply, read_replies, recorded_model
 from codebotler.simulator.engine import run
 from roboeval.evaluate import judge
 from roboeval.suite import Suite, Task
@@ -40,6 +40,18 @@ def tried(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
 def recorded_programs(task: Task) -> list[str]:
     """The programs that somebody wrote for the task's prompts, right and wrong ones.
 
+    Args:
+        task: the task.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+    """
+    return [reply.program for reply in recorded_replies(task)]
+
+
+def recorded_replies(task: Task) -> list[Reply]:
+    """What somebody wrote for the task's prompts; of replies with the same program the first.
+
     They stand in `recorded/*/TASK.yaml` of the suite's folder; where it has no such folder, in the package.
 
     Args:
@@ -53,5 +65,5 @@ def recorded_programs(task: Task) -> list[str]:
         written = [read_replies(path) for path in sorted(folder.glob(f"*/{task.path.name}"))]
     else:
         written = [recorded_model(name).replies for name in NAMES]
-    replies = (reply for one in written for prompt in task.prompts for reply in one.get(prompt, ()))
-    return [*dict.fromkeys(reply.program for reply in replies)]
+    replies = [reply for one in written for prompt in task.prompts for reply in one.get(prompt, ())]
+    return [*{reply.program: reply for reply in reversed(replies)}.values()][::-1]

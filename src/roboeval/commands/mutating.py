@@ -1,0 +1,142 @@
+"""The command that makes right programs wrong, and says which of them the checks of a suite let through."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.commands.options import SuiteOption, cores, load, named
+from roboeval.terminal import note, print_rich, watched
+
+if TYPE_CHECKING:
+    from codebotler.simulator.engine import Lanes
+    from roboeval.mutation.mutants import Original
+    from roboeval.mutation.scores import Job, Score
+    from roboeval.suite import Suite
+
+
+def mutate(
+    tasks: Annotated[
+        list[str] | None, typer.Argument(help="Tasks of the suite; all by default.", metavar="TASK...")
+    ] = None,
+    suite: SuiteOption = "paper",
+    also: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Mutate the right ones of these programs, too: a run, or anything else that "
+            "`roboeval evaluate` reads; may be given several times."
+        ),
+    ] = None,
+    worlds: Annotated[
+        int | None, typer.Option(min=1, help="Try them in so many generated worlds, if the suite makes any.")
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(min=0, help="From which mutants are drawn, and worlds are generated.")
+    ] = 1,
+    most: Annotated[
+        int, typer.Option("--mutants", min=1, help="Try at most so many of each task, drawn evenly.")
+    ] = 400,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Keep scores, mutants and survivors in this folder.", parser=named("a folder")),
+    ] = None,
+    brief: Annotated[bool, typer.Option("--brief", help="Only the tables, without the survivors.")] = False,
+    at_least: Annotated[
+        float | None, typer.Option(min=0, max=1, help="Status 1 if a task scores less than this.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
+    ] = None,
+) -> None:
+    """Make right programs wrong as models do, and say which of them the checks let through."""
+    from codebotler.simulator.engine import Lanes
+    from roboeval.mutation.keeping import keep
+    from roboeval.mutation.mutants import originals
+    from roboeval.mutation.scores import Job
+    from roboeval.mutation.stillright import reasons
+    from roboeval.mutation.worlds import worlds_of
+
+    known = load(suite)
+    wanted = [known.task(name) for name in dict.fromkeys(tasks or known.tasks)]
+    further = named_programs(also or [], known)
+    jobs = [
+        Job(
+            task=task.name,
+            programs=originals(task, further.get(task.name, ())),
+            scenarios=worlds_of(known, task, worlds, seed),
+            rules=known.rules,
+            still_right=reasons(task),
+            most=most,
+            seed=seed,
+        )
+        for task in wanted
+    ]
+    with Lanes(workers or cores()) as lanes:
+        scores = [score_of(job, lanes) for job in jobs]
+    show_scores(scores, known.name, brief=brief)
+    if out is not None:
+        keep(scores, out)
+        note(f"scores, mutants and survivors are in {out}")
+    if at_least is not None and any(score.score is None or score.score < at_least for score in scores):
+        raise SystemExit(1)
+
+
+def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
+    """The programs that a user names, by their task; the same one may be among them several times."""
+    from roboeval.mutation.mutants import Original
+    from roboeval.records import name_of
+    from roboeval.run import open_source
+
+    found: dict[str, list[Original]] = {}
+    for source in sources:
+        for completion in watched(open_source(source, suite).read(), "reading"):
+            name = f"{source}:{name_of(completion.key)}"
+            found.setdefault(completion.task, []).append(Original(name, completion.program, claimed=False))
+    return found
+
+
+def score_of(job: Job, lanes: Lanes) -> Score:
+    """Run the originals of a task, make mutants of the right ones, and try these."""
+    from roboeval.mutation.mutants import drawn, mutants
+    from roboeval.mutation.operator import Setting
+    from roboeval.mutation.scores import Score, Trial, explained
+    from roboeval.mutation.survival import baselines, ends
+
+    running = baselines(job.programs, job.scenarios, job.rules, lanes)
+    before = list(watched(running, f"running {job.task}", len(job.programs)))
+    right = [baseline for baseline in before if baseline.fault is None]
+    setting = Setting.of([scenario.world for scenario in job.scenarios])
+    made = drawn(mutants([baseline.original for baseline in right], setting), job.most, job.seed)
+    trying = ends(made, right, job.scenarios, job.rules, lanes)
+    found = list(watched(trying, f"mutating {job.task}", len(made)))
+    trials = [Trial(mutant, end) for mutant, end in zip(made, found, strict=True)]
+    return Score(
+        task=job.task,
+        worlds=len(job.scenarios),
+        right=tuple(baseline.original for baseline in right),
+        wrong=tuple(baseline for baseline in before if baseline.fault is not None),
+        trials=explained(trials, job.still_right),
+    )
+
+
+def show_scores(scores: Sequence[Score], suite: str, *, brief: bool) -> None:
+    """Print the tables, the survivors, and beside them what makes a score doubtful."""
+    from rich.console import Group
+    from rich.text import Text
+
+    from roboeval.mutation.view import operators_view, scores_view, survivors_view
+
+    parts = [scores_view(scores, suite), Text(), operators_view(scores)]
+    print_rich(Group(*parts, *([] if brief else map(survivors_view, scores))))
+    for score in scores:
+        for complaint in score.complaints:
+            note(f"warning: {complaint}")
+        for baseline in score.wrong:
+            if baseline.fault is not None and baseline.original.claimed:
+                where, why = baseline.fault.world, baseline.fault.why
+                note(
+                    f"not right, and so not mutated: {score.task}, {baseline.original.name} ({where}: {why})"
+                )

@@ -1,0 +1,31 @@
+"""The worlds in which mutants are tried."""
+
+from __future__ import annotations
+
+from codebotler.badinput import BadInput
+from roboeval.suite import Scenario, Suite, Task
+
+COUNT = 200
+"""How many worlds a suite makes for mutants, if nobody says another number."""
+
+
+def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
+    """The worlds of a task with what they require.
+
+    Args:
+        suite: of the task.
+        task: the task.
+        count: how many worlds to make; by default 200, or those that are written out where all are.
+        seed: from which they are made.
+
+    Raises:
+        BadInput: worlds are to be made, and all of the suite's are written out.
+    """
+    if suite.further is not None:
+        return suite.further(task, count or COUNT, seed)
+    if count is not None:
+        raise BadInput(
+            f'the worlds of the suite "{suite.name}" are written out, and no further ones can be made; '
+            "leave --worlds out"
+        )
+    return task.scenarios

@@ -1,0 +1,137 @@
+"""Each operator by an example: what it changes in a program, and in what the robot then does."""
+
+from __future__ import annotations
+
+import ast
+import re
+import textwrap
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import TypedDict
+
+import pytest
+import yaml
+
+from codebotler.simulator.engine import run
+from codebotler.simulator.rules import Limits, Rules
+from codebotler.trace import Event, Outcome, Status
+from codebotler.world import Person, Room, World
+from roboeval.mutation.operator import Operator, Setting
+from roboeval.mutation.operators import OPERATORS
+from roboeval.mutation.rewriting import changed, read
+
+WORLD = World(
+    rooms=(
+        Room("hall"),
+        Room("alice's office", people=(Person("alice", ("yes",)),)),
+        Room("bob's office", people=(Person("bob", ("no",)),)),
+        Room("store", objects=("mug", "stapler")),
+        Room("lobby"),
+    ),
+    robot="hall",
+)
+SETTING = Setting.of([WORLD])
+RULES = Rules(literals="as-written", limits=Limits(calls=20))
+BY_NAME = {operator.name: operator for operator in OPERATORS}
+
+
+class Example(TypedDict):
+    """What an operator makes of the body of a `task_program`, and what the robot does before and after."""
+
+    operator: str
+    before: str
+    after: str
+    did: str
+    does: str
+
+
+EXAMPLES: list[Example] = yaml.safe_load(Path(__file__).with_name("operators.yaml").read_text())
+NAMES = [example["operator"] for example in EXAMPLES]
+
+
+def program(body: str) -> str:
+    """A program with this body, as all programs with its tree are written."""
+    return ast.unparse(ast.parse("def task_program():\n" + textwrap.indent(body, "    ")))
+
+
+def mutants(operator: Operator, body: str) -> Iterator[str]:
+    """What an operator makes of a body."""
+    source = read(program(body))
+    assert source is not None
+    found = (changed(source, edit) for edit in operator(source, SETTING))
+    yield from (one for one in found if one is not None)
+
+
+@cache
+def outcomes() -> dict[str, Outcome]:
+    """How all programs of the examples ended."""
+    programs = [program(body) for example in EXAMPLES for body in (example["before"], example["after"])]
+    ended = run(((source, WORLD) for source in programs), workers=2, rules=RULES)
+    return dict(zip(programs, ended, strict=True))
+
+
+def told(outcome: Outcome) -> str:
+    """What a robot did, on one line."""
+    end = "" if outcome.status is Status.FINISHED else f"({outcome.error.kind if outcome.error else ''})"
+    return "; ".join([*map(told_event, outcome.trace[:8]), *([end] if end else [])])
+
+
+def told_event(event: Event) -> str:
+    found = {None: "", True: ": yes", False: ": no"}[event.found]
+    return f"{event.kind} {event.text}{found}{'' if event.answer is None else ': ' + event.answer}"
+
+
+def test_each_operator_has_an_example_a_name_and_a_sentence() -> None:
+    assert [operator.name for operator in OPERATORS] == NAMES
+    assert len(BY_NAME) == len(OPERATORS)
+    for operator in OPERATORS:
+        assert re.fullmatch(r"[a-z]+(-[a-z]+)*", operator.name)
+        assert re.fullmatch(r"[A-Z].+\.", operator.about)
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=NAMES)
+def test_what_it_makes_of_a_program(example: Example) -> None:
+    made = list(mutants(BY_NAME[example["operator"]], example["before"]))
+    assert program(example["after"]) in made
+    assert program(example["before"]) not in made
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=NAMES)
+def test_what_the_robot_does_instead(example: Example) -> None:
+    did, does = (outcomes()[program(example[body])] for body in ("before", "after"))
+    assert told(did) == example["did"]
+    assert told(does) == example["does"]
+    assert told(did) != told(does)
+
+
+LEFT_ALONE = {
+    "off-by-one": ("import time\ntime.sleep(1)", "say(str(72 + 3))"),
+    "see-nothing": ("is_in_room('person') or is_in_room('bob')", "is_in_room('bob')"),
+    "and-or": ("say(str(is_in_room('person') or is_in_room('bob')))",),
+    "drop-the-else": ("import time\nif True:\n    say('a')\nelse:\n    time.sleep(1)",),
+    "swap-steps": ("say('hello')\nsay('good day')", "n = 1\nsay('hello')"),
+    "wrong-thing": ("pick('red mug with a stapler')",),
+    "swap-values": ("for kind in ['mug']:\n    say(f'{kind}: {len(kind)}')",),
+    "vague-question": ("ask('bob', 'What would you like?', ['tea', 'water'])",),
+    "drop-the-return": ("go_to('lobby')",),
+    "say-before-asking": ("answer = ask('bob', 'Lunch?', ['yes', 'no'])\nsay(answer)",),
+    "drop-a-condition": ("while get_current_location() != 'lobby':\n    go_to('lobby')",),
+}
+"""What an operator has no business with: there it would make nothing wrong, or no program at all."""
+
+
+@pytest.mark.parametrize(("name", "body"), [(name, body) for name in LEFT_ALONE for body in LEFT_ALONE[name]])
+def test_what_it_leaves_alone(name: str, body: str) -> None:
+    assert list(mutants(BY_NAME[name], body)) == []
+
+
+def test_names_by_place_and_by_keyword_are_the_same_to_operators() -> None:
+    body = "start = get_current_location()\ngo_to(location={})\nsay(message='hello')"
+    assert program(body.format("get_current_location()")) in mutants(
+        BY_NAME["return-to-here"], body.format("start")
+    )
+
+
+def test_another_person_keeps_the_spelling_of_the_first() -> None:
+    assert list(mutants(BY_NAME["wrong-person"], "say('BOB and bob')")) == [program("say('Alice and bob')")]
