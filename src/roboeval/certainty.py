@@ -21,6 +21,7 @@ SEED = 0
 DRAWS = 10_000
 LEVEL = 0.95
 POWER = 0.8
+FEW = 8  # clusters below which the bootstrap knows too few means, so that its interval is too narrow
 EXACT = 20  # so many clusters have 2 to the power of 20 signs, all of which are tried
 ROUNDING = 1e-12
 CHUNK = 1_000  # draws that are held at one time

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -16,7 +15,16 @@ from rich.text import Text
 from codebotler.badinput import BadInput
 from codebotler.storyboard import grid
 from codebotler.terminal import visible
-from roboeval.certainty import DIFFERENCE, Needed, by_bootstrap, by_formula, needed, p_by_signs
+from roboeval.certainty import (
+    DIFFERENCE,
+    FEW,
+    ROUNDING,
+    Needed,
+    by_bootstrap,
+    by_formula,
+    needed,
+    p_by_signs,
+)
 from roboeval.metrics import Estimate
 from roboeval.suite import Suite
 
@@ -125,7 +133,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
 def verdict(comparison: Comparison, names: tuple[str, str], *, level: float = 0.05) -> str:
     """In a sentence, which is better, as far as these prompts can tell."""
     difference = comparison.over_tasks.mean
-    if difference == 0:
+    if abs(difference) < ROUNDING:
         return f"{names[0]} and {names[1]} pass equally often."
     better, other = (names[1], names[0]) if difference > 0 else names
     by = f"{100 * abs(difference):.1f} points"
@@ -139,11 +147,16 @@ def verdict(comparison: Comparison, names: tuple[str, str], *, level: float = 0.
     return f"{better} passes more often than {other} by {by}, which chance alone may well give."
 
 
+def told_of(about: Mapping[str, Any], head: Mapping[str, Any]) -> dict[str, Any]:
+    """What run.json says of how completions were asked for, and KEY.json of how they were judged."""
+    return {**about, **{name: head.get(name) for name in ("python", "codebotler")}}
+
+
 def unlike(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
     """What two runs differ in that may explain a difference beside the model.
 
     Args:
-        first: what run.json and KEY.json say of the one.
+        first: what is `told_of` the one.
         second: the same of the other.
     """
     told = []
@@ -151,7 +164,7 @@ def unlike(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
         a, b = first.get(name), second.get(name)
         if a is not None and b is not None and a != b:
             told.append(f"{words} differ: {_said(a)} and {_said(b)}")
-    settings = [dict(one.get("settings") or {}) for one in (first, second)]
+    settings = [found if isinstance(found := one.get("settings"), dict) else {} for one in (first, second)]
     if bool(settings[0]) != bool(settings[1]):
         told.append("of one of them nobody recorded the settings")
     for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
@@ -172,12 +185,13 @@ def _said(value: object) -> str:
     return "none" if value is None else visible(str(value))[:12]
 
 
-def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite) -> None:
+def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, again: Mapping[str, str]) -> None:
     """Refuse runs that were judged by suites of different content.
 
     Args:
         heads: what KEY.json says of each run, by its path.
         suite: as it is now.
+        again: the command that judges a run, by its path.
 
     Raises:
         BadInput: the hashes of their suites differ.
@@ -190,7 +204,7 @@ def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite) -> N
     hashes = f"{digests[stale][:8]} and {digests[other][:8]}"
     raise BadInput(
         f"{stale} and {other} were judged by suites of other content ({hashes}); "
-        f"`roboeval evaluate {shlex.quote(stale)} --redo` judges it by the suite as it is now"
+        f"`{again[stale]} --redo` judges it by the suite as it is now"
     )
 
 
@@ -234,14 +248,14 @@ def render(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
     rows.add_row(
         "difference",
         f"{comparison.over_tasks.mean:+.3f}",
-        f"over {comparison.prompts} prompts that both have",
+        f"over {prompts(comparison.prompts)} that both have",
     )
-    for name, estimate, p in (
-        ("95% interval, prompts drawn at random", comparison.over_prompts, comparison.p_prompts),
-        ("95% interval, tasks drawn at random", comparison.over_tasks, comparison.p_tasks),
-        ("the same by bootstrap", comparison.bootstrap, None),
+    few = "too narrow for so few tasks" if len(comparison.tasks) < FEW else ""
+    for name, estimate, told in (
+        ("95% interval, prompts drawn at random", comparison.over_prompts, _p(comparison.p_prompts)),
+        ("95% interval, tasks drawn at random", comparison.over_tasks, _p(comparison.p_tasks)),
+        ("the same by bootstrap", comparison.bootstrap, few),
     ):
-        told = "" if p is None else f"p = {p:.4f}" if p >= SMALL else f"p < {SMALL}"
         rows.add_row(name, f"{estimate.low:+.3f} to {estimate.high:+.3f}", told)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     table.add_column("task", overflow="fold")
@@ -252,6 +266,15 @@ def render(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
     sentence = Text(verdict(comparison, (a, b)), "bold")
     return Group(sentence, Text(), rows, Text(), *map(Text, to_tell(comparison)), Text(), table)
+
+
+def _p(value: float) -> str:
+    return f"p = {value:.4f}" if value >= SMALL else f"p < {SMALL}"
+
+
+def prompts(count: int) -> str:
+    """Such as `1 prompt` or `20 prompts`."""
+    return f"{count:,} prompt{'s' * (count != 1)}"
 
 
 def to_tell(comparison: Comparison) -> list[str]:

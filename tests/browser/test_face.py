@@ -15,6 +15,11 @@ from pageserver import PageServer
 from server import Server
 from viewing import PHONE, OpenPage
 
+TOUCHES = """() => new MutationObserver(() =>
+    setTimeout(() => document.querySelector("#options button")?.click(), 100),
+).observe(document.getElementById("options"), { childList: true })"""
+"""Touches the first answer to each further question a tenth of a second after it appears."""
+
 FAR = "def task_program():\n    for _ in range(50):\n        go_to('kitchen')\n        go_to('study')\n"
 
 
@@ -84,6 +89,23 @@ def test_what_the_robot_does_is_seen(server: PageServer, opened: OpenPage) -> No
     assert server.call("GET", "/api/robot").data["reason"] == "stopped by somebody at the face"
 
 
+def test_stop_needs_nothing_of_the_rest_of_the_face(server: PageServer, opened: OpenPage) -> None:
+    face = face_of(server, opened)
+    server.run(FAR)
+    expect(face.locator("#doing")).to_have_text("On my way: kitchen")
+    held: list[Route] = []
+
+    def hold(route: Route) -> None:  # Playwright wants a function of Python's own
+        held.append(route)
+
+    face.route("**/static/face.js", hold)
+    face.reload(wait_until="commit")
+    face.locator("#stop").click()
+    expect(face.locator("#stop-told")).to_have_text("The robot has stopped.")
+    assert held
+    expect(face.locator("#doing")).to_be_empty()
+
+
 def test_two_faces_are_in_step_and_the_first_answer_counts(server: PageServer, opened: OpenPage) -> None:
     one, other = face_of(server, opened), face_of(server, opened, PHONE, expecting=REFUSED)
     server.run(ASKS)
@@ -150,6 +172,8 @@ def test_a_face_that_comes_late_shows_what_is_asked(server: PageServer, opened: 
 def test_a_touch_for_one_question_answers_no_other(server: PageServer, opened: OpenPage) -> None:
     face = face_of(server, opened)
     server.run(TWICE)
+    expect(option(face, "Yes")).to_be_enabled()
+    face.evaluate(TOUCHES)
     option(face, "Yes").dblclick()
     expect(face.locator("#question")).to_have_text("Are you sure?")
     expect(option(face, "No")).to_be_enabled()

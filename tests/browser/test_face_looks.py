@@ -50,6 +50,17 @@ def expect_in_sight(page: Page) -> None:
         assert button.evaluate("e => e.scrollWidth <= e.clientWidth")
 
 
+def expect_names_beside_stop(page: Page) -> None:
+    """The names of all pages can be read, however many there are and however small the screen."""
+    stop = page.locator("#stop").bounding_box()
+    assert stop is not None
+    for link in page.locator("nav a").all():
+        box = link.bounding_box()
+        assert box is not None
+        assert box["x"] + box["width"] <= stop["x"]
+        assert box["y"] + box["height"] <= 60
+
+
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
 def test_face(office: PageServer, opened: OpenPage, shots: Path, screen: Screen) -> None:
     which, size, dark = screen
@@ -67,6 +78,8 @@ def test_face(office: PageServer, opened: OpenPage, shots: Path, screen: Screen)
         expect_no_grave_fault(at)
         if at is page:
             expect_in_sight(page)
+        else:
+            expect_names_beside_stop(at)
 
     expect(page.locator("#doing")).not_to_be_empty()
     look("face-idle")

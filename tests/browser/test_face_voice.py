@@ -52,6 +52,15 @@ def test_muting_is_remembered(server: PageServer, opened: OpenPage) -> None:
     until(face, "window.spoken.includes('She says Yes')")
 
 
+def test_who_answers_needs_not_hear_the_question_to_its_end(server: PageServer, opened: OpenPage) -> None:
+    face = face_of(server, opened)
+    server.run(ASKS)
+    expect(option(face, "Yes")).to_be_enabled()
+    assert face.evaluate("window.hushed") == 0
+    option(face, "Yes").click()
+    until(face, "window.hushed === 1")
+
+
 def test_a_browser_that_waits_for_a_touch_says_so(server: PageServer, opened: OpenPage) -> None:
     """With the browser's own speech synthesis, which nobody hears here."""
     face = face_of(server, opened, script="")
@@ -95,6 +104,18 @@ def test_nobody_is_listened_to_before_somebody_switches_it_on(server: PageServer
     expect(voice).not_to_be_checked()
     expect(option(face, "Yes")).to_be_enabled()
     assert face.evaluate("window.listening.length") == 0, "who comes next has not agreed"
+
+
+def test_the_robot_does_not_listen_to_itself(server: PageServer, opened: OpenPage) -> None:
+    face = face_of(server, opened, script=f"window.isSlow = true;{SPEAKING}{HEARING}")
+    face.get_by_role("switch", name="Answer by voice").click()
+    server.run(ASKS.replace('    say("Good morning")\n', ""))
+    expect(option(face, "Yes")).to_be_enabled()
+    expect(face.locator("body.speaks")).to_be_visible()
+    assert face.evaluate("window.listening.length") == 0
+    face.evaluate("window.end()")
+    until(face, "window.listening.length === 1")
+    expect(face.locator("body.speaks")).to_be_hidden()
 
 
 def test_a_spoken_answer_is_shown_before_it_is_taken(server: PageServer, opened: OpenPage) -> None:

@@ -11,6 +11,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
 from made_up_runs import HOSTILE, SUITE, made_up
 from roboeval.report.contents import Wishes, sections
@@ -29,6 +30,13 @@ addEventListener("load", () => {
   seen.push("down: " + names());
   button.click();
   seen.push("up: " + names() + " " + button.parentNode.getAttribute("aria-sort"));
+  const prompts = document.querySelector("#table-prompts table");
+  const last = prompts.tHead.rows[0].cells.length - 1;
+  for (const way of ["down", "up"]) {
+    prompts.tHead.querySelectorAll("button")[last].click();
+    const cells = [...prompts.tBodies[0].rows].map((row) => row.cells[last].textContent);
+    seen.push("missing " + way + ": " + cells);
+  }
   const groups = [...document.querySelectorAll(".cluster")];
   const shown = () => groups.filter((one) => one.offsetParent !== null).length;
   const all = shown();
@@ -67,7 +75,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     runs = [
         made_up("strong", {"Visit": (9, 8), "CountMugs": (10, 3)}),
         made_up("weak", {"Visit": (0, 2), "CountMugs": (1, 0)}),
-        made_up(HOSTILE, {"Visit": (4, 5)}),
+        made_up(HOSTILE, {"Visit": (4, 5)}),  # and nothing else, so that some cells are empty
     ]
     for run in runs:
         assert isinstance(run.written, dict)
@@ -104,6 +112,8 @@ def test_sorting_filtering_and_printing(chromium: str, page: Path, tmp_path: Pat
     assert title[1].split(" | ") == [
         "down: stro,&lt;scr,weak",
         "up: weak,&lt;scr,stro ascending",
+        "missing down: 0.500,0.400,-,-",
+        "missing up: 0.400,0.500,-,-",
         "filtered: true 10 of 46 groups, 10 completions",
         "none: 0",
         "open: 0",
@@ -112,6 +122,23 @@ def test_sorting_filtering_and_printing(chromium: str, page: Path, tmp_path: Pat
         "hacked: true",
         "wide: true",
     ]
+
+
+A4 = 186 * 96 // 25  # pixels between margins of 12 mm
+
+
+def test_nothing_is_cut_off_on_paper(browser: Browser, page: Path) -> None:
+    opened = browser.new_page(viewport={"width": A4, "height": 1000})
+    opened.goto(page.as_uri())
+    opened.emulate_media(media="print")
+    opened.evaluate("dispatchEvent(new Event('beforeprint'))")
+    ends = opened.evaluate(
+        "[...document.querySelectorAll('table, img, pre')].map((one) => one.getBoundingClientRect())"
+        ".filter((box) => box.width > 0).map((box) => box.right)"
+    )
+    opened.close()
+    assert len(ends) > 15
+    assert max(ends) <= A4
 
 
 def test_without_a_script_it_reads_as_a_document(chromium: str, page: Path, tmp_path: Path) -> None:

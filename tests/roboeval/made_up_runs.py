@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -114,6 +115,7 @@ def usual() -> list[JudgedRun]:
     ]
 
 
+@cache
 def cases() -> dict[str, list[JudgedRun]]:
     """What has broken figures elsewhere."""
     one = made_up("one", {"Visit": (4,)})
@@ -131,6 +133,9 @@ def cases() -> dict[str, list[JudgedRun]]:
         "all failures": [made_up("hopeless", {"Visit": (0, 0), "CountMugs": (0,)}, trials=None)],
         "unfinished": [replace(one, total=500), *usual()[:1]],
         "40 models": many,
+        "long names": [
+            made_up(f"openai-chat:somebody/model-34b-hf-{n}", {"Visit": (n, 5)}) for n in range(7)
+        ],
         "hostile": [made_up(HOSTILE, {"Visit": (4, 5)})],
     }
 

@@ -4,6 +4,7 @@ import math
 import random
 from collections.abc import Callable
 from itertools import product
+from statistics import NormalDist
 
 import pytest
 
@@ -58,6 +59,14 @@ def test_the_bootstrap_repeats_itself() -> None:
 def test_the_bootstrap_of_two_clusters_by_hand() -> None:
     # The means of two draws are 0, 0.5, 0.5 or 1; expanded percentiles of two clusters are the ends.
     assert by_bootstrap([[0.0], [1.0]]) == Estimate(0.5, 0.0, 1.0)
+
+
+def test_the_bootstrap_is_as_wide_as_the_formula_where_values_are_normal() -> None:
+    # Plain percentiles would be narrower by the square root of 11 / 12, and by 1.96 over Student's t.
+    normal = NormalDist(0.5, 0.1)
+    clusters = [[normal.inv_cdf((n + 0.5) / 12)] for n in range(12)]
+    formula, drawn = by_formula(clusters), by_bootstrap(clusters, draws=40_000)
+    assert drawn.high - drawn.low == pytest.approx(formula.high - formula.low, rel=0.02)
 
 
 METHODS: dict[str, Callable[[Clusters, int], Estimate]] = {

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -32,7 +33,7 @@ def served(url: str, *more: str, model: str = "completions:tiny", tasks: str = T
 # --- with a recorded model
 
 
-def test_from_nothing_to_tables(tmp_path: Path) -> None:
+def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
     words = ["run", "--model", "recorded:hasty", "--num-completions", "3"]
     ended = roboeval(*words, cwd=tmp_path)
     assert ended.status == 0
@@ -41,9 +42,39 @@ def test_from_nothing_to_tables(tmp_path: Path) -> None:
     run = tmp_path / "runs" / "recorded-hasty"
     assert len(set(keys(run))) == 240
     assert (run / "evaluations" / "paper.jsonl").read_bytes().count(b"\n") == 240
-    again = roboeval(*words, cwd=tmp_path)
+    assert ended.err.endswith("the report is in runs/recorded-hasty/report/index.html\n")
+    text = (run / "report" / "index.html").read_text()
+    assert "roboeval report runs/recorded-hasty --out runs/recorded-hasty/report" in text
+    shutil.rmtree(run / "report")
+    again = roboeval(*words, "--no-report", cwd=tmp_path)
     assert (again.status, again.out) == (0, ended.out)
     assert "240 of 240 completions are there already" in again.err
+    assert not (run / "report").exists()
+
+
+def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
+    words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--out", "run", "--workers", "1"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "roboeval.cli", *words],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    checks = tmp_path / "run" / "checks" / "paper.jsonl"
+    while process.poll() is None and not (checks.exists() and checks.stat().st_size):
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130
+    assert err.endswith(
+        "roboeval: stopped; verdicts are in run; `roboeval report run --out run/report` writes the report\n"
+    ), err
+    assert not (tmp_path / "run" / "report").exists()
+    kept = checks.read_bytes()
+    assert roboeval("resample", "run", cwd=tmp_path).status == 0
+    assert checks.read_bytes().startswith(kept[: kept.rfind(b"\n") + 1])
+    assert roboeval("show", "run", cwd=tmp_path).status == 0
 
 
 def test_generate_says_where_and_what_next(tmp_path: Path) -> None:

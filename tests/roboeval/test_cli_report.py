@@ -19,7 +19,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("hasty", "careful"):
         made = roboeval(
             *("run", "--model", f"recorded:{name}", "--tasks", "LunchTime,SayGoodDay"),
-            *("--num-completions", "4", "--out", name),
+            *("--num-completions", "4", "--out", name, "--no-report"),
             cwd=folder,
         )
         assert made.status == 0, made
@@ -47,34 +47,29 @@ def test_a_report_of_two_runs(runs: Path) -> None:
 
 
 def test_an_unfinished_run_is_reported_as_far_as_it_goes(runs: Path) -> None:
-    shutil.copytree(runs / "careful", runs / "part")
+    shutil.copytree(runs / "careful", runs / "part", ignore=shutil.ignore_patterns("checks"))
     rows = runs / "part" / "evaluations" / "paper.jsonl"
     lines = rows.read_text().splitlines(keepends=True)
     rows.write_text("".join(lines[:-3]))
-    made = roboeval("report", "part", "--out", "partly", "--no-check", cwd=runs)
+    price = ("--price", "recorded:careful=1/2")
+    made = roboeval("report", "part", "--out", "partly", *price, "--no-check", cwd=runs)
     assert made.status == 0, made
     assert "37 of 40 completions judged, and only these count" in made.err
-    assert "only 37 of 40 completions are judged" in (runs / "partly" / "index.html").read_text()
+    text = (runs / "partly" / "index.html").read_text()
+    assert "only 37 of 40 completions are judged" in text
+    assert "roboeval report part --out partly --no-check --price recorded:careful=1/2" in text
+    assert not (runs / "partly" / "figures" / "accepted.png").exists()
+    assert not (runs / "part" / "checks").exists()
     rows.write_text("")
     nothing = roboeval("report", "part", "--out", "none", "--no-check", cwd=runs)
     assert nothing.status == 2
     assert "no completion has been judged" in nothing.err
 
 
-def test_prices(runs: Path) -> None:
-    price = ("--price", "recorded:careful=1/2", "--no-check")
-    made = roboeval("report", "careful", "--out", "paid", *price, cwd=runs)
-    assert made.status == 0, made
-    text = (runs / "paid" / "index.html").read_text()
-    assert "roboeval report careful --out paid --no-check --price recorded:careful=1/2" in text
+def test_prices_that_are_none(runs: Path) -> None:
     said = refused("report", runs / "careful", "--out", runs / "x", "--price", "careful", "--no-check")
     assert said.startswith('"careful" is no price; write MODEL=INPUT/OUTPUT')
-
-
-def test_without_a_check_no_program_runs(runs: Path) -> None:
-    made = roboeval("report", "careful", "--out", "quick", "--no-check", cwd=runs)
-    assert made.status == 0, made
-    assert not (runs / "quick" / "figures" / "accepted.png").exists()
+    assert not (runs / "x").exists()
 
 
 def test_what_is_refused(runs: Path, tmp_path: Path) -> None:
@@ -95,7 +90,7 @@ def test_runs_of_different_suites_are_not_set_side_by_side(runs: Path) -> None:
     head.write_text(kept)
     assert ended.status == 2
     assert re.search(r"other content \(ffffffff and [0-9a-f]{8}\)", ended.err), ended
-    assert "`roboeval evaluate careful --redo`" in ended.err
+    assert "`roboeval evaluate careful --tasks LunchTime,SayGoodDay --redo`" in ended.err
     assert not (runs / "mixed").exists()
 
 

@@ -1,6 +1,7 @@
 """Comparing two runs: by hand, and as a person meets it."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,7 @@ def test_verdicts() -> None:
     assert "two is better than one by 10.0 points; tasks" in said([0.1] * 10, 10)
     assert "one is better than two by 10.0 points on prompts of these tasks" in said([-0.1] * 10, 2)
     assert "chance alone may well" in said([0.3, -0.2], 2)
+    assert said([0.1, 0.2, -0.3], 3) == "one and two pass equally often."  # but for the last digit
 
 
 def test_how_much_it_takes_is_said() -> None:
@@ -82,12 +84,33 @@ def test_what_is_unlike() -> None:
         "temperature differs: 0.2 and 0.8",
     ]
     assert unlike(one, {"python": "3.11"}) == ["of one of them nobody recorded the settings"]
+    for wrong in ([1, 2], "abc", 3):
+        assert unlike(one, {**one, "settings": wrong}) == ["of one of them nobody recorded the settings"]
 
 
 def test_other_suites_are_refused() -> None:
-    expect_same_suite({"a": {"digest": "1"}, "b": {"digest": "1"}}, SUITE)
-    with pytest.raises(BadInput, match=r"b and a were judged by suites of other content \(1 and 00000000\)"):
-        expect_same_suite({"a": {"digest": SUITE.digest}, "b": {"digest": "1"}}, SUITE)
+    again = {"a": "roboeval evaluate a", "b": "roboeval evaluate b --suite mine"}
+    expect_same_suite({"a": {"digest": "1"}, "b": {"digest": "1"}}, SUITE, again)
+    with pytest.raises(
+        BadInput, match=r"b and a were judged by suites of other content \(1 and 00000000\)"
+    ) as e:
+        expect_same_suite({"a": {"digest": SUITE.digest}, "b": {"digest": "1"}}, SUITE, again)
+    assert "`roboeval evaluate b --suite mine --redo` judges it" in str(e.value)
+
+
+def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
+    def shown(tasks: int) -> str:
+        a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
+        return printed(render(compared(a, {key: value / 2 for key, value in a.items()}), ("a", "b")))
+
+    assert re.search(r"by bootstrap .* too narrow for so few tasks", shown(7))
+    assert "too narrow" not in shown(8)
+
+
+def test_one_prompt_is_not_many() -> None:
+    assert "over 1 prompt that both have" in printed(
+        render(compared({("A", 0): 1}, {("A", 0): 0}), ("a", "b"))
+    )
 
 
 @pytest.fixture(scope="module")

@@ -98,6 +98,9 @@ def test_the_command(runs: Path) -> None:
     assert made.status == 0, made
     assert made.out.startswith("found ")
     assert "GrilledCheese" not in made.out
+    of_the_task = json.loads(roboeval("find", runs, "--task", "SayGoodDay", "--json").out)
+    assert of_the_task["looked_at"] == len(of_the_task["found"]) > 0
+    assert f" of {of_the_task['looked_at']} completions" in made.out
     assert " passes, and differs in " in made.out
     data = json.loads(roboeval("find", runs, "--json").out)
     assert data["looked_at"] == len(data["found"])

@@ -60,14 +60,15 @@ def find(
     programs = {completion.key: completion.program for completion in evaluation.judged()}
     failed = [one.row for one in found if one.row is not None]
     right = [one.key for one in every if one.passed]
+    total = sum(question.task in {None, one.key[0]} for one in every)
     together = groups(failed, programs)
     shown = together if json else together[:most]
     telling = clusters(shown, right, programs, known, ablated=ablation)
     told = list(watched(telling, "comparing", len(shown)))
     if json:
-        print_found(found, told, len(every))
+        print_found(found, told, total)
     else:
-        show_found(found, told, len(every), failed=len(failed), groups=len(together))
+        show_found(found, told, total, failed=len(failed), groups=len(together))
 
 
 def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:

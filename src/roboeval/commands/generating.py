@@ -1,4 +1,4 @@
-"""Commands that have a model write programs: generate, and run, which judges them as well."""
+"""Commands that have a model write programs: generate, and run, which judges and reports as well."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from codebotler.options import (
 )
 from roboeval.commands.judging import evaluate
 from roboeval.commands.options import JsonOption, SuiteOption, TasksOption, command, load, named
+from roboeval.commands.reporting import report
 from roboeval.terminal import metered, note
 
 if TYPE_CHECKING:
@@ -95,9 +96,12 @@ def run(
     require_isolation: Annotated[
         bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
     ] = False,
+    with_report: Annotated[
+        bool, typer.Option("--report/--no-report", help="Write the report, to the folder report of the run.")
+    ] = True,
     json: JsonOption = False,
 ) -> None:
-    """Have a model write programs for a suite, judge them, and print the tables."""
+    """Have a model write programs for a suite, judge them, print the tables, and write the report."""
     path = generated(
         model,
         out,
@@ -122,6 +126,19 @@ def run(
         require_isolation=require_isolation,
         json=json,
     )
+    if with_report:
+        reported(path, suite, workers)
+
+
+def reported(path: Path, suite: str, workers: int | None) -> None:
+    """Write the report of a run into it; ends with a sentence if that is interrupted."""
+    out = path / "report"
+    try:
+        report([path], out, suite=suite, workers=workers)
+    except KeyboardInterrupt:
+        again = command("report", path, "--out", out, suite=suite)
+        note(f"roboeval: stopped; verdicts are in {path}; `{again}` writes the report")
+        raise SystemExit(STOPPED) from None
 
 
 def generated(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
@@ -18,6 +18,7 @@ from roboeval.commands.options import (
     load,
     named,
     open_evaluation,
+    options_of,
 )
 from roboeval.commands.resampling import checked
 from roboeval.terminal import note, print_json, print_rich, watched
@@ -49,7 +50,6 @@ def report(
 ) -> None:
     """Draw the figures of the paper, and one page about how models do, why, and how sure that is."""
     from codebotler.terminal import busy
-    from roboeval.comparison import expect_same_suite
     from roboeval.report.contents import Wishes, headline, sections
     from roboeval.report.cost import expect_known, price_from
     from roboeval.report.reading import named_apart
@@ -58,7 +58,7 @@ def report(
     prices = tuple(map(price_from, price or ()))
     known = load(suite)
     evaluations = [open_evaluation(run, known, suite, ablated=False) for run in runs]
-    expect_same_suite({str(run): one.head for run, one in zip(runs, evaluations, strict=True)}, known)
+    expect_alike(runs, evaluations, known, suite)
     how = How(check=check, workers=workers or cores())
     read = named_apart([judged_run(one, known, suite, **how) for one in evaluations])
     expect_known(prices, read)
@@ -87,14 +87,14 @@ def compare(
     json: JsonOption = False,
 ) -> None:
     """Say by how much the second run passes more often than the first, and how sure that is."""
-    from roboeval.comparison import compared, comparison_data, expect_same_suite, render, unlike
+    from roboeval.comparison import compared, comparison_data, prompts, render, told_of, unlike
     from roboeval.metrics import score_by_prompt
     from roboeval.run import load_head
 
     known = load(suite)
     paths = first, second
     evaluations = [open_evaluation(path, known, suite, ablated=ablation) for path in paths]
-    expect_same_suite({str(path): one.head for path, one in zip(paths, evaluations, strict=True)}, known)
+    expect_alike(paths, evaluations, known, suite)
     scores, abouts = [], []
     for evaluation in evaluations:
         rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
@@ -102,17 +102,33 @@ def compare(
         expect_current(evaluation, known, suite)
         scores.append({(p.task, p.prompt): p.pass_at(1) for task in tasks for p in task.prompts})
         about = load_head(evaluation.run.about) if evaluation.run.about.exists() else {}
-        abouts.append({**about, **{k: evaluation.head.get(k) for k in ("python", "codebotler")}})
+        abouts.append(told_of(about, evaluation.head))
     result = compared(*scores)
     for difference in unlike(*abouts):
         note(f"warning: {difference}")
     if result.left_out:
-        note(f"{result.left_out} prompts that only one of them has are left out")
+        note(f"left out, since only one of them has them: {prompts(result.left_out)}")
     names = str(first), str(second)
     if json:
         print_json({**comparison_data(result, names), "warnings": unlike(*abouts)})
     else:
         print_rich(render(result, names))
+
+
+def expect_alike(
+    paths: Sequence[Path], evaluations: Sequence[Evaluation], suite: Suite, suite_name: str
+) -> None:
+    """Refuse runs that were judged by suites of different content."""
+    from roboeval.comparison import expect_same_suite
+
+    heads, again = {}, {}
+    for path, one in zip(paths, evaluations, strict=True):
+        heads[str(path)] = one.head
+        ablated = bool(one.head.get("ablation"))
+        again[str(path)] = command(
+            "evaluate", path, *options_of(one, suite), suite=suite_name, ablated=ablated
+        )
+    expect_same_suite(heads, suite, again)
 
 
 class How(TypedDict):

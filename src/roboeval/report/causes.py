@@ -114,7 +114,7 @@ def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
         return ["None of these runs names a model of the paper, so no published causes stand beside them."]
     all_tasks = set(paper.published()["pass_at_1"])
     parts = [run.name for run in known if set(run.by_task) != all_tasks]
-    notes = [paper.TWO_SUMS]
+    notes = [*paper.taken_for(runs), paper.TWO_SUMS]
     if parts:
         notes.append(
             f"Published causes are of all {len(all_tasks)} tasks of the paper, which is more than "

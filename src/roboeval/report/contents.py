@@ -201,7 +201,8 @@ def _cells(runs: Sequence[JudgedRun], suite: Suite) -> Section:
     unknown = [run.name for run in runs if paper.model_of(run) is None]
     prose = None
     if beside is not None and unknown:
-        prose = Prose((f"The paper has no numbers of {', '.join(unknown)}.",))
+        names = ", ".join(unknown)
+        prose = Prose((f"No published numbers of {names}: no model of the paper is called so.",))
     parts = _parts(scores.prompt_sheet(runs, suite), beside, prose)
     return Section("prompts", "Every prompt, and the paper", parts)
 

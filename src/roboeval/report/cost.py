@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from codebotler.badinput import BadInput
+from roboeval.records import Key
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
 from roboeval.resampling import LIMITS, Prompt, chances
+from roboeval.tables import key_of
 
 MILLION = 1_000_000
 ABOUT = (
-    "Sums over the completions of which the run says how many tokens and how much time they took; what "
-    "passes is counted among the same. Money is in the unit of the prices that were given with --price."
+    "Sums over the completions that were judged. Tokens and time are left out where a run does not tell them "
+    "of each of its completions. Money is in the unit of the prices that were given with --price."
 )
 BUDGET = (
     "How many requests a program takes on average where rejected ones are asked for again, and how many "
@@ -79,33 +82,45 @@ class Spent:
 
 def spent(run: JudgedRun) -> Spent:
     """What the completions of a run took, as far as it says so of each."""
-    rows = [(row["passed"], run.written.get((row["task"], row["prompt"], row["index"]))) for row in run.rows]
-    told = [(passed, w) for passed, w in rows if w is not None]
-    counted = [w for _, w in told if w.input_tokens is not None and w.output_tokens is not None]
-    tokens = [(w.input_tokens or 0, w.output_tokens or 0) for w in counted]
-    whole = len(counted) == len(rows) and any(a or b for a, b in tokens)
-    timed = [w.seconds for _, w in told if w.seconds is not None]
+    counted = list(_counted(run).values())
+    whole = len(counted) == len(run.rows) and any(a or b for a, b in counted)
+    told = (run.written.get(key_of(row)) for row in run.rows)
+    timed = [written.seconds for written in told if written is not None and written.seconds is not None]
     return Spent(
-        completions=len(rows),
-        passed=sum(passed for passed, _ in rows),
-        input_tokens=sum(a for a, _ in tokens) if whole else None,
-        output_tokens=sum(b for _, b in tokens) if whole else None,
-        seconds=sum(timed) if len(timed) == len(rows) and any(timed) else None,
+        completions=len(run.rows),
+        passed=sum(row["passed"] for row in run.rows),
+        input_tokens=sum(a for a, _ in counted) if whole else None,
+        output_tokens=sum(b for _, b in counted) if whole else None,
+        seconds=math.fsum(timed) if len(timed) == len(run.rows) and any(timed) else None,
     )
 
 
+def _counted(run: JudgedRun) -> dict[Key, tuple[int, int]]:
+    """The tokens of input and of output of the judged completions, where somebody counted them."""
+    keys = map(key_of, run.rows)
+    told = ((key, written) for key in keys if (written := run.written.get(key)) is not None)
+    return {
+        key: (written.input_tokens, written.output_tokens)
+        for key, written in told
+        if written.input_tokens is not None and written.output_tokens is not None
+    }
+
+
 def price_of(run: JudgedRun, prices: Iterable[Price]) -> Price | None:
-    """The price that was given for a run."""
-    return next((price for price in prices if price.model in {run.model, run.folder, run.name}), None)
+    """The price that was given for a run: that for its folder, or else that for its model."""
+    given = {price.model: price for price in prices}
+    return given.get(run.folder) or given.get(run.name) or given.get(run.model or "")
 
 
-def expect_known(prices: Iterable[Price], runs: Sequence[JudgedRun]) -> None:
-    """Refuse a price of what is not there.
+def expect_known(prices: Sequence[Price], runs: Sequence[JudgedRun]) -> None:
+    """Refuse a price of what is not there, and two prices of the same.
 
     Raises:
-        BadInput: no run has the model or the name.
+        BadInput: no run has the model or the name, or it is named twice.
     """
-    for price in prices:
+    for number, price in enumerate(prices):
+        if price.model in {other.model for other in prices[:number]}:
+            raise BadInput(f'--price names "{price.model}" twice; give one price')
         if not any(price_of(run, [price]) for run in runs):
             names = ", ".join(run.name for run in runs)
             raise BadInput(f'--price names "{price.model}", but the runs are {names}')
@@ -155,25 +170,13 @@ def budget_sheet(runs: Sequence[JudgedRun], prices: Sequence[Price]) -> Sheet | 
     """What a budget gives at each limit of retries; None if no run was checked."""
     rows: list[list[Cell]] = []
     for run in runs:
-        took = spent(run)
-        money = took.money(price_of(run, prices))
-        shares = _by_prompt(run)
-        for limit in LIMITS if run.trials else ():
-            asked = [requests(prompt, limit) for prompt in run.trials or ()]
-            passed = sum(chances(prompt.trials, limit).passed for prompt in run.trials or ())
-            weighed = zip(asked, run.trials or (), strict=True)
-            used = sum(n * shares.get((p.task, p.prompt), 0.0) for n, p in weighed) if took.tokens else None
-            paid = None if money is None or used is None or not took.tokens else used * money / took.tokens
-            rows.append(
-                [
-                    run.name,
-                    limit,
-                    sum(asked) / len(asked),
-                    1_000 * passed / sum(asked),
-                    _per(MILLION * passed, used) if used else None,
-                    _per(passed, paid) if paid else None,
-                ]
-            )
+        tokens = _of_a_request(run) if spent(run).tokens is not None else {}
+        price = price_of(run, prices)
+        rows += [
+            [run.name, limit, *_budget_cells(run.trials, limit, tokens, price)]
+            for limit in LIMITS
+            if run.trials
+        ]
     columns = (
         Column("model"),
         Column("retries", "count"),
@@ -185,10 +188,31 @@ def budget_sheet(runs: Sequence[JudgedRun], prices: Sequence[Price]) -> Sheet | 
     return sheet("budget", "What a budget gives", columns, rows, about=BUDGET) if rows else None
 
 
-def _by_prompt(run: JudgedRun) -> Mapping[tuple[str, int], float]:
-    """The mean number of tokens of a request, by prompt."""
-    tokens: defaultdict[tuple[str, int], list[int]] = defaultdict(list)
-    for (task, prompt, _), written in run.written.items():
-        if written.input_tokens is not None and written.output_tokens is not None:
-            tokens[task, prompt].append(written.input_tokens + written.output_tokens)
-    return {key: sum(those) / len(those) for key, those in tokens.items()}
+def _budget_cells(
+    prompts: Sequence[Prompt],
+    limit: int,
+    tokens: Mapping[tuple[str, int], tuple[float, float]],
+    price: Price | None,
+) -> list[Cell]:
+    asked = [requests(prompt, limit) for prompt in prompts]
+    passed = sum(chances(prompt.trials, limit).passed for prompt in prompts)
+    each = [tokens.get((prompt.task, prompt.prompt), (0.0, 0.0)) for prompt in prompts]
+    there, back = (math.fsum(n * t[at] for n, t in zip(asked, each, strict=True)) for at in (0, 1))
+    paid = 0.0 if price is None else there * price.input + back * price.output
+    return [
+        sum(asked) / len(asked),
+        1_000 * passed / sum(asked),
+        _per(MILLION * passed, there + back),
+        _per(MILLION * passed, paid),
+    ]
+
+
+def _of_a_request(run: JudgedRun) -> Mapping[tuple[str, int], tuple[float, float]]:
+    """The mean numbers of tokens of input and of output, by prompt."""
+    tokens: defaultdict[tuple[str, int], list[tuple[int, int]]] = defaultdict(list)
+    for (task, prompt, _), both in _counted(run).items():
+        tokens[task, prompt].append(both)
+    return {
+        key: (sum(a for a, _ in those) / len(those), sum(b for _, b in those) / len(those))
+        for key, those in tokens.items()
+    }

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 from codebotler.badinput import BadInput
-from roboeval.comparison import compared, verdict
+from roboeval.comparison import compared, told_of, unlike, verdict
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
 
@@ -24,6 +24,7 @@ def difference_sheet(runs: Sequence[JudgedRun]) -> tuple[Sheet, list[str]] | Non
     """All pairs as a table and in sentences; None if there is only one run."""
     rows: list[list[Cell]] = []
     said: list[str] = []
+    unequal: list[str] = []
     for first, second in _pairs(runs):
         try:
             found = compared(first.by_prompt, second.by_prompt)
@@ -31,6 +32,7 @@ def difference_sheet(runs: Sequence[JudgedRun]) -> tuple[Sheet, list[str]] | Non
             continue
         if len(said) < MOST_PAIRS:
             said.append(verdict(found, (first.name, second.name)))
+            unequal += _unlike(first, second)
         over = found.over_prompts, found.over_tasks
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]
         much = found.needed
@@ -52,8 +54,13 @@ def difference_sheet(runs: Sequence[JudgedRun]) -> tuple[Sheet, list[str]] | Non
     )
     if not rows:
         return None
-    notes = [MANY] if len(rows) > 1 else []
+    notes = [*([MANY] if len(rows) > 1 else []), *unequal]
     return sheet("differences", "Differences", columns, rows, about=ABOUT, notes=notes), said
+
+
+def _unlike(first: JudgedRun, second: JudgedRun) -> list[str]:
+    found = unlike(told_of(first.about, first.head), told_of(second.about, second.head))
+    return [f"{first.name} and {second.name}: {'; '.join(found)}."] if found else []
 
 
 def _pairs(runs: Sequence[JudgedRun]) -> list[tuple[JudgedRun, JudgedRun]]:

@@ -35,6 +35,7 @@ class Look:
     paper: str
     ink: str
     faint: str
+    quiet: str
     black: str
     middle: str
 
@@ -44,8 +45,12 @@ class Look:
         return self.black if colour == "#000000" else colour
 
 
-LIGHT = Look(paper="#ffffff", ink="#1b1b1f", faint="#d5d5da", black="#000000", middle="#7fb5d5")
-DARK = Look(paper="#17181c", ink="#e6e6ea", faint="#3d3f47", black="#ffffff", middle="#2b5f80")
+LIGHT = Look(
+    paper="#ffffff", ink="#1b1b1f", faint="#d5d5da", quiet="#6f6f78", black="#000000", middle="#7fb5d5"
+)
+DARK = Look(
+    paper="#17181c", ink="#e6e6ea", faint="#3d3f47", quiet="#8f919b", black="#ffffff", middle="#2b5f80"
+)
 
 
 @contextmanager

@@ -66,7 +66,7 @@ def failures(runs: Sequence[JudgedRun], suite: Suite) -> Failures:
 def _left_out(run: JudgedRun, sizes: Sequence[int]) -> Iterator[str]:
     if sizes:
         those = f"{len(sizes):,} smaller groups with {how_many(sum(sizes))}"
-        yield f"{run.name}: {those} are left out; `roboeval find {run.folder} --groups 1000` shows them."
+        yield f"{run.name}: {those} are left out; `roboeval find` shows as many as --groups says."
 
 
 def failures_sheet(found: Failures) -> Sheet:

@@ -33,6 +33,7 @@ from roboeval.suite import Suite
 LOWEST = 1e-3  # where the paper ends its axis
 A_ROW = 8  # tasks that stand beside each other
 FEWEST = 4  # tasks for which there is room, lest a single bar fill a page
+SHORT_NAME = 16  # letters up to which two names stand beside each other below a narrow figure
 BAR = 0.82  # of the room that a task has
 
 
@@ -63,7 +64,10 @@ def bars(runs: Sequence[JudgedRun], suite: Suite, look: Look) -> Figure:
         if line == 0:
             axes.set_title("(b) common sense only", loc="left")
     handles = [Patch(color=look.colour(i), label=brief(run.name)) for i, run in enumerate(runs)]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(runs), 5), handlelength=1.0)
+    columns = 5 if max(len(brief(run.name)) for run in runs) <= SHORT_NAME else 3
+    figure.legend(
+        handles=handles, loc="outside lower center", ncols=min(len(runs), columns), handlelength=1.0
+    )
     return figure
 
 
@@ -152,7 +156,9 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 
 def thresholds(runs: Sequence[JudgedRun], look: Look) -> Figure:
     """The share of prompts by threshold of pass@1, one line a model, on the paper's axis."""
-    figure = new_figure(NARROW if len(runs) <= MOST_COLOURS else WIDE, 2.75 + 0.13 * math.ceil(len(runs) / 2))
+    columns = _legend_columns([run.name for run in runs])
+    width = NARROW if len(runs) <= MOST_COLOURS else WIDE
+    figure = new_figure(width, 2.75 + 0.13 * math.ceil(len(runs) / columns))
     axes = figure.add_subplot()
     best = sorted(range(len(runs)), key=lambda i: -_mean_of(runs[i]))[:MOST_COLOURS]
     for number, run in enumerate(runs):
@@ -170,8 +176,17 @@ def thresholds(runs: Sequence[JudgedRun], look: Look) -> Figure:
     if len(runs) > MOST_COLOURS:
         axes.plot([], [], color=look.faint, linewidth=0.7, label=f"{len(runs) - MOST_COLOURS} others")
     _threshold_axes(axes)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2, handlelength=3.2)
+    _threshold_labels(axes)
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, handlelength=3.2
+    )
     return figure
+
+
+def _legend_columns(names: Sequence[str]) -> int:
+    """In how many columns a legend fits below a narrow figure."""
+    is_narrow = len(names) <= MOST_COLOURS
+    return 1 if is_narrow and max(len(brief(name)) for name in names) > SHORT_NAME else 2
 
 
 def _mean_of(run: JudgedRun) -> float:
@@ -183,28 +198,40 @@ def _line(axes: Axes, points: Sequence[tuple[float, float]], number: int, label:
     _steps(
         axes,
         points,
+        is_marked=True,
         color=look.colour(number),
         linestyle=DASHES[number % len(DASHES)],
         marker=MARKERS[number % len(MARKERS)],
         markersize=3.2,
-        markevery=[0, len(points)],
         label=label,
     )
 
 
-def _steps(axes: Axes, points: Sequence[tuple[float, float]], **style: Any) -> None:  # noqa: ANN401 - matplotlib's own
-    xs = [threshold for threshold, _ in points]
-    ys = [share for _, share in points]
-    axes.plot([*xs, LOWEST], [*ys, ys[-1]], drawstyle="steps-post", clip_on=False, **style)
+def _steps(
+    axes: Axes,
+    points: Sequence[tuple[float, float]],
+    *,
+    is_marked: bool = False,
+    **style: Any,  # noqa: ANN401 - matplotlib's own
+) -> None:
+    shown = [(threshold, share) for threshold, share in points if threshold >= LOWEST]
+    xs, ys = zip(*shown, (LOWEST, shown[-1][1]), strict=True)
+    ends = [0, len(shown)] if is_marked else None
+    axes.plot(xs, ys, drawstyle="steps-post", clip_on=False, markevery=ends, **style)
 
 
 def _threshold_axes(axes: Axes) -> None:
+    """Set what axes that share theirs share; to be set once, since each time all of them are set."""
     axes.set_xscale("log")
     axes.set_xlim(1, LOWEST)
     axes.set_xticks([1, 0.1, 0.01, LOWEST], ["1", "0.1", "0.01", "0.001"])
-    axes.tick_params(axis="x", which="minor", length=1.5)
     axes.xaxis.set_minor_formatter(NullFormatter())
     share_axis(axes)
+
+
+def _threshold_labels(axes: Axes) -> None:
+    axes.tick_params(axis="x", which="minor", length=1.5)
+    axes.grid(visible=True, axis="y")
     axes.set_xlabel("threshold of pass@1")
     axes.set_ylabel("prompts that reach it")
 
@@ -221,6 +248,7 @@ def limits(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
     rows = math.ceil(len(found) / columns)
     figure = new_figure(WIDE if columns > 1 else NARROW, 1.75 * rows + 0.55)
     all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    _threshold_axes(all_axes[0, 0])
     for number, axes in enumerate(all_axes.flat):
         if number >= len(found):
             axes.set_visible(False)
@@ -236,7 +264,7 @@ def limits(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
                 linewidth=1.0 if limit == 0 else 1.3,
                 label=label if number == 0 else None,
             )
-        _threshold_axes(axes)
+        _threshold_labels(axes)
         axes.set_title(brief(name), loc="left")
         axes.label_outer()
     handles, labels = all_axes[0, 0].get_legend_handles_labels()
@@ -249,9 +277,9 @@ def at_the_limit(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
     found = retries.checked(runs)
     if not found:
         return None
-    figure = new_figure(
-        NARROW if len(found) <= MOST_COLOURS else WIDE, 2.6 + 0.13 * math.ceil(len(found) / 2)
-    )
+    columns = _legend_columns([name for name, _ in found])
+    width = NARROW if len(found) <= MOST_COLOURS else WIDE
+    figure = new_figure(width, 2.6 + 0.13 * math.ceil(len(found) / columns))
     axes = figure.add_subplot()
     shares = [(name, retries.accepted(prompts)) for name, prompts in found]
     best = sorted(range(len(shares)), key=lambda i: (-shares[i][1][-1], i))[:MOST_COLOURS]
@@ -280,5 +308,7 @@ def at_the_limit(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
     share_axis(axes)
     axes.set_xlabel("retries at most")
     axes.set_ylabel("programs that are accepted")
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2, handlelength=3.2)
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, handlelength=3.2
+    )
     return figure

@@ -16,7 +16,7 @@ from roboeval.taxonomy import CLASSES, PYTHON, ROBOT, TASK
 
 FULL = "#00507d"  # the shade of a share of 1; one hue is read by every eye, and in print
 MOST_NUMBERS = 14  # rows or columns up to which each cell says its number
-HALF = 0.5  # the share from which writing is white
+DARK_FROM = 0.75  # the share from which white is read better than black
 PANELS = (
     (PYTHON, "(b) Python errors"),
     (ROBOT, "(c) robot errors"),
@@ -62,7 +62,7 @@ def draw_heat(axes: Axes, heat: Heat, look: Look) -> None:
     for row, shares in enumerate(heat.cells):
         for column, share in enumerate(shares):
             if share is not None:
-                colour = look.faint if share == 0 else look.ink if share < HALF else "white"
+                colour = look.quiet if share == 0 else look.ink if share < DARK_FROM else "white"
                 axes.text(
                     column + 0.5,
                     row + 0.5,
@@ -87,7 +87,9 @@ def causes_figure(causes: Sequence[Causes], look: Look) -> Figure:
     kinds = [kinds_in_order(causes, name) for name, _ in PANELS]
     tallest = max(3, *map(len, kinds))
     many = len(causes) > MOST_NUMBERS
+    longest = 0 if many else max(len(brief(one.name, 18)) for one in causes)
     heights = _heights(len(causes), tallest, many=many)
+    heights[1] += 0.04 * max(0, longest - 8)  # names of models stand aslant below the panels
     figure = new_figure(WIDE, sum(heights))
     above, below = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
     axes = above.add_subplot()
@@ -126,7 +128,7 @@ def _classes(axes: Axes, causes: Sequence[Causes], look: Look) -> None:
         )
         left = [a + b for a, b in zip(left, shares, strict=True)]
     axes.set_yticks(places, [brief(one.name, 34) for one in causes])
-    axes.invert_yaxis()
+    axes.set_ylim(len(causes) - 0.5, -0.5)
     axes.tick_params(axis="y", length=0)
     share_axis(axes, along="x")
 

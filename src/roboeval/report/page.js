@@ -6,21 +6,19 @@ for (const table of document.querySelectorAll("table")) {
     const cell = row.cells[at];
     return cell.dataset.v === undefined ? cell.textContent : Number(cell.dataset.v);
   };
-  const order = (a, b) => {
-    if (typeof a === typeof b) return typeof a === "number" ? a - b : a.localeCompare(b, "en", {numeric: true});
-    return typeof a === "number" ? -1 : 1;
-  };
+  const order = (a, b) => typeof a === "number" ? a - b : a.localeCompare(b, "en", {numeric: true});
   [...table.tHead.rows[0].cells].forEach((head, at) => {
     const button = document.createElement("button");
     button.type = "button";
     button.textContent = head.textContent;
     head.replaceChildren(button);
     button.addEventListener("click", () => {
-      const up = head.getAttribute("aria-sort") ? head.getAttribute("aria-sort") !== "ascending" : head.className === "text";
+      const up = head.getAttribute("aria-sort") ? head.getAttribute("aria-sort") !== "ascending" : head.classList.contains("text");
       for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
       head.setAttribute("aria-sort", up ? "ascending" : "descending");
       const rows = [...body.rows].map((row) => [value(row, at), row]);
-      rows.sort((a, b) => (up ? 1 : -1) * order(a[0], b[0]));
+      // Where some cells are numbers, those that are none come last, whichever way the others are sorted.
+      rows.sort(([a], [b]) => typeof a === typeof b ? (up ? 1 : -1) * order(a, b) : typeof a === "number" ? -1 : 1);
       body.append(...rows.map((row) => row[1]));
     });
   });

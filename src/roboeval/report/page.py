@@ -16,6 +16,7 @@ from roboeval.report.sheets import Cell, Column, Sheet, told
 
 WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
 LONG = 24  # rows from which a table is folded
+LONG_TEXT = 70  # characters from which a cell takes several lines
 STYLE = Path(__file__).with_name("page.css")
 SCRIPT = Path(__file__).with_name("page.js")
 Drawn = tuple[bytes, bytes]
@@ -129,7 +130,8 @@ def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
         words = _text(told(cell, column.kind))
         is_head = number == 0 and column.kind == "text"
         tag = 'th scope="row"' if is_head else "td"
-        cells.append(f'<{tag} class="{column.kind}"{sort}>{words}</{"th" if is_head else "td"}>')
+        long = " long" if isinstance(cell, str) and len(cell) > LONG_TEXT else ""
+        cells.append(f'<{tag} class="{column.kind}{long}"{sort}>{words}</{"th" if is_head else "td"}>')
     return f"<tr>{''.join(cells)}</tr>"
 
 

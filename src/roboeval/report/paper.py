@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,20 @@ from roboeval.suite import Suite
 
 SUITE = "paper"
 NAMES: Mapping[str, tuple[str, ...]] = {
-    "GPT-4": ("gpt-4",),
-    "GPT-3.5": ("gpt-3.5", "text-davinci-003"),
-    "PaLM2": ("palm-2", "palm2", "text-bison-001"),
-    "CodeLlama": ("codellama", "codellama-34b-python-hf"),
+    "GPT-4": ("gpt-4", "openai/gpt-4", "gpt-4-0314", "gpt-4-0613"),
+    "GPT-3.5": ("text-davinci-003",),
+    "PaLM2": ("text-bison-001", "models/text-bison-001"),
+    "CodeLlama": ("codellama/codellama-34b-python-hf", "codellama-34b-python-hf"),
+    "StarCoder": ("bigcode/starcoder",),
+}
+"""What their makers call the paper's models, in small letters, without the provider."""
+SHORT: Mapping[str, tuple[str, ...]] = {
+    "GPT-3.5": ("gpt-3.5",),
+    "PaLM2": ("palm-2", "palm2"),
+    "CodeLlama": ("codellama",),
     "StarCoder": ("starcoder",),
 }
-"""What runs of the paper's models are called, in small letters, without the provider."""
+"""What the paper calls them. Where a provider is named this may be another model, such as a smaller one."""
 
 CLASSES = {
     "PythonError": ("Python Error", "python_error"),
@@ -59,14 +66,22 @@ def published() -> dict[str, Any]:
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """The model of the paper that a run names; None if it names another.
+    """The model of the paper that a run names; None if it names another, or none for sure.
 
     Without a recorded model, the name of the folder counts.
     """
-    if run.head.get("suite") != SUITE:
+    if run.head.get("suite") != SUITE or run.is_mixed:
         return None
-    name = (run.model or run.folder).lower().rpartition(":")[2].rpartition("/")[2]
-    return next((model for model, names in NAMES.items() if name in names), None)
+    provider, colon, name = (run.model or run.folder).lower().partition(":")
+    known = [*NAMES.items(), *(() if colon else SHORT.items())]
+    return next((model for model, names in known if (name or provider) in names), None)
+
+
+def taken_for(runs: Iterable[JudgedRun]) -> list[str]:
+    """Which models of the paper runs are taken for, by their names, in sentences."""
+    named = [(run.name, model) for run in runs if (model := model_of(run)) is not None]
+    those = ", ".join(f"{name} for {model}" for name, model in named)
+    return [f"By their names, these are taken for models of the paper: {those}."] if named else []
 
 
 def is_of_authors_prompts(run: JudgedRun, suite: Suite) -> bool:

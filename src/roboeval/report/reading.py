@@ -19,6 +19,9 @@ from roboeval.run import load_head
 from roboeval.suite import Suite
 from roboeval.tables import Row
 
+MOST = 10**12  # tokens or seconds; a request of which more is told was not counted
+LONGEST_NAME = 100
+
 
 @dataclass(frozen=True)
 class Written:
@@ -46,7 +49,7 @@ class JudgedRun:
     Args:
         name: as figures and tables call it; no two runs of a report share it.
         folder: the name of its folder.
-        model: who wrote the completions; None where nobody recorded it, or several did.
+        model: who wrote the completions; None where nobody recorded it, or several wrote them.
         about: what run.json says.
         head: by what it was judged.
         rows: of the evaluation; of their verdicts only that of the world that decided keeps its trace.
@@ -55,6 +58,7 @@ class JudgedRun:
         total: how many completions there are to judge.
         ablated: scores where only common sense is required; None where nobody judged that.
         trials: its completions as the check sees them; None where they were not checked.
+        is_mixed: whether several models wrote the completions.
     """
 
     name: str
@@ -68,6 +72,7 @@ class JudgedRun:
     total: int
     ablated: tuple[TaskScore, ...] | None = None
     trials: tuple[Prompt, ...] | None = None
+    is_mixed: bool = False
 
     @cached_property
     def by_prompt(self) -> dict[tuple[str, int], float]:
@@ -110,9 +115,10 @@ def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> Judge
         key = sys.intern(completion.task), completion.prompt, completion.index
         written[key] = _written(completion)
     folder = evaluation.run.path.resolve().name
-    model = models.pop() if len(models) == 1 else None
+    is_mixed = len(models) > 1
+    model = None if is_mixed or not models else models.pop()
     return JudgedRun(
-        name=visible(model or folder),
+        name=_readable(model or folder),
         folder=folder,
         model=model,
         about=about,
@@ -121,7 +127,14 @@ def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> Judge
         written=written,
         scores=scored(kept, suite),
         total=evaluation.scope.total,
+        is_mixed=is_mixed,
     )
+
+
+def _readable(name: str) -> str:
+    """A name as text that a line holds: its beginning and its end, by which names are told apart."""
+    name = visible(name)
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 30]}…{name[-29:]}"
 
 
 def scored(rows: Iterable[Row], suite: Suite) -> tuple[TaskScore, ...]:
@@ -146,18 +159,20 @@ def _written(completion: Completion) -> Written:
 
 
 def _whole(value: object) -> int | None:
-    return value if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else None
+    return value if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST else None
 
 
 def _number(value: object) -> float | None:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool) and value >= 0
-    return float(value) if is_number else None  # type: ignore[arg-type]  # a number, as was just seen
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    return float(value) if 0 <= value <= MOST else None
 
 
 def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
     """The same runs, named so that no two share a name: by folder too where the model does not tell."""
     names = _apart([run.name for run in runs], [f"{run.name} ({run.folder})" for run in runs])
-    names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
+    while len({*names}) < len(names):
+        names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
     return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboeval.certainty import by_bootstrap, by_formula
+from roboeval.certainty import FEW, by_bootstrap, by_formula
 from roboeval.report import paper
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
@@ -12,11 +12,11 @@ from roboeval.resampling import ROUNDING
 from roboeval.suite import Suite
 
 INTERVALS = (
-    "pass@1 is the mean over all prompts of the share of completions that pass. The first pair of ends holds "
-    "the mean of 95 of 100 such runs if prompts are taken as drawn at random, the others if tasks are: a "
-    "formula (Student's t over clusters) and a bootstrap that draws whole tasks again, 10,000 times, with "
-    "seed 0. Quote those over tasks where you speak of tasks that are not in the suite: prompts of "
-    "a task resemble each other."
+    "pass@1 is the mean over all prompts of the share of completions that pass. Of 100 intervals made like "
+    "these, from prompts or tasks drawn anew each time, 95 hold the true mean. For the first pair of ends, "
+    "prompts are taken as drawn at random, for the others tasks are: a formula (Student's t over clusters) "
+    "and a bootstrap that draws whole tasks again, 10,000 times, with seed 0. Quote those over tasks where "
+    "you speak of tasks that are not in the suite: prompts of a task resemble each other."
 )
 BY_TASK = (
     "The mean pass@1 over the prompts of a task, and the prompts that did worst and best. The bars and error "
@@ -50,7 +50,7 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         columns,
         [_overall_row(run) for run in runs],
         about=INTERVALS,
-        notes=_unfinished(runs),
+        notes=[*_few_tasks(runs), *_unfinished(runs)],
     )
 
 
@@ -61,6 +61,15 @@ def _overall_row(run: JudgedRun) -> list[str | int | float]:
     mean = ends[0].mean
     flat = [end for estimate in ends for end in (estimate.low, estimate.high)]
     return [run.name, len(run.rows), len(prompts), len(tasks), mean, *flat]
+
+
+def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
+    few = [run.name for run in runs if len(run.by_task) < FEW]
+    if not few:
+        return []
+    of_which = "" if len(few) == len(runs) else f" of {', '.join(few)}"
+    few_tasks = f"The bootstrap{of_which} draws from fewer than {FEW} tasks, for which it is too narrow"
+    return [f"{few_tasks}; quote the formula."]
 
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
@@ -151,9 +160,9 @@ def published_sheet(runs: Sequence[JudgedRun], suite: Suite) -> Sheet | None:
             [task, run.name, ours, theirs, None if theirs is None else ours - theirs]
             for task, ours, theirs in pairs
         ]
-    notes = [paper.TWO_SUMS]
+    notes = [*paper.taken_for(runs), paper.TWO_SUMS]
     if not all(paper.is_of_authors_prompts(run, suite) for run, _ in known):
-        notes.insert(0, paper.OTHER_PHRASINGS)
+        notes.insert(1, paper.OTHER_PHRASINGS)
     return sheet(
         "published",
         "Beside what the paper's authors published",

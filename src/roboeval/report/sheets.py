@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -27,7 +28,7 @@ class Column(NamedTuple):
     """A column of a table.
 
     Args:
-        head: its name; no two columns of a table share it.
+        head: its name, which may be that of a model.
         kind: what stands in it: a text, a share from 0 to 1, a difference of shares, a whole number, or any.
     """
 
@@ -76,12 +77,26 @@ def write_csv(table: Sheet, folder: Path) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    schema = {_head(column.head): TYPES[column.kind] for column in table.columns}
+    kinds = [TYPES[column.kind] for column in table.columns]
+    schema = dict(zip(_heads(table.columns), kinds, strict=True))
     rows = [
         [_plain(cell, column.kind) for cell, column in zip(row, table.columns, strict=True)]
         for row in table.rows
     ]
     write(pl.DataFrame(rows, schema=schema, orient="row"), folder / f"{table.name}.csv", "csv")
+
+
+def _heads(columns: Sequence[Column]) -> list[str]:
+    """The heads, with a number behind those that others have, such as that of a model named `task`."""
+    heads: list[str] = []
+    for column in columns:
+        plain = head = _head(column.head)
+        for number in count(2):
+            if head not in heads:
+                break
+            head = f"{plain} #{number}"
+        heads.append(head)
+    return heads
 
 
 def _head(head: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 from codebotler.badinput import BadInput
@@ -13,6 +14,11 @@ from roboeval.report.sheets import Sheet, write_csv
 from roboeval.run import write_whole
 
 FORMATS = ("png", "pdf")
+OPTIONAL = {
+    *("abilities", "accepted", "budget", "coming-back", "cost", "differences", "failures", "published"),
+    *("rejection-sampling", "rejection-sampling-curves"),
+}
+"""Figures and tables that not every report has."""
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
@@ -50,7 +56,15 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
             case _:
                 pass
     write_whole(out / "index.html", page(title, lead, sections, drawn).encode())
+    _forget_others(out, {*drawn, *(part.name for part in parts if isinstance(part, Sheet))})
     yield "page"
+
+
+def _forget_others(out: Path, names: AbstractSet[str]) -> None:
+    """Remove what an earlier report wrote here that this one has not, such as rejection sampling."""
+    for name in OPTIONAL - names:
+        for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
+            (out / file).unlink(missing_ok=True)
 
 
 def pieces(sections: Sequence[Section]) -> int:

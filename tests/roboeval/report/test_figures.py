@@ -3,20 +3,23 @@
 import io
 import os
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
-from made_up_runs import SUITE, cases
+from made_up_runs import SUITE, cases, made_up
 from roboeval.report.causes import all_causes
-from roboeval.report.drawing import DARK, LIGHT, Look, looking, written
-from roboeval.report.figures import at_the_limit, bars, limits, thresholds
-from roboeval.report.heat import causes_figure
+from roboeval.report.drawing import DARK, LIGHT, WIDE, Look, looking, new_figure, written
+from roboeval.report.figures import LOWEST, at_the_limit, bars, limits, thresholds
+from roboeval.report.heat import Heat, causes_figure, draw_heat
 from roboeval.report.reading import JudgedRun
+from roboeval.resampling import Prompt, Trial
 
 PICTURES = Path(__file__).with_name("pictures")
 DRAWINGS: dict[str, Callable[[list[JudgedRun], Look], Figure | None]] = {
@@ -32,9 +35,14 @@ SIZE = (480, 480)
 TOLERANCE = 0.012  # of the whole range, on average over all points
 
 
-def picture(case: str, name: str, look: Look = LIGHT) -> Image.Image | None:
-    with looking(look):
-        figure = DRAWINGS[name](cases()[case], look)
+@cache
+def picture(case: str, name: str) -> Image.Image | None:
+    return drawn_anew(case, name)
+
+
+def drawn_anew(case: str, name: str) -> Image.Image | None:
+    with looking(LIGHT):
+        figure = DRAWINGS[name](cases()[case], LIGHT)
         if figure is None:
             return None
         drawn = Image.open(io.BytesIO(written(figure, "png"))).convert("RGB")
@@ -77,6 +85,58 @@ def test_other_numbers_look_different() -> None:
     assert np.abs(one - two).mean() / 255 > TOLERANCE
 
 
+def test_the_line_through_a_bar_reaches_from_the_worst_prompt_to_the_best() -> None:
+    with looking(LIGHT):
+        (axes,) = bars([made_up("a", {"Visit": (1, 5, 9), "CountMugs": (4,)})], SUITE, LIGHT).axes
+    ends = [np.asarray(line)[:, 1] for lines in axes.collections for line in lines.get_segments()]  # type: ignore[attr-defined]  # error bars are lines
+    assert np.allclose(ends, [(0.1, 0.9), (0.4, 0.4)])
+    assert np.allclose([bar.get_height() for bar in axes.patches], [0.5, 0.4])  # type: ignore[attr-defined]  # bars are rectangles
+
+
+@pytest.mark.parametrize("name", ["tasks", "thresholds", "accepted", "rejection-sampling"])
+def test_long_names_fit_into_legends(name: str) -> None:
+    with looking(LIGHT):
+        figure = DRAWINGS[name](cases()["long names"], LIGHT)
+        assert figure is not None
+        figure.draw_without_rendering()
+        (legend,) = figure.legends
+        box = legend.get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.x1
+
+
+def test_lines_end_where_the_axis_ends() -> None:
+    good, bad = Trial(accepted=True, ran=True, passed=False), Trial(accepted=False, ran=False, passed=True)
+    trials = (Prompt("Visit", 0, (good, bad)),)  # whose pass@1 is half, after 100 retries nearly nothing
+    run = made_up("a", {"Visit": (1,)}, of=5_000, trials=trials)
+    with looking(LIGHT):
+        drawn = [thresholds([run], LIGHT), limits([run], LIGHT)]
+    for figure in drawn:
+        assert figure is not None
+        lines = [np.asarray(line.get_xdata()) for axes in figure.axes for line in axes.lines]
+        assert {float(xs.min()) for xs in lines} == {float(xs[-1]) for xs in lines} == {LOWEST}
+
+
+@pytest.mark.parametrize("look", [LIGHT, DARK], ids=["light", "dark"])
+def test_numbers_stand_out_from_their_shades(look: Look) -> None:
+    shares = [n / 100 for n in range(101)]
+    with looking(look):
+        figure = new_figure(WIDE, WIDE)
+        axes = figure.add_subplot()
+        draw_heat(axes, Heat([[share] for share in shares], [""] * len(shares), [""]), look)
+        figure.draw_without_rendering()
+        shades = np.asarray(axes.collections[0].get_facecolor())
+    for text, shade in zip(axes.texts, shades, strict=True):
+        one, other = sorted((light(to_rgb(text.get_color())), light((shade[0], shade[1], shade[2]))))
+        assert (other + 0.05) / (one + 0.05) > 4
+
+
+def light(colour: tuple[float, float, float]) -> float:
+    """How light a colour is, as the guidelines for accessible pages reckon it."""
+    parts = [v / 12.92 if v <= 0.03928 else ((v + 0.055) / 1.055) ** 2.4 for v in colour]
+    return float(np.dot(parts, [0.2126, 0.7152, 0.0722]))
+
+
 @pytest.mark.parametrize("kind", ["png", "pdf", "svg"])
 def test_the_same_numbers_give_the_same_bytes(kind: str) -> None:
     def drawn() -> bytes:
@@ -91,9 +151,9 @@ def test_the_same_numbers_give_the_same_bytes(kind: str) -> None:
 
 
 def test_a_readers_own_style_plays_no_part(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = picture("one prompt", "tasks")
+    before = drawn_anew("one prompt", "tasks")
     monkeypatch.setitem(mpl.rcParams, "axes.facecolor", "red")
-    after = picture("one prompt", "tasks")
+    after = drawn_anew("one prompt", "tasks")
     assert before is not None
     assert after is not None
     assert before.tobytes() == after.tobytes()

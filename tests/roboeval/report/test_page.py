@@ -1,13 +1,14 @@
 """The page of a report: whole in one file, quiet, and deaf to what models write."""
 
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
 
 from made_up_runs import HOSTILE, SUITE, cases, made_up
-from roboeval.report.contents import Wishes, sections
+from roboeval.report.contents import Picture, Section, Wishes, sections
 from roboeval.report.page import page
 from roboeval.report.reading import JudgedRun
 from roboeval.report.writing import pieces, write_report
@@ -40,15 +41,32 @@ class Tags(HTMLParser):
         self.words.append(data)
 
 
-def made(runs: list[JudgedRun], folder: Path) -> str:
-    parts = sections(runs, SUITE, Wishes(published=True, command="roboeval report"))
-    assert len([*write_report("a report", ["about it"], parts, folder)]) == pieces(parts)
-    return (folder / "index.html").read_text()
+def parts(runs: list[JudgedRun]) -> list[Section]:
+    return sections(runs, SUITE, Wishes(published=True, command="roboeval report"))
+
+
+def shown(runs: list[JudgedRun]) -> str:
+    """The page, with a dot for each figure: what figures look like is not asked here."""
+    dot = b'<svg xmlns="http://www.w3.org/2000/svg"/>'
+    names = [part.name for section in parts(runs) for part in section.parts if isinstance(part, Picture)]
+    return page("a report", ["about it"], parts(runs), dict.fromkeys(names, (dot, dot)))
+
+
+def written(folder: Path) -> Path:
+    found = parts(cases()["usual"])
+    assert len([*write_report("a report", ["about it"], found, folder)]) == pieces(found)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a report with all its figures."""
+    return written(tmp_path_factory.mktemp("usual"))
 
 
 @pytest.mark.parametrize("case", ["usual", "hostile", "one completion", "no failures", "all failures"])
-def test_a_page_is_one_whole_file(case: str, tmp_path: Path) -> None:
-    text = made(cases()[case], tmp_path)
+def test_a_page_is_one_whole_file(case: str, usual: Path) -> None:
+    text = (usual / "index.html").read_text() if case == "usual" else shown(cases()[case])
     tags = Tags(text)
     assert tags.tags.count("script") == 1
     addresses = [value for name, value in tags.attributes if name in {"src", "href", "srcset"}]
@@ -59,8 +77,8 @@ def test_a_page_is_one_whole_file(case: str, tmp_path: Path) -> None:
     assert [name for name, _ in tags.attributes if name.startswith("on")] == []
 
 
-def test_names_of_models_are_text(tmp_path: Path) -> None:
-    text = made([made_up(HOSTILE, {"Visit": (4, 5)}), made_up("b", {"Visit": (1, 5)})], tmp_path)
+def test_names_of_models_are_text() -> None:
+    text = shown([made_up(HOSTILE, {"Visit": (4, 5)}), made_up("b", {"Visit": (1, 5)})])
     assert "<script>alert" not in text
     assert "&lt;script&gt;alert(&#x27;x&#x27;)&lt;/script&gt;&amp;&quot;" in text
     assert "\x1b" not in text
@@ -75,18 +93,31 @@ def test_only_the_script_of_the_page_may_run() -> None:
     assert re.search(r"script-src 'sha256-[\w+/]{43}='$", policy[1])
 
 
-def test_every_number_of_the_page_is_in_a_csv(tmp_path: Path) -> None:
-    text = made(cases()["usual"], tmp_path)
+def test_every_number_of_the_page_is_in_a_csv(usual: Path) -> None:
+    text = (usual / "index.html").read_text()
     named = set(re.findall(r"tables/([\w-]+\.csv)", text))
-    assert named == {path.name for path in (tmp_path / "tables").iterdir()}
-    drawn = {path.stem for path in (tmp_path / "figures").iterdir()}
+    assert named == {path.name for path in (usual / "tables").iterdir()}
+    drawn = {path.stem for path in (usual / "figures").iterdir()}
     assert drawn == set(re.findall(r"figures/([\w-]+)\.pdf", text))
 
 
-def test_the_same_runs_give_the_same_bytes(tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        made(cases()["usual"], tmp_path / name)
-    files = [path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file()]
+def test_the_same_runs_give_the_same_bytes(usual: Path, tmp_path: Path) -> None:
+    again = written(tmp_path)
+    files = [path.relative_to(usual) for path in usual.rglob("*") if path.is_file()]
     assert len(files) > 15
     for file in files:
-        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
+        assert (usual / file).read_bytes() == (again / file).read_bytes(), file
+
+
+def test_what_an_earlier_report_had_more_is_gone(usual: Path, tmp_path: Path) -> None:
+    shutil.copytree(usual, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "tables" / "mine.csv").write_text("kept")
+    run = made_up("a", {"Visit": (10,)}, trials=None)
+    found = [section for section in parts([run]) if section.name not in {"results", "thresholds", "causes"}]
+    list(write_report("another", [], found, tmp_path))
+    named = set(re.findall(r"tables/([\w-]+)\.csv", (tmp_path / "index.html").read_text()))
+    always = {"overall", "tasks", "curve", "causes", "prompts", "runs", "phrasings", "spread", "thresholds"}
+    there = {path.stem for path in tmp_path.glob("*/*")}
+    assert there - {"mine"} - always == named - always
+    assert "rejection-sampling" not in there
+    assert (tmp_path / "tables" / "mine.csv").read_text() == "kept"

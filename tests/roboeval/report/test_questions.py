@@ -15,6 +15,7 @@ from roboeval.report.cost import (
     cost_sheet,
     expect_known,
     price_from,
+    price_of,
     requests,
     spent,
 )
@@ -199,8 +200,47 @@ def test_prices() -> None:
     for wrong in ("gpt", "gpt=1", "=1/2", "gpt=a/b", "gpt=-1/2", "gpt=nan/1", "gpt=1/2/3"):
         with pytest.raises(BadInput, match="is no price; write MODEL=INPUT/OUTPUT"):
             price_from(wrong)
+    run = made_up("a", {"Visit": (1,)})
     with pytest.raises(BadInput, match='--price names "x", but the runs are a'):
-        expect_known([Price("x", 1, 1)], [made_up("a", {"Visit": (1,)})])
+        expect_known([Price("x", 1, 1)], [run])
+    with pytest.raises(BadInput, match='--price names "a" twice'):
+        expect_known([Price("a", 1, 1), Price("a", 2, 2)], [run])
+
+
+def test_a_price_for_a_folder_goes_before_that_for_its_model() -> None:
+    run = made_up("a", {"Visit": (1,)}, folder="cheap")
+    assert price_of(run, [Price("a", 2, 2), Price("cheap", 1, 1)]) == Price("cheap", 1, 1)
+    assert price_of(run, [Price("a", 2, 2)]) == Price("a", 2, 2)
+
+
+def test_sums_do_not_depend_on_the_order_of_completions() -> None:
+    run = made_up("a", {"Visit": (4,)})
+    run = replace(
+        run, written={key: Written("", None, 1, 1, 0.1 * n) for n, key in enumerate(run.written, 1)}
+    )
+    assert spent(run) == spent(replace(run, rows=tuple(reversed(run.rows))))
+
+
+def test_what_was_not_judged_costs_nothing() -> None:
+    run = paid(made_up("a", {"Visit": (4,)}))
+    more = {**run.written, ("Visit", 0, 99): Written("", None, 10**9, 10**9, 1.0)}
+    more["FindBook", 0, 0] = Written("")
+    assert spent(replace(run, written=more)) == spent(run)
+    assert budget_sheet([replace(run, written=more)], []) == budget_sheet([run], [])
+
+
+def test_money_goes_by_what_each_prompt_takes() -> None:
+    run = made_up("a", {"Visit": (1, 1)}, of=1)
+    good, bad = (Trial(accepted=ok, ran=ok, passed=ok) for ok in (True, False))
+    written = {
+        ("Visit", 0, 0): Written("", None, 1_000, 0, 1.0),
+        ("Visit", 1, 0): Written("", None, 0, 1_000, 1.0),
+    }
+    trials = (Prompt("Visit", 0, (good,)), Prompt("Visit", 1, (bad,)))
+    run = replace(run, written=written, trials=trials)
+    rows = {row["retries"]: row for row in as_dicts(budget_sheet([run], [Price("a", 1.0, 100.0)]))}
+    # One request for the first prompt, and all three for the second, whose output is dear.
+    assert rows[2]["passes per unit of money"] == pytest.approx(1 / (0.001 + 3 * 0.1))
 
 
 # --- differences, groups, and where it comes from
@@ -223,6 +263,15 @@ def test_all_pairs_or_each_with_the_best() -> None:
     assert difference_sheet([made_up("a", {"Visit": (1,)}), made_up("b", {"FindBook": (1,)})]) is None
 
 
+def test_pairs_that_were_asked_otherwise_are_told() -> None:
+    one, other = (
+        made_up(name, {"Visit": (n,)}, about={"settings": {"temperature": n}}) for n, name in enumerate("ab")
+    )
+    found = difference_sheet([one, other])
+    assert found is not None
+    assert found[0].notes == ("a and b: temperature differs: 0 and 1.",)
+
+
 def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     run = made_up("a", {"Visit": (3,)})
     found = failures([run], SUITE)
@@ -234,7 +283,7 @@ def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("roboeval.report.failures.MOST", 2)
     monkeypatch.setattr("roboeval.report.failures.FEWEST", 2)
     (note,) = failures([run], SUITE).notes
-    assert note.startswith("a: 5 smaller groups with 5 completions are left out; `roboeval find a")
+    assert note.startswith("a: 5 smaller groups with 5 completions are left out; `roboeval find` shows")
 
 
 def test_where_it_comes_from() -> None:
@@ -252,3 +301,10 @@ def test_what_completions_say_of_their_cost() -> None:
     read = _written(Completion.model_validate({**data, "usage": usage}))
     assert (read.input_tokens, read.output_tokens, read.seconds) == (3, None, 1.5)
     assert _written(Completion.model_validate({**data, "usage": 3, "latency_s": "x"})).seconds is None
+
+
+@pytest.mark.parametrize("much", [10**400, 10**13, float("inf"), float("nan"), -1])
+def test_what_nobody_can_have_counted(much: float) -> None:
+    data = {"task": "T", "prompt": 0, "index": 0, "program": "x", "latency_s": much}
+    read = _written(Completion.model_validate({**data, "usage": {"input_tokens": much, "output_tokens": 1}}))
+    assert (read.input_tokens, read.output_tokens, read.seconds) == (None, 1, None)

@@ -8,9 +8,11 @@ import pytest
 
 from made_up_runs import HOSTILE, SUITE, made_up, usual
 from roboeval.evaluation import Evaluation
+from roboeval.records import to_line
 from roboeval.report import paper
 from roboeval.report.causes import all_causes, beside_notes, causes_of, causes_sheet, kinds_in_order
-from roboeval.report.reading import JudgedRun, Written, named_apart, read_run
+from roboeval.report.contents import Wishes, sections
+from roboeval.report.reading import JudgedRun, Written, _readable, named_apart, read_run
 from roboeval.report.retries import accepted, retries_sheet, steps_sheet
 from roboeval.report.scores import (
     curve,
@@ -57,7 +59,15 @@ def test_intervals_of_prompts_and_of_tasks() -> None:
 
 def test_an_unfinished_run_says_so() -> None:
     run = replace(made_up("a", {"Visit": (1,)}), total=99)
-    assert overall_sheet([run]).notes == ("a: only 10 of 99 completions are judged, and only these count.",)
+    assert overall_sheet([run]).notes[-1] == "a: only 10 of 99 completions are judged, and only these count."
+
+
+def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
+    few, enough = (made_up(name, {f"T{n}": (1,) for n in range(of)}) for name, of in (("a", 7), ("b", 8)))
+    assert overall_sheet([enough]).notes == ()
+    too_narrow = "draws from fewer than 8 tasks, for which it is too narrow; quote the formula."
+    assert overall_sheet([few]).notes == (f"The bootstrap {too_narrow}",)
+    assert overall_sheet([few, enough]).notes == (f"The bootstrap of a {too_narrow}",)
 
 
 def test_causes_are_counted() -> None:
@@ -97,11 +107,37 @@ def paper_run(name: str, **changes: object) -> JudgedRun:
         ("hf:codellama/CodeLlama-34b-Python-hf", "CodeLlama"),
         ("codellama/CodeLlama-7b-Python-hf", None),
         ("text-bison-001", "PaLM2"),
+        ("openai:gpt-4-0613", "GPT-4"),
+        ("openai-chat:openai/gpt-4", "GPT-4"),
+        ("hf:somebody/gpt-4", None),
+        ("openai-chat:gpt-4-turbo", None),
+        ("openai-chat:gpt-3.5-turbo", None),
+        ("openai-chat:gpt-3.5", None),
+        ("gpt-3.5", "GPT-3.5"),
+        ("starcoder", "StarCoder"),
+        ("openai-chat:starcoder", None),  # a server calls what it likes so, a smaller one as well
+        ("codellama", "CodeLlama"),
+        ("openai-chat:codellama", None),
+        ("palm-2", "PaLM2"),
     ],
 )
 def test_names_of_the_papers_models(name: str, model: str | None) -> None:
     assert paper.model_of(paper_run(name)) == model
     assert paper.model_of(replace(paper_run(name), head={"suite": "mine"})) is None
+
+
+def test_a_folder_names_a_model_only_where_nobody_else_does() -> None:
+    run = paper_run("x", model=None, folder="gpt-4")
+    assert paper.model_of(run) == "GPT-4"
+    assert paper.model_of(replace(run, is_mixed=True)) is None
+    assert paper.model_of(replace(run, model="gpt-5")) is None
+
+
+def test_the_page_says_which_model_a_run_is_taken_for() -> None:
+    runs = [paper_run("openai:gpt-4-0613"), paper_run("mine")]
+    said = "By their names, these are taken for models of the paper: openai:gpt-4-0613 for GPT-4."
+    assert said in beside_notes(runs)
+    assert paper.taken_for(runs[1:]) == []
 
 
 def test_cells_stand_only_beside_the_authors_own_prompts(paper_suite: Suite) -> None:
@@ -142,6 +178,7 @@ def test_published_causes_only_where_asked_for() -> None:
     assert [one.name for one in all_causes(runs, published=True)] == ["gpt-4", "gpt-4, published", "mine"]
     table = causes_sheet(all_causes(runs, published=True))
     assert beside_notes(runs) == [
+        *paper.taken_for(runs),
         paper.TWO_SUMS,
         "Published causes are of all 16 tasks of the paper, which is more than gpt-4 did.",
     ]
@@ -180,6 +217,59 @@ def test_runs_are_named_apart() -> None:
         made_up("x", {"Visit": (1,)}),
     ]
     assert [one.name for one in named_apart(runs)] == ["gpt-4 (a)", "gpt-4 (b) #2", "gpt-4 (b) #3", "x"]
+
+
+def test_a_run_as_it_is_read(paper_suite: Suite, tmp_path: Path) -> None:
+    rows = [
+        {
+            "task": "LunchTime",
+            "prompt": 0,
+            "index": n,
+            "model": model,
+            "program": "def task_program():\n    1\n",
+        }
+        for n, model in enumerate(("gpt-4", "other"))
+    ]
+    (tmp_path / "a.jsonl").write_bytes(b"".join(map(to_line, rows)))
+    run = Run(tmp_path / "gpt-4")
+    run.keep(open_source(str(tmp_path / "a.jsonl"), paper_suite))
+    for _ in evaluate_run(run, paper_suite, tasks=None, ablated=False, redo=False, workers=1):
+        pass
+    evaluation = Evaluation(run, "paper")
+    read = read_run(evaluation, evaluation.rows(), paper_suite)
+    assert (read.is_mixed, read.model, read.name) == (True, None, "gpt-4")
+    for row in read.rows:  # held in memory, all of them
+        kept = [number for number, verdict in enumerate(row["verdicts"]) if "trace" in verdict]
+        assert kept == [row["failure"]["world"]]
+
+
+def test_a_very_long_name_keeps_both_ends() -> None:
+    name = "begin" + "x" * 4_000 + "end"
+    assert _readable(name).startswith("beginx")
+    assert _readable(name).endswith("xend")
+    assert len(_readable(name)) == 100
+    assert _readable("x" * 100) == "x" * 100
+
+
+def test_names_stay_apart_whatever_they_are() -> None:
+    run = made_up("m", {"Visit": (1,)}, folder="f")
+    names = [one.name for one in named_apart([run, run, made_up("m (f) #2", {"Visit": (1,)})])]
+    assert len(set(names)) == 3
+
+
+@pytest.mark.parametrize(
+    "names", [("task", "prompt"), ("threshold", "retries"), ("=x", "'=x"), ("task #2", "task")]
+)
+def test_models_may_be_called_as_columns_are(names: tuple[str, str], tmp_path: Path) -> None:
+    runs = [made_up(name, {"Visit": (3, 1)}) for name in names]
+    for section in sections(runs, SUITE, Wishes()):
+        for part in section.parts:
+            if isinstance(part, Sheet):
+                write_csv(part, tmp_path)
+    with (tmp_path / "prompts.csv").open(newline="") as file:
+        head, *rows = csv.reader(file)
+    assert len(set(head)) == len(head) == 4
+    assert rows[0] == ["Visit", "0", "0.3", "0.3"]
 
 
 def test_csv_holds_all_digits_and_no_formula(tmp_path: Path) -> None:

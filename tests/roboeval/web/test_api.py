@@ -278,6 +278,14 @@ def test_the_operators_page_has_the_benchmark_too(tmp_path: Path, runs: Path) ->
             assert "stop.js" in page.text, "STOP is on every page where there is a robot"
 
 
+def test_the_link_of_a_face_opens_no_run(tmp_path: Path, runs: Path) -> None:
+    token = "a face's token of some length"
+    with PageServer(tmp_path, "--face", "--face-token", token, "--runs", str(runs)) as server:
+        for path in ("/runs", "/runs/hasty", "/side-by-side?run=hasty", "/api/runs", "/api/runs/hasty"):
+            assert server.ask("GET", path, authorization=f"Bearer {token}").status == 403, path
+        assert server.ask("GET", "/face", authorization=f"Bearer {token}").status == 200
+
+
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
     ended = roboeval("serve", tmp_path / "none")
     assert ended.status == 2
