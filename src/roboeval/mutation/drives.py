@@ -110,7 +110,9 @@ def plural_rooms(source: Source, _: Setting) -> Iterator[Edit]:
     """Look for a plural in the names of rooms, where no room has one."""
     for node in source.nodes:
         match node:
-            case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]):
+            case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]) if word[
+                -1:
+            ].isalpha():
                 yield {left: literal(word + "s")}
             case ast.Call(ast.Attribute(_, "startswith" | "endswith"), [ast.Constant(str(word)) as only]):
                 yield {only: literal(word + "s")}
