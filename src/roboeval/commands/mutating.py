@@ -65,6 +65,7 @@ def mutate(
     jobs = [
         Job(
             task=task.name,
+            phrasings=task.prompts,
             programs=originals(task, further.get(task.name, ())),
             scenarios=worlds_of(known, task, worlds, seed),
             rules=known.rules,
@@ -108,7 +109,7 @@ def score_of(job: Job, lanes: Lanes) -> Score:
     running = baselines(job.programs, job.scenarios, job.rules, lanes)
     before = list(watched(running, f"running {job.task}", len(job.programs)))
     right = [baseline for baseline in before if baseline.fault is None]
-    setting = Setting.of([scenario.world for scenario in job.scenarios])
+    setting = Setting.of([scenario.world for scenario in job.scenarios], job.phrasings)
     made = drawn(mutants([baseline.original for baseline in right], setting), job.most, job.seed)
     trying = ends(made, right, job.scenarios, job.rules, lanes)
     found = list(watched(trying, f"mutating {job.task}", len(made)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 
-from roboeval.mutation.operator import Operator, Setting, others
+from roboeval.mutation.operator import COMING_BACK, STAYING_OUT, Operator, Setting, others, where
 from roboeval.mutation.rewriting import Edit, Source, argument, literal, rewritten, sliced, step, text_of
 
 
@@ -110,7 +110,9 @@ def plural_rooms(source: Source, _: Setting) -> Iterator[Edit]:
     """Look for a plural in the names of rooms, where no room has one."""
     for node in source.nodes:
         match node:
-            case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]):
+            case ast.Compare(ast.Constant(str(word)) as left, [ast.In() | ast.NotIn()], [_]) if word[
+                -1:
+            ].isalpha():
                 yield {left: literal(word + "s")}
             case ast.Call(ast.Attribute(_, "startswith" | "endswith"), [ast.Constant(str(word)) as only]):
                 yield {only: literal(word + "s")}
@@ -119,13 +121,21 @@ def plural_rooms(source: Source, _: Setting) -> Iterator[Edit]:
 OPERATORS = (
     Operator("skip-the-first", "Goes through all but the first: room, person or report.", skip_first),
     Operator("skip-the-last", "Goes through all but the last.", skip_last),
-    Operator("drop-the-return", "Does not come back.", drop_return),
+    Operator("drop-the-return", "Does not come back.", where(COMING_BACK, drop_return)),
     Operator("drop-a-drive", "Leaves out a drive.", drop_drive),
     Operator("wrong-room", "Names another room than the instruction.", wrong_room),
-    Operator("return-elsewhere", "Comes back to another place than it started from.", return_elsewhere),
-    Operator("return-to-here", "Takes the place where it is for the place to come back to.", stay_and_call),
+    Operator(
+        "return-elsewhere",
+        "Comes back to another place than it started from.",
+        where(COMING_BACK, return_elsewhere),
+    ),
+    Operator(
+        "return-to-here",
+        "Takes the place where it is for the place to come back to.",
+        where(COMING_BACK, stay_and_call),
+    ),
     Operator("drive-by-words", "Says that it goes somewhere, and stays.", drive_by_words),
     Operator("one-drive-for-all", "Names all rooms in one drive, which leads to one of them.", one_drive),
-    Operator("detour", "Drives through a room that nobody named.", detour),
+    Operator("detour", "Drives through a room that nobody named.", where(STAYING_OUT, detour)),
     Operator("plural-rooms", "Looks for a plural in the names of rooms.", plural_rooms),
 )

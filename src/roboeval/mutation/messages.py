@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from itertools import pairwise
 
-from roboeval.mutation.operator import Operator, Setting
+from roboeval.mutation.operator import TELLING, Operator, Setting, where
 from roboeval.mutation.rewriting import (
     Edit,
     Source,
@@ -40,7 +40,7 @@ OPPOSITES = {
     "warmer": "colder",
     "colder": "warmer",
 }
-TELLING = re.compile("|".join(rf"\b({word})\b" for word in OPPOSITES), re.IGNORECASE)
+TURNED = re.compile("|".join(rf"\b({word})\b" for word in OPPOSITES), re.IGNORECASE)
 CLAIM = re.compile(r"\b(is|are|will|would)\b")
 EMPTY = "Done."
 HEDGE = "0, 1, 2, 3 or 4"
@@ -148,7 +148,7 @@ def say_the_opposite(source: Source, _: Setting) -> Iterator[Edit]:
         text = text_of(node)
         if text is None or " " not in text.strip() or node in options | compared:
             continue
-        other = TELLING.sub(_opposite, text)
+        other = TURNED.sub(_opposite, text)
         other = CLAIM.sub(r"\1 not", text, count=1) if other == text else other
         if other != text:
             yield {node: literal(other)}
@@ -194,15 +194,17 @@ def say_before_asking(source: Source, _: Setting) -> Iterator[Edit]:
 
 
 OPERATORS = (
-    Operator("forget-to-say", "Does not say something.", forget_to_say),
-    Operator("say-nothing-of-it", "Says something that tells nothing.", say_nothing_of_it),
+    Operator("forget-to-say", "Does not say something.", where(TELLING, forget_to_say)),
+    Operator("say-nothing-of-it", "Says something that tells nothing.", where(TELLING, say_nothing_of_it)),
     Operator(
-        "constant-for-a-value", "Reports a constant instead of what it counted or heard.", constant_for_value
+        "constant-for-a-value",
+        "Reports a constant instead of what it counted or heard.",
+        where(TELLING, constant_for_value),
     ),
-    Operator("hedge", "Reports all numbers, of which one is right.", hedge),
-    Operator("leave-out-a-clause", "Says only a part of a sentence.", leave_out_clause),
-    Operator("leave-out-a-value", "Leaves a value out of a message.", leave_out_value),
-    Operator("swap-values", "Mixes up two values in a message.", swap_values),
+    Operator("hedge", "Reports all numbers, of which one is right.", where(TELLING, hedge)),
+    Operator("leave-out-a-clause", "Says only a part of a sentence.", where(TELLING, leave_out_clause)),
+    Operator("leave-out-a-value", "Leaves a value out of a message.", where(TELLING, leave_out_value)),
+    Operator("swap-values", "Mixes up two values in a message.", where(TELLING, swap_values)),
     Operator("say-the-opposite", "Says the opposite.", say_the_opposite),
     Operator("say-before-asking", "Says before a question what should come after it.", say_before_asking),
 )

@@ -10,24 +10,34 @@ from typing import TypeAlias
 from codebotler.world import World
 from roboeval.mutation.rewriting import Edit, Source
 
+COMING_BACK = re.compile(
+    r"\b(come|came|coming|are) back\b|\bback (here|with me|to me)\b|\breturn (here|to me|to where)\b"
+)
+TELLING = re.compile(r"\b(tell|say|speak|report|inform|hear|know|announce|suggest)\b")
+STAYING_OUT = re.compile(
+    r"\b(no other room|nowhere else|no place besides|(other|remaining) rooms|just the labs|straight|directly)"
+)
+
 
 @dataclass(frozen=True)
 class Setting:
-    """The names that there are in the worlds of a task, in the order in which they first stand there.
+    """What operators may know of a task: the names in its worlds, in their order there, and its instruction.
 
     Args:
         rooms: all rooms but the start.
         people: who has a room of their own; of the others no instruction tells the name.
         things: what lies somewhere.
+        phrasings: of the instruction.
     """
 
     rooms: tuple[str, ...]
     people: tuple[str, ...]
     things: tuple[str, ...]
+    phrasings: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, worlds: Sequence[World]) -> Setting:
-        """The setting of some worlds."""
+    def of(cls, worlds: Sequence[World], phrasings: Sequence[str] = ()) -> Setting:
+        """The setting of some worlds and of an instruction."""
         starts = {world.robot for world in worlds}
         rooms = [room for world in worlds for room in world.rooms]
         owners = (re.fullmatch(r"(\w+)'s .+", room.name) for room in rooms)
@@ -35,7 +45,12 @@ class Setting:
             tuple(dict.fromkeys(room.name for room in rooms if room.name not in starts)),
             tuple(dict.fromkeys(owner[1] for owner in owners if owner)),
             tuple(dict.fromkeys(thing for room in rooms for thing in room.objects)),
+            tuple(phrasings),
         )
+
+    def asks_for(self, what: re.Pattern[str]) -> bool:
+        """Whether some phrasing asks for it; what none asks for, a program may leave out."""
+        return not self.phrasings or any(what.search(phrasing) for phrasing in self.phrasings)
 
     def idle_rooms(self, source: Source) -> tuple[str, ...]:
         """The rooms of whose names no word stands in any text of a program."""
@@ -63,6 +78,15 @@ class Operator:
     def __call__(self, source: Source, setting: Setting) -> Iterator[Edit]:
         """The edits of a program."""
         yield from self.edits(source, setting)
+
+
+def where(what: re.Pattern[str], edits: Edits) -> Edits:
+    """Edits of programs for those instructions only that ask for it."""
+
+    def only(source: Source, setting: Setting) -> Iterable[Edit]:
+        return edits(source, setting) if setting.asks_for(what) else ()
+
+    return only
 
 
 def others(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:

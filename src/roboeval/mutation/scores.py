@@ -23,6 +23,7 @@ class Job:
 
     Args:
         task: its name.
+        phrasings: of its instruction.
         programs: of which the right ones are mutated.
         scenarios: worlds with what they require.
         rules: how worlds are simulated.
@@ -32,6 +33,7 @@ class Job:
     """
 
     task: str
+    phrasings: Sequence[str]
     programs: Sequence[Original]
     scenarios: Sequence[Scenario]
     rules: Rules

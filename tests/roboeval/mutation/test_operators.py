@@ -135,3 +135,25 @@ def test_names_by_place_and_by_keyword_are_the_same_to_operators() -> None:
 
 def test_another_person_keeps_the_spelling_of_the_first() -> None:
     assert list(mutants(BY_NAME["wrong-person"], "say('BOB and bob')")) == [program("say('Alice and bob')")]
+
+
+LEFT_OUT = [
+    (
+        "drop-the-return",
+        "start = get_current_location()\ngo_to('lobby')\ngo_to(start)",
+        "Go there and come back.",
+    ),
+    ("detour", "go_to('lobby')", "Take it straight to the lobby."),
+    ("forget-to-say", "say('It is done.')", "Do it and tell me."),
+]
+
+
+@pytest.mark.parametrize(("name", "body", "asking"), LEFT_OUT, ids=[name for name, *_ in LEFT_OUT])
+def test_what_no_phrasing_asks_for_may_be_left_out(name: str, body: str, asking: str) -> None:
+    source = read(program(body))
+    assert source is not None
+    made = {
+        phrasings: len([*BY_NAME[name](source, Setting.of([WORLD], phrasings))])
+        for phrasings in ((), ("Go to the lobby.",), ("Go to the lobby.", asking))
+    }
+    assert [*made.values()] == [1, 0, 1]
