@@ -13,13 +13,15 @@ _TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ni
 _WORDS = {word: n for n, word in enumerate(_ONES)} | {word: 20 + 10 * n for n, word in enumerate(_TENS)}
 _NOTHING = r"no one|no-one|noone|nobody|nothing|none|neither|no"
 
+_NEAR = 60  # characters within which words belong together; without an end, long texts would take for ever
+
 _UNITS = "|".join(_ONES[1:10])
 _NUMBER = re.compile(
     rf"(?P<digits>(?<![\w.,:/-])-?\d+(?:\.\d+)?(?![\w:]|\.\d))"
     rf"|\b(?P<tens>{'|'.join(_TENS)})(?:[ -](?P<units>{_UNITS}))?\b"
     rf"|\b(?P<hundred>(?:(?:a|one) )?hundred)\b"
     rf"|\b(?P<nothing>{_NOTHING})\b"
-    rf"|(?P<negated>(?:\bnot|n['\u2019]t)\b[^.,;!?]*?\bany(?:body|one|thing)?\b)"
+    rf"|(?P<negated>(?:\bnot|n['\u2019]t)\b[^.,;!?]{{0,{_NEAR}}}?\bany(?:body|one|thing)?\b)"
     rf"|\b(?P<word>{'|'.join(_ONES)})\b",
     re.IGNORECASE,
 )
@@ -56,7 +58,7 @@ def _told(matches: list[re.Match[str]]) -> tuple[int, int, tuple[float, ...]]:
 
 
 def _is_none(match: re.Match[str], text: str) -> bool:
-    before = text[: match.start()]
+    before = text[max(0, match.start() - _NEAR) : match.start()]
     if match["word"] and match["word"].lower() == "one" and _PRONOUN.search(before):
         return True
     return _OF.search(before) is not None and not match["nothing"]
