@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Route, expect
 
-from faces import ASKS, REFUSED, SPEAKING, TWICE, face_of, option, said
+from faces import ASKS, REFUSED, SPEAKING, TWICE, face_of, option, said, until
 from pageserver import PageServer
 from server import Server
 from viewing import PHONE, OpenPage
@@ -245,9 +245,14 @@ def test_a_tool_that_is_gone_is_said_and_found_again(tmp_path: Path, opened: Ope
             expecting="WebSocket connection",
         )
         expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do just now.")
+        face.locator("h1, body").first.click(position={"x": 5, "y": 5})
+        server.run("def task_program():\n    for number in range(4):\n        say(str(number))\n")
+        until(face, "window.spoken.includes('3')")
     expect(face.locator("#doing")).to_have_text("The robot cannot be reached. Trying again …")
-    with PageServer(tmp_path, "--face", *tokens, "--port", str(port)):
+    with PageServer(tmp_path, "--face", *tokens, "--port", str(port)) as server:
         expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do just now.")
+        server.run("def task_program():\n    say('here again')\n")
+        until(face, "window.spoken.includes('here again')")
         face.context.close()
 
 

@@ -208,6 +208,62 @@ def test_two_who_type_at_once_end_with_the_same_text(server: PageServer, opened:
     assert first.evaluate("programEditor.text()") == second.evaluate("programEditor.text()") == program
 
 
+def test_who_was_slower_at_the_same_moment_is_told(server: PageServer, opened: OpenPage) -> None:
+    first, second = opened(server), opened(server)
+    checked(first, TEA)
+    expect(second.locator(".cm-content")).to_contain_text("Tea for ann")
+    for page in (first, second):
+        page.locator(".cm-content").click()
+        page.keyboard.press("Control+End")
+    second.evaluate("programEditor.show = () => {}")  # what the tool says comes too late
+    first.keyboard.insert_text("# of the first\n")
+    expect(first.get_by_text("The check found no problem.")).to_be_visible()
+    while "# of the first" not in server.call("GET", "/api/missions/current").data["program"]:
+        first.wait_for_timeout(50)
+    second.keyboard.insert_text("# of the second\n")
+    expect(second.get_by_text("Somebody else changed the program meanwhile")).to_be_visible()
+    assert "# of the second" not in server.call("GET", "/api/missions/current").data["program"]
+
+
+def test_what_was_typed_just_before_a_click_is_checked_and_kept(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    checked(page, TEA)
+    button = page.get_by_role("button", name="Run it on the robot")
+    expect(button).to_be_enabled()
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+End")
+    page.keyboard.insert_text("# one more")
+    button.evaluate("button => button.click()")
+    expect(page.get_by_text("What was just typed is checked first.")).to_be_visible()
+    page.wait_for_function(
+        "fetch('/api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))"
+    )
+    expect(page.locator(".headline")).to_have_text("Waits for your word")
+    expect(page.locator(".cm-content")).to_contain_text("# one more")
+
+
+def test_undoing_is_for_what_was_typed_here(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    checked(page, TEA)
+    page.keyboard.insert_text("# mine")
+    expect(page.locator(".cm-content")).to_contain_text("# mine")
+    server.call("PUT", "/api/missions/current/program", {"program": FAR})
+    expect(page.locator(".cm-content")).to_contain_text("range(50)")
+    for _ in range(5):
+        page.keyboard.press("Control+z")
+    expect(page.locator(".cm-content")).to_contain_text("range(50)")
+
+
+def test_a_program_that_is_too_long_is_refused_in_a_sentence(server: PageServer, opened: OpenPage) -> None:
+    page = opened(server)
+    checked(page, TEA)
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text("# " + "x" * 200_000)
+    expect(page.get_by_text("A program has at most 200,000 characters")).to_be_visible()
+    expect(page.locator(".cm-content")).to_contain_text("Tea for ann, please")
+
+
 def test_a_despite_is_for_one_program_only(server: PageServer, opened: OpenPage) -> None:
     page = opened(server)
     write(page, BAD)

@@ -21,7 +21,8 @@ from codebotler.mission import MissionError
 from codebotler.missionlog import EVENTS, Line, Summary, events_of
 from codebotler.missionmcap import write_mcap
 from codebotler.web.desk import MOST_PROGRAM, Desk
-from codebotler.web.turn import Order, Turn, View
+from codebotler.web.turn import Turn
+from codebotler.web.view import Order, View
 
 HERE = "current"
 """Names the mission at hand in an address."""

@@ -19,7 +19,8 @@ from codebotler.robots.face import Face
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.imagined import Plan
 from codebotler.web.board import Board
-from codebotler.web.turn import Means, Order, Turn, View
+from codebotler.web.turn import Means, Turn
+from codebotler.web.view import Order, View
 from codebotler.world import World
 
 MOST_PROGRAM = 200_000

@@ -34,8 +34,8 @@ class Answer(BaseModel):
     """What somebody answers."""
 
     model_config = ConfigDict(extra="forbid")
-    question: int = Field(ge=1, description="The number of the question.")
-    option: int = Field(ge=0, description="The position of the chosen option, from 0.")
+    question: int = Field(strict=True, ge=1, description="The number of the question.")
+    option: int = Field(strict=True, ge=0, description="The position of the chosen option, from 0.")
 
 
 def router(desk: Desk, face: Face) -> APIRouter:

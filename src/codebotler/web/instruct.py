@@ -17,7 +17,7 @@ from codebotler.running import unknown_rooms
 from codebotler.simulator.imagined import Plan
 from codebotler.terminal import shortened
 from codebotler.web.desk import Desk
-from codebotler.web.turn import Order, View
+from codebotler.web.view import Order, View
 from codebotler.web.words import Press, Words
 
 MOST_EXAMPLES, MOST_BEFORE = 4, 6
@@ -60,6 +60,8 @@ class Instruct:
         """Fill in what has to be read first: examples, and what was asked for before."""
         examples = await asyncio.to_thread(_examples, self._desk)
         before = await asyncio.to_thread(_before, self._desk)
+        if self._examples.is_deleted:  # the page was closed meanwhile
+            return
         if examples:
             self._fill(self._examples, "Examples", [(text, "") for text in examples])
         if before:

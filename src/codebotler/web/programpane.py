@@ -15,10 +15,10 @@ from codebotler.mission import MissionError, State
 from codebotler.problems import Check
 from codebotler.skills import SKILLS
 from codebotler.terminal import shortened
-from codebotler.web.desk import Desk
+from codebotler.web.desk import MOST_PROGRAM, Desk
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import Strip, strips
-from codebotler.web.turn import View
+from codebotler.web.view import View
 from codebotler.web.words import Press, Words
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
@@ -92,11 +92,22 @@ class ProgramPane:
             ui.run_javascript(f"programEditor.show({json.dumps(told)})")
 
     def _typed(self, event: GenericEventArguments) -> None:
-        """Have the desk check what was typed."""
-        typed, self._heard = str(event.args["text"]), int(event.args["number"])
-        if typed != _for_editor(self._desk.view.program):
+        """Have the desk check what was typed, unless somebody else was quicker."""
+        typed, self._heard = event.args["text"], int(event.args["number"])
+        current = _for_editor(self._desk.view.program)
+        if typed is None:
+            self._restore(f"A program has at most {MOST_PROGRAM:,} characters; this one was longer.")
+        elif event.args["base"] != current:
+            self._restore("Somebody else changed the program meanwhile; what you just typed is left out.")
+        elif typed != current:
             self._try(lambda: self._desk.edit(typed))
         self.show(self._desk.view)
+
+    def _restore(self, why: str) -> None:
+        """Have the browser show what the desk has, and say why."""
+        view = self._desk.view
+        self._tell(view, _for_editor(view.program), anyway=True)
+        ui.notify(why, type="warning", position="top", timeout=10_000)
 
     # --- somebody's word
 
@@ -148,12 +159,13 @@ class ProgramPane:
 
     async def _is_seen(self, view: View) -> bool:
         """Whether this browser shows that very program; two people may type at the same time."""
-        shown = _for_editor(view.program)
-        if await ui.run_javascript("programEditor.text()", timeout=5.0) == shown:
+        seen = await ui.run_javascript("programEditor.settle()", timeout=5.0)
+        if seen["text"] == _for_editor(view.program):
             return True
-        if self._view is view:
-            self._tell(view, shown, anyway=True)
-        ui.notify("The program was changed meanwhile; look at it again.", type="warning", position="top")
+        if seen["number"] > self._heard or seen["text"] == _for_editor(self._desk.view.program):
+            ui.notify("What was just typed is checked first.", position="top")
+        else:
+            self._restore("The program was changed meanwhile; look at it again.")
         return False
 
     def _again(self, *, repair: bool) -> None:

@@ -9,7 +9,7 @@ from codebotler.web.asking import Asking
 from codebotler.web.desk import Desk
 from codebotler.web.floorplan import floorplan
 from codebotler.web.progress import Moment
-from codebotler.web.turn import View
+from codebotler.web.view import View
 from codebotler.web.words import Press, Words
 from codebotler.world import Room, World, laid_out
 

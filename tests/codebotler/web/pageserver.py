@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from urllib.parse import unquote_plus
 
 WORLD = """about: a small house
 robot: hall
@@ -124,7 +125,7 @@ class PageServer:
 
     def call(self, method: str, path: str, body: object = None) -> Answer:
         """Send a request as the API's clients do, with the token."""
-        return self.ask(method, path, body, authorization=f"Bearer {self.token}")
+        return self.ask(method, path, body, authorization=f"Bearer {unquote_plus(self.token)}")
 
     @property
     def face_link(self) -> str:
@@ -133,7 +134,7 @@ class PageServer:
 
     def face(self, method: str, path: str, body: object = None) -> Answer:
         """Send a request with the token of the robot's face."""
-        return self.ask(method, path, body, authorization=f"Bearer {self.face_token}")
+        return self.ask(method, path, body, authorization=f"Bearer {unquote_plus(self.face_token)}")
 
     def run(self, program: str, *, despite_problems: bool = False) -> None:
         """Have the robot run a program, as the API's clients do."""

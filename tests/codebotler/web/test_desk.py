@@ -19,7 +19,7 @@ from codebotler.robots.base import Result, Robot
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.imagined import Plan
 from codebotler.web.desk import MOST_PROGRAM, Desk
-from codebotler.web.turn import Order, View, digest
+from codebotler.web.view import Order, View, digest
 from codebotler.world import Room, World
 from doubles import Answering
 
@@ -186,6 +186,34 @@ def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path
         view = until(desk, lambda view: view.may_be_approved and view.program == HELLO)
         assert view.problems == ()
         assert "cellar" in author.asked[1].messages[-1].text
+
+
+def test_a_model_that_fails_when_asked_again_takes_nothing_away(tmp_path: Path) -> None:
+    author = Author(BAD)
+    with desk_of(tmp_path, author=author) as desk:
+        turn = desk.begin(Order("say hello", "author"))
+        until(desk, lambda view: view.may_be_approved)
+        desk.edit(HELLO)
+        before = until(desk, lambda view: view.may_be_approved and view.program == HELLO)
+        turn.ask_again(repair=False)
+        view = until(desk, lambda view: bool(view.trouble))
+        assert view.trouble == "the model is not there"
+        assert (view.program, view.found, view.state) == (HELLO, before.found, State.CHECKED)
+        turn.approve(view.digest)
+        assert until(desk, lambda view: view.is_over).state is State.DONE
+        assert desk.view.program == HELLO
+
+
+def test_a_program_is_there_again_when_the_asking_is_stopped(tmp_path: Path) -> None:
+    author = Author(HELLO, BAD)
+    with desk_of(tmp_path, author=author) as desk:
+        turn = desk.begin(Order("say hello", "author"))
+        until(desk, lambda view: view.may_be_approved)
+        author.waits = True
+        turn.ask_again(repair=False)
+        until(desk, lambda view: view.program == BAD[:10])
+        desk.stop("a test")
+        assert until(desk, lambda view: view.is_over).program == HELLO
 
 
 def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:

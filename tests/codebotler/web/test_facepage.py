@@ -26,7 +26,7 @@ from codebotler.web.access import SHORTEST_TOKEN
 from codebotler.web.desk import Desk
 from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
 from codebotler.web.guard import MOST_BYTES
-from codebotler.web.turn import View
+from codebotler.web.view import View
 from codebotler.world import Room, World
 from pageserver import PageServer
 

@@ -88,7 +88,7 @@ def test_a_token_in_the_address_opens_pages_only(server: PageServer) -> None:
 
 
 def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
-    with PageServer(tmp_path) as server:
+    with PageServer(tmp_path, "--token", "one-that-a-person-made") as server:
         cookie = server.cookie
         wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(TRIES + 2)]
         assert wrong == [401] * TRIES + [429] * 2
@@ -96,6 +96,13 @@ def test_wrong_tokens_are_not_tried_for_ever(tmp_path: Path) -> None:
         forwarded = server.ask("GET", f"/?token={server.token}", x_forwarded_for="10.9.8.7")
         assert (forwarded.status, forwarded.headers["retry-after"]) == (429, "60")
         assert server.ask("GET", "/api/robot", cookie=cookie).status == 200  # who is in stays in
+
+
+def test_nobody_keeps_the_token_that_was_made_from_a_stop(tmp_path: Path) -> None:
+    with PageServer(tmp_path) as server:
+        wrong = [server.ask("GET", f"/?token=wrong{n}").status for n in range(TRIES + 1)]
+        assert wrong[-1] == 429
+        assert server.call("POST", "/api/stop").status == 202
 
 
 def test_tries_are_counted_by_address_and_for_a_while() -> None:
@@ -108,6 +115,16 @@ def test_tries_are_counted_by_address_and_for_a_while() -> None:
     assert access.of_token("a token", "there") is Role.OPERATOR
     now[0] = WINDOW
     assert access.of_token("a token", "here") is Role.OPERATOR
+
+
+def test_a_token_that_was_made_here_opens_whatever_was_tried_before() -> None:
+    access = Access.asked_for(None, "the tablet's own", open_to_all=False, is_loopback=True)
+    for _ in range(TRIES):
+        access.of_token("wrong", "here")
+    assert access.of_token(access.operator or "", "here") is Role.OPERATOR
+    for token in ("wrong", "the tablet's own"):
+        with pytest.raises(TooManyTriesError):
+            access.of_token(token, "here")
 
 
 def test_addresses_that_tried_are_not_kept_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:

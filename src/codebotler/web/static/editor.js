@@ -1,17 +1,23 @@
 // The program in the editor: sends what is typed, shows what the tool has, and lets neither undo the other.
 globalThis.programEditor = (() => {
   const PAUSE = 300; // milliseconds without a key, after which what was typed is sent
+  const MOST = 200_000; // characters; the tool takes no more, and tells so
   let editor; // NiceGUI's component, once it is there
   let latest; // what the tool said last
   let sent = 0; // how many texts were sent
   let waiting; // the timer of one that will be
+  let base = ""; // the program that was changed here: what the tool has, unless somebody else changed it too
 
   const text = () => editor.editor.state.doc.toString();
 
   const send = () => {
     if (!editor) return typed();
+    clearTimeout(waiting);
     waiting = undefined;
-    emitEvent("program-typed", { text: text(), number: ++sent });
+    const now = text();
+    const isTooLong = now.length > MOST;
+    emitEvent("program-typed", { text: isTooLong ? null : now, base, number: ++sent });
+    if (!isTooLong) base = now;
   };
 
   function typed() {
@@ -25,8 +31,29 @@ globalThis.programEditor = (() => {
     if (isOlder && !latest.anyway) return; // the tool answers each text, and that answer is newer
     clearTimeout(waiting);
     waiting = undefined;
-    editor.setEditorValue(latest.program);
+    base = latest.program;
+    put(latest.program);
     editor.setDecorations(latest.marks);
+  };
+
+  /** Only what differs, so that cursors stay; and undoing is for what was typed here. */
+  const put = (program) => {
+    const [view, old] = [editor.editor, text()];
+    if (old === program) return;
+    let start = 0;
+    while (start < old.length && old[start] === program[start]) start++;
+    let [to, end] = [old.length, program.length];
+    while (to > start && end > start && old[to - 1] === program[end - 1]) [to, end] = [to - 1, end - 1];
+    const { addToHistory } = view.state.update({}).constructor;
+    editor.emitting = false;
+    view.dispatch({ changes: { from: start, to, insert: program.slice(start, end) }, annotations: addToHistory.of(false) });
+    editor.emitting = true;
+  };
+
+  /** What is shown, and how many texts were sent; what was just typed goes at once. */
+  const settle = () => {
+    if (waiting !== undefined) send();
+    return { text: text(), number: sent };
   };
 
   const show = (what) => {
@@ -47,5 +74,5 @@ globalThis.programEditor = (() => {
     if (latest) apply();
   };
 
-  return { show, start, text, typed };
+  return { settle, show, start, text, typed };
 })();

@@ -206,7 +206,8 @@ function connect() {
     document.body.dataset.doing = "lost";
     put("doing", LOST);
     ask(null);
-    if (now) now.question = null;
+    now = null; // another tool may answer, which counts from 1 again
+    seen = 0;
     setTimeout(connect, AGAIN);
   });
 }
