@@ -225,6 +225,7 @@ def test_what_happens_is_announced_to_who_sees_no_screen(server: PageServer, ope
     expect(face.get_by_role("log", name="What the robot says")).to_contain_text("Good morning")
     line = face.locator("#said p").first
     line.evaluate("e => e.mark = 1")
+    expect(face.locator("#options button").first).to_be_enabled()
     face.keyboard.press("1")
     expect(said(face)).to_have_text("She says Yes")
     assert line.evaluate("e => e.mark") == 1, "what was announced is not written anew"

@@ -51,6 +51,13 @@ def recorded(task: Task) -> list[tuple[str, bool, str]]:
     ]
 
 
+@cache
+def verdicts_on_recorded(name: str) -> list[list[Verdict]]:
+    """How the recorded programs of a task do."""
+    task = plus().tasks[name]
+    return verdicts([program for *_, program in recorded(task)], task)
+
+
 def test_the_suite_of_the_paper_is_what_it_was() -> None:
     assert load_suite("paper").digest == "ea395de1c023ae42bcf293f8da46567226ecc850722a2ec3a081fb90c44b5ffb"
     assert sorted(plus().tasks) == TASKS
@@ -94,8 +101,7 @@ OTHERWISE = {
 @pytest.mark.parametrize("name", TASKS)
 def test_recorded_programs_are_judged_as_they_are_meant(name: str) -> None:
     task = plus().tasks[name]
-    programs = recorded(task)
-    judged = verdicts([program for *_, program in programs], task)
+    programs, judged = recorded(task), verdicts_on_recorded(name)
     wrong = [
         (
             about,
@@ -136,15 +142,15 @@ def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: 
         '    say("Hello, I am on my way.")\n    _task()\n'
         for program in programs
     ]
-    before, after = verdicts(programs, task), verdicts(changed, task)
-    assert [passes(one) for one in after] == [passes(one) for one in before]
+    before = verdicts_on_recorded(name)[::7]
+    assert [passes(one) for one in verdicts(changed, task)] == [passes(one) for one in before]
 
 
 @pytest.mark.parametrize("name", TASKS)
 def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
     task = plus().tasks[name]
     programs = [program for *_, program in recorded(task)]
-    right = [p for p, one in zip(programs, verdicts(programs, task), strict=True) if passes(one)][::6]
+    right = [p for p, one in zip(programs, verdicts_on_recorded(name), strict=True) if passes(one)][::6]
     assert right
     random = Random(name)
     worlds = [
