@@ -15,7 +15,6 @@ from made_up_runs import PROGRAM, SUITE, made_up
 from roboeval.report import beside
 from roboeval.reversals import (
     Judged,
-    Overtaking,
     Reversals,
     overtakings,
     place,
@@ -97,7 +96,7 @@ def test_who_changes_places() -> None:
     found = runs(a=(9, 3), b=(5, 5), c=(9, 2), d=(1, 1))
     assert [(one.one, one.other) for one in overtakings(found)] == [("b", "a"), ("a", "c"), ("b", "c")]
     tied = next(one for one in overtakings(found) if one.one == "a")
-    assert tied == Overtaking("a", "c", first=0.0, second=pytest.approx(0.1))
+    assert (tied.first, tied.second) == (0.0, pytest.approx(0.1))
     assert said_of_order(found) == [
         "b passes more often than a under strict, and less often than it under small.",
         "a passes more often than c under strict, and as often as it under small.",
@@ -161,6 +160,17 @@ def test_tables_of_the_report() -> None:
     groups = as_dicts("reversals", found)
     assert sum(group["completions"] for group in groups) == 6
     assert {group["passes"] for group in groups} == {"small only"}
+
+
+def test_a_report_shows_the_largest_groups_and_says_how_many_it_leaves_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(beside, "MOST", 2)
+    found = changed({"Visit": (10, 0)}, {"Visit": (0, 1)})
+    (table,) = (table for table in beside.sheets([found]) if table.name == "reversals")
+    sizes = [group["completions"] for group in as_dicts("reversals", [found])]
+    assert sizes == [2, 2]
+    assert table.notes[0].startswith("a: 6 smaller groups are left out")
 
 
 def test_a_report_reads_both_evaluations() -> None:

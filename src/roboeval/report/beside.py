@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from roboeval.clusters import Cluster
 from roboeval.records import Key, name_of
@@ -82,11 +83,26 @@ def _tasks(found: Sequence[Reversals]) -> Sheet:
 def _groups(found: Sequence[Reversals]) -> Sheet:
     heads = ("task", "class", "kind", "check", "why", "such as")
     columns = (Column("model"), Column("passes"), Column("completions", "count"), *map(Column, heads))
-    rows = [row for one in found for row in _rows(one)]
-    return sheet("reversals", "What passes by one of the checks only", columns, rows, about=GROUPS)
+    every = {one.name: [*_rows(one)] for one in found}
+    rows = [row for those in every.values() for row in those[:MOST]]
+    notes = [
+        f"{name}: {len(those) - MOST:,} smaller groups are left out; `roboeval compare --suites` shows them."
+        for name, those in every.items()
+        if len(those) > MOST
+    ]
+    title = "What passes by one of the checks only"
+    return sheet("reversals", title, columns, rows, about=GROUPS, notes=notes)
+
+
+MOST = 100  # groups of each run
 
 
 def _rows(one: Reversals) -> Iterator[list[Cell]]:
+    """A row for each group, the largest first."""
+    yield from sorted(_both_ways(one), key=lambda row: -row[2])
+
+
+def _both_ways(one: Reversals) -> Iterator[list[Any]]:
     sides: Iterable[tuple[str, Sequence[Cluster]]] = (
         (f"{one.suites[0]} only", one.first_only),
         (f"{one.suites[1]} only", one.second_only),
@@ -94,6 +110,6 @@ def _rows(one: Reversals) -> Iterator[list[Cell]]:
     for passes, groups in sides:
         for group in groups:
             failure = group.failure
-            ground: list[Cell] = [failure["class"], failure["kind"], failure["check"], group.why]
+            ground = [failure["class"], failure["kind"], failure["check"], group.why]
             size, example = len(group.members), name_of(group.representative)
             yield [one.name, passes, size, group.task, *ground, example]
