@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from roboeval.evaluate import evaluate
+from roboeval.verdicts import evaluate
 from roboeval.records import read_completions, recorded_completions, to_line
 from roboeval.suite import Suite, load_suite
 

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from roboeval.evaluate import evaluate, head
+from roboeval.verdicts import evaluate, head
 from roboeval.evaluation import Evaluation
 from roboeval.records import Completion, recorded_completions, to_line
 from roboeval.report.contents import Wishes, headline, sections

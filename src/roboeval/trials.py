@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from codebotler.models.recorded import NAMES, Reply, read_replies, recorded_model
 from codebotler.simulator.engine import run
-from roboeval.evaluate import judge
+from roboeval.verdicts import judge
 from roboeval.suite import Suite, Task
 from roboeval.taxonomy import Verdict
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from roboeval.evaluate import evaluate
+from roboeval.verdicts import evaluate
 from roboeval.records import Completion, read_completions
 from roboeval.suite import Suite
 

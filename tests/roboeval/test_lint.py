@@ -18,7 +18,7 @@ from codebotler.rtl import Formula, Regex, Without, Words, holds, parse
 from codebotler.rtl.formula import CutName
 from codebotler.trace import Event, Option, Trace
 from roboeval.catalogue import new_task
-from roboeval.evaluate import evaluate
+from roboeval.verdicts import evaluate
 from roboeval.findings import Finding, render
 from roboeval.lint import lint
 from roboeval.records import Completion

@@ -12,7 +12,7 @@ import yaml
 from codebotler.models.recorded import NAMES, recorded_model
 from codebotler.simulator.engine import run
 from codebotler.world import World
-from roboeval.evaluate import judge
+from roboeval.verdicts import judge
 from roboeval.mutation.variants import variants
 from roboeval.suite import Suite, Task, load_suite
 from roboeval.taxonomy import Verdict

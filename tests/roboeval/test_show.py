@@ -15,7 +15,7 @@ from codebotler.rtl import parse
 from codebotler.simulator.rules import Rules
 from codebotler.trace import Event, Option, Outcome, RunError, Status
 from codebotler.world import Person, Room, World
-from roboeval.evaluate import evaluation, judge, judgement
+from roboeval.verdicts import evaluation, judge, judgement
 from roboeval.records import Completion
 from roboeval.show import (
     Selection,

@@ -12,7 +12,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.trace import Outcome, Status
 from codebotler.world import World
-from roboeval.evaluate import judge
+from roboeval.verdicts import judge
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.suite import Scenario
 from roboeval.taxonomy import Verdict

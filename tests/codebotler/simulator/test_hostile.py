@@ -37,7 +37,7 @@ from codebotler.simulator.rules import Rules
 from codebotler.trace import Event, Outcome, Status
 from codebotler.tracefile import outcome_data
 from codebotler.world import Person, Room, World
-from roboeval.evaluate import judge
+from roboeval.verdicts import judge
 from roboeval.records import to_line
 from roboeval.suite import Requirement, Scenario
 

@@ -30,14 +30,20 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
         outcome: of the run.
         scenario: the world in which it ran, with its requirements.
     """
-    waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
-    if outcome.status is not Status.FINISHED and not waited:
+    if not may_satisfy(outcome, scenario):
         return Verdict(scenario.world.about, outcome, (), satisfied=False)
-    failed = tuple(r for r in scenario.require if not _is_met(r, outcome.trace))
+    failed = tuple(r for r in scenario.require if not is_met(r, outcome.trace))
     return Verdict(scenario.world.about, outcome, failed, satisfied=not failed)
 
 
-def _is_met(requirement: Requirement, trace: Trace) -> bool:
+def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
+    """Whether a run ended so that the requirements decide: by itself, or waiting where that is allowed."""
+    waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
+    return waited or outcome.status is Status.FINISHED
+
+
+def is_met(requirement: Requirement, trace: Trace) -> bool:
+    """Whether a trace satisfies a requirement; one that cannot be judged is not satisfied."""
     try:
         return holds(requirement.formula, trace)
     except CannotJudge:
