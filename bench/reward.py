@@ -1,7 +1,6 @@
 """How many programs a minute are rewarded? All are distinct, so that none is remembered; batches of 64.
 
-Beside it stands what `evaluate` does with the same programs in the same minute, where nothing is kept warm but
-within one call.
+Beside it stands what one call of `evaluate` does with the same programs, as what could be reached.
 """
 
 import sys

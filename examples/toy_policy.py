@@ -1,7 +1,7 @@
-"""A policy that learns to write a program from nothing but rewards (REINFORCE), in half a minute or less.
+"""A policy that learns to write a program from nothing but rewards (REINFORCE), in some seconds.
 
-It is far simpler than a language model: it writes a fixed program with three holes, and for each hole draws one of a
-few texts. What it learns is which to draw. The rewards are those a model would be trained with.
+It is far simpler than a language model: it writes a fixed program with three holes, and for each hole draws
+one of a few texts. What it learns is which to draw. The rewards are those a model would be trained with.
 """
 
 import math

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import atexit
 import os
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass
+from functools import partial
 from statistics import fmean
 
 from codebotler.badinput import BadInput
-from codebotler.simulator.engine import Lanes, digest
+from codebotler.simulator.engine import digest
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.warm import warm
 from codebotler.trace import Outcome
 from roboeval.records import unknown
 from roboeval.suite import Scenario, Suite, load_suite
@@ -63,7 +64,7 @@ def reward(
         chosen = chosen.with_worlds(worlds, seed)
     if (problem := unknown((task, prompt, 0), chosen)) is not None:
         raise BadInput(problem)
-    return _warm().rewards(chosen, task, programs)
+    return REWARDS.of(chosen, task, programs)
 
 
 @dataclass(frozen=True)
@@ -107,19 +108,14 @@ def total(shares: Sequence[Share]) -> float:
 
 
 class Rewards:
-    """Judges programs on lanes that stay warm, and remembers what came of each.
-
-    Raises:
-        EngineError: no isolated process could be started.
-    """
+    """Judges programs, equal ones once, and remembers what came of each."""
 
     def __init__(self) -> None:
-        self._lanes = Lanes(_cores())
         self._lock = threading.RLock()
         self._known: OrderedDict[bytes, float] = OrderedDict()
         self._running: dict[bytes, Future[float]] = {}
 
-    def rewards(self, suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
+    def of(self, suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
         """The rewards of programs, in their order.
 
         Raises:
@@ -129,10 +125,10 @@ class Rewards:
         free = [[is_met(requirement, ()) for requirement in scenario.require] for scenario in scenarios]
 
         def judged(program: str) -> float:
-            lane = self._lanes.here()
+            lane = warm().here()
             shares = []
             for scenario, its in zip(scenarios, free, strict=True):
-                outcome = lane.run(program, lambda s=scenario: SimulatedRobot(s.world, suite.rules))
+                outcome = lane.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
                 shares.append(Share.of(outcome, scenario, its))
             return total(shares)
 
@@ -147,13 +143,18 @@ class Rewards:
                     one.cancel()
             raise
 
-    def close(self) -> None:
-        """End all processes."""
-        self._lanes.__exit__()
+    def before_fork(self) -> None:
+        """Let nothing change in the meantime."""
+        self._lock.acquire()
 
-    def forget(self) -> None:
-        """Let go of the processes in a forked process."""
-        self._lanes.forget()
+    def after_fork(self) -> None:
+        """Go on, in the process that has forked."""
+        self._lock.release()
+
+    def begin_anew(self) -> None:
+        """Expect nothing of threads that are not here, in the process that was forked."""
+        self._running.clear()
+        self._lock.release()
 
     def _ask(self, name: bytes, program: str, judged: Callable[[str], float]) -> float | Future[float]:
         with self._lock:
@@ -161,7 +162,7 @@ class Rewards:
                 self._known.move_to_end(name)
                 return self._known[name]
             if name not in self._running:
-                future = self._running[name] = self._lanes.submit(judged, program)
+                future = self._running[name] = warm().submit(judged, program)
                 future.add_done_callback(lambda ended: self._remember(name, ended))
                 return future
             return self._running[name]
@@ -186,43 +187,7 @@ class Rewards:
                 self._known.popitem(last=False)
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-class Warm:
-    """The one of this process, made when it is first needed."""
-
-    def __init__(self) -> None:
-        self.lock = threading.Lock()
-        self.rewards: Rewards | None = None
-        self.inherited: list[Rewards] = []  # never taken apart: its threads are not here
-
-    def close(self) -> None:
-        """End all processes, with this one."""
-        with self.lock:
-            if self.rewards is not None:
-                self.rewards.close()
-                self.rewards = None
-
-    def forget(self) -> None:
-        """Begin anew in a forked process; the lock is held."""
-        if self.rewards is not None:
-            self.rewards.forget()
-            self.inherited.append(self.rewards)
-            self.rewards = None
-        self.lock.release()
-
-
-WARM = Warm()
-atexit.register(WARM.close)
+REWARDS = Rewards()
 os.register_at_fork(
-    before=WARM.lock.acquire, after_in_parent=WARM.lock.release, after_in_child=WARM.forget
+    before=REWARDS.before_fork, after_in_parent=REWARDS.after_fork, after_in_child=REWARDS.begin_anew
 )
-
-
-def _warm() -> Rewards:
-    with WARM.lock:
-        if WARM.rewards is None:
-            WARM.rewards = Rewards()
-        return WARM.rewards

@@ -16,11 +16,11 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.simulator.isolated import ONE_AT_A_TIME
 from codebotler.simulator.lane import EVENTS
+from codebotler.simulator.warm import warm
 from codebotler.trace import Event, Outcome, RunError, Status
 from processes import are_gone, children_of
-from roboeval import rewards as module
 from roboeval.records import recorded_completions
-from roboeval.rewards import Share, reward, total
+from roboeval.rewards import REWARDS, Share, reward, total
 from roboeval.suite import Suite
 from roboeval.verdicts import evaluate
 
@@ -115,28 +115,27 @@ def test_it_may_be_called_from_many_threads_at_once() -> None:
 
 
 def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    warm = module._warm()
+    lanes = warm()
     gate, patience = threading.Event(), 60
-    here = warm._lanes.here
-    monkeypatch.setattr(warm._lanes, "here", lambda: gate.wait(patience) and here())
+    here, plain_submit = lanes.here, lanes.submit
+    monkeypatch.setattr(lanes, "here", lambda: gate.wait(patience) and here())
     waited_for = distinct(8, "interrupted")
     asked = threading.Event()
-    lanes_submit = warm._lanes.submit
 
     def submit(*args: object) -> object:
         asked.set()
-        return lanes_submit(*args)  # type: ignore[arg-type]
+        return plain_submit(*args)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(warm._lanes, "submit", submit)
+    monkeypatch.setattr(lanes, "submit", submit)
     with ThreadPoolExecutor(1) as beside:
         other = beside.submit(reward, "SayGoodDay", 0, waited_for)
         assert asked.wait(patience)
+        threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
         with pytest.raises(KeyboardInterrupt):
-            threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
             reward("SayGoodDay", 0, [*waited_for, *distinct(1_000, "given up")])
         gate.set()
         assert other.result() == [1.0] * 8  # the other thread asks again for what was taken from it
-    assert not warm._running
+    assert not REWARDS._running
 
 
 def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:

@@ -55,8 +55,8 @@ def codes() -> IO[bytes]:
 
 
 ONE_AT_A_TIME = threading.Lock()
-# Who forks this process in the middle of a start would get half of it: a lock that nobody opens, and the end of
-# a pipe on whose closing the start waits.
+# Who forks this process in the middle of a start would get half of it: a lock that nobody opens, and the end
+# of a pipe on whose closing the start waits.
 os.register_at_fork(
     before=ONE_AT_A_TIME.acquire,
     after_in_parent=ONE_AT_A_TIME.release,

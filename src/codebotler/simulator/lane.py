@@ -100,7 +100,7 @@ class Lane:
             self._zygotes.popitem()[1].close()
 
     def forget(self) -> None:
-        """Close what a forked process has inherited, without a word to the processes, which are not its own."""
+        """Close what a forked process has inherited, and let the processes be, which are not its own."""
         self._preparer.forget()
         while self._zygotes:
             self._zygotes.popitem()[1].forget()
