@@ -114,6 +114,7 @@ def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
         "serve.md",
         "ros.md",
         "perception.md",
+        "library.md",
     ],
 )
 def test_pages_are_linked(page: str) -> None:
