@@ -5,12 +5,15 @@ from __future__ import annotations
 import contextlib
 import platform
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 
 from codebotler import __version__
 from codebotler.badinput import BadInput
 from codebotler.checker import Settings, check_on
-from codebotler.simulator.engine import Lanes, digest
+from codebotler.simulator.engine import digest
 from codebotler.simulator.imagined import Plan
+from codebotler.simulator.lane import Lane
+from roboeval.engines import Local, OpenEngine
 from roboeval.records import Appender, Completion, read_rows, to_line
 from roboeval.run import Run, load_head, to_text, write_whole
 from roboeval.suite import Suite
@@ -44,12 +47,15 @@ class Checks:
         self.problems: dict[tuple[str, str], list[str]] = {}
         """What is wrong with a program, by its task and its hash."""
 
-    def add(self, completions: Iterable[Completion], *, workers: int = 1) -> Iterator[list[str]]:
+    def add(
+        self, completions: Iterable[Completion], *, workers: int = 1, engine: OpenEngine | None = None
+    ) -> Iterator[list[str]]:
         """Check those programs that were not checked before; yields the problems of each program once.
 
         Args:
             completions: of tasks of the suite.
             workers: how many programs are checked at the same time.
+            engine: where they are, instead of in so many lanes of this machine.
 
         Raises:
             BadInput: the run is being written, or somebody broke a file of checks.
@@ -63,25 +69,21 @@ class Checks:
                 programs = {(c.task, c.program_sha256): c.program for c in completions}
                 yield from (self.problems[key] for key in programs if key in self.problems)
                 left = {key: program for key, program in programs.items() if key not in self.problems}
-                for key, problems in self._checked(left, workers):
+                for key, problems in self._checked(left, engine or Local(workers)):
                     file.append(to_line({"task": key[0], "program_sha256": key[1], "problems": problems}))
                     self.problems[key] = problems
                     yield problems
 
     def _checked(
-        self, programs: Mapping[tuple[str, str], str], workers: int
+        self, programs: Mapping[tuple[str, str], str], engine: OpenEngine
     ) -> Iterator[tuple[tuple[str, str], list[str]]]:
         if not programs:
             return
-        with Lanes(workers) as lanes:
-
-            def check(key: tuple[str, str]) -> list[str]:
-                found = check_on(lanes.here(), programs[key], self._plans[key[0]], self._settings)
-                return [problem.sentence for problem in found.problems]
-
-            yield from zip(
-                programs, lanes.map_distinct(check, programs, name=lambda key: digest(*key)), strict=True
-            )
+        checking = partial(problems, self._plans, self._settings)
+        works = ((task, program) for (task, _), program in programs.items())
+        with engine as opened:
+            found = opened.map_distinct(checking, works, name=lambda work: digest(*work))
+            yield from zip(programs, found, strict=True)
 
     def _begin(self) -> None:
         """Keep what was checked alike, and forget anything else."""
@@ -99,3 +101,9 @@ class Checks:
                     self.problems[task, program] = problems
                 case _:
                     raise BadInput("this line tells of no check; delete the file", file=path, line=number)
+
+
+def problems(plans: Mapping[str, Plan], settings: Settings, lane: Lane, work: tuple[str, str]) -> list[str]:
+    """What is wrong with a program, the second of the two, in sentences; the first is its task."""
+    task, program = work
+    return [problem.sentence for problem in check_on(lane, program, plans[task], settings).problems]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.badinput import BadInput
+from roboeval.engines import OpenEngine
 from roboeval.records import HASH_LINE, Appender, Completion, length_before, name_of, read_judged, to_line
 from roboeval.run import Run, evaluation_key, load_head, to_text, write_whole
 from roboeval.suite import Suite
@@ -25,6 +26,7 @@ def evaluate_run(
     redo: bool,
     workers: int,
     require_isolation: bool = False,
+    engine: OpenEngine | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Judge a run's completions, going on where an earlier evaluation stopped; yields all rows in order.
 
@@ -36,6 +38,7 @@ def evaluate_run(
         redo: whether to start over.
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing.
+        engine: where programs are run instead of on this machine.
 
     Raises:
         BadInput: the run is being written, or was judged otherwise or holds other completions than it did.
@@ -61,6 +64,7 @@ def evaluate_run(
                 ablated=ablated,
                 workers=workers,
                 require_isolation=require_isolation,
+                engine=engine,
             ):
                 # The hash comes first: a crash in between leaves one too many, and no row without one.
                 programs.append(f"{hashes.popleft()}\n".encode())

@@ -5,17 +5,18 @@ from __future__ import annotations
 import platform
 from collections import deque
 from collections.abc import Iterable, Iterator
-from contextlib import nullcontext
+from functools import partial
 from typing import Any
 
 from codebotler import __version__
 from codebotler.rtl import CannotJudge, holds
-from codebotler.simulator.engine import Lanes, digest
+from codebotler.simulator.engine import digest
+from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
-from codebotler.world import World
+from roboeval.engines import Local, OpenEngine
 from roboeval.records import Completion
 from roboeval.suite import Requirement, Scenario, Suite
 from roboeval.taxonomy import Verdict, failure
@@ -58,7 +59,7 @@ def evaluate(
     ablated: bool = False,
     workers: int = 1,
     require_isolation: bool = False,
-    lanes: Lanes | None = None,
+    engine: OpenEngine | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Judge completions, yielding one row each in their order; equal programs of a task run once.
 
@@ -68,21 +69,11 @@ def evaluate(
         ablated: whether to require common sense only; then all tasks have an ablation.
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
-        lanes: what runs programs, for who judges now and then; without it, as many as `workers` are started
-            and ended.
+        engine: where programs are run; by default in so many lanes of this machine, started and ended for it.
 
     Raises:
         EngineError: no isolated process can be started.
     """
-
-    def judged(work: tuple[str, str]) -> dict[str, Any]:
-        task, program = work
-        scenarios = suite.tasks[task].judged_in(ablated=ablated)
-        return judgement([judge(run(program, scenario.world), scenario) for scenario in scenarios])
-
-    def run(program: str, world: World) -> Outcome:
-        return open_lanes.here().run(program, lambda: SimulatedRobot(world, suite.rules))
-
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -90,10 +81,18 @@ def evaluate(
             waiting.append(completion)
             yield completion.task, completion.program
 
-    own = nullcontext(lanes) if lanes else Lanes(workers, require_isolation=require_isolation)
-    with own as open_lanes:
-        for told in open_lanes.map_distinct(judged, works(), name=lambda work: digest(*work)):
+    with engine or Local(workers, require_isolation=require_isolation) as opened:
+        judging = partial(judged, suite, ablated=ablated)
+        for told in opened.map_distinct(judging, works(), name=lambda work: digest(*work)):
             yield evaluation(waiting.popleft(), told)
+
+
+def judged(suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool) -> dict[str, Any]:
+    """What is said of a program, the second of the two, in all worlds of a task, the first."""
+    task, program = work
+    scenarios = suite.tasks[task].judged_in(ablated=ablated)
+    outcomes = (lane.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios)
+    return judgement([judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
 
 
 def evaluation(completion: Completion, told: dict[str, Any]) -> dict[str, Any]:

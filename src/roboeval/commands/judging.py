@@ -11,6 +11,7 @@ import typer
 from codebotler.cli import STOPPED
 from roboeval.commands.options import (
     AblationOption,
+    EngineOption,
     JsonOption,
     RunArgument,
     SuiteOption,
@@ -18,6 +19,7 @@ from roboeval.commands.options import (
     as_judged,
     command,
     cores,
+    engine_named,
     load,
     named,
     open_evaluation,
@@ -26,6 +28,7 @@ from roboeval.commands.options import (
 from roboeval.terminal import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
+    from roboeval.engines import OpenEngine
     from roboeval.evaluation import Scope
     from roboeval.records import Key
     from roboeval.suite import Suite
@@ -51,7 +54,7 @@ def evaluate(
     seed: Annotated[
         int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
     ] = None,
-    engine: Annotated[str, typer.Option(help="local or ray.")] = "local",
+    engine: EngineOption = "local",
     require_isolation: Annotated[
         bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
     ] = False,
@@ -63,7 +66,7 @@ def evaluate(
     from roboeval.run import Run, open_source, tasks_to_judge
     from roboeval.verdicts import evaluate as judge_all
 
-    refuse_what_comes_later(engine)
+    opened_engine = engine_named(engine, workers, require_isolation=require_isolation)
     judged_by = load(suite)
     if worlds is not None or seed is not None:
         judged_by = judged_by.with_worlds(worlds, seed)
@@ -80,7 +83,12 @@ def evaluate(
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
             run.keep(opened)
-        how = How(ablated=ablation, workers=workers or cores(), require_isolation=require_isolation)
+        how = How(
+            ablated=ablation,
+            workers=workers or cores(),
+            require_isolation=require_isolation,
+            engine=opened_engine,
+        )
         rows = (
             judge_all(opened.of(wanted), judged_by, **how)
             if run is None
@@ -189,20 +197,13 @@ def import_(
     note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
 
 
-def refuse_what_comes_later(engine: str) -> None:
-    """End with a sentence about options that are promised and not there yet, or never were."""
-    if engine not in {"local", "ray"}:
-        fail(f'there is no engine "{engine}"; there is local, and ray is not there yet')
-    if engine != "local":
-        fail(f"--engine {engine} is not there yet; leave it out to judge on this machine")
-
-
 class How(TypedDict):
     """How completions are judged."""
 
     ablated: bool
     workers: int
     require_isolation: bool
+    engine: OpenEngine
 
 
 class Tally:

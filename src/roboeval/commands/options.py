@@ -12,6 +12,7 @@ import typer
 from roboeval.terminal import fail, note
 
 if TYPE_CHECKING:
+    from roboeval.engines import OpenEngine
     from roboeval.evaluation import Evaluation
     from roboeval.suite import Suite
 
@@ -29,6 +30,9 @@ RunArgument = Annotated[Path, typer.Argument(help="A run.", parser=named("a run"
 SuiteOption = Annotated[str, typer.Option(help="A suite that ships with the package, or a folder.")]
 TasksOption = Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common sense only.")]
+EngineOption = Annotated[
+    str, typer.Option(help="Where programs are run: local, on this machine, or ray, on a Ray cluster.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
@@ -124,3 +128,16 @@ def expect_current(evaluation: Evaluation, suite: Suite, suite_name: str) -> Non
 def cores() -> int:
     """How many programs to run at the same time."""
     return os.cpu_count() or 1
+
+
+def engine_named(name: str, workers: int | None, *, require_isolation: bool = False) -> OpenEngine:
+    """The engine that a user names."""
+    from roboeval.engines import Local
+
+    if name == "local":
+        return Local(workers or cores(), require_isolation=require_isolation)
+    if name != "ray":
+        fail(f'there is no engine "{name}"; there are local and ray')
+    from roboeval.rayengine import Cluster
+
+    return Cluster(workers, require_isolation=require_isolation)

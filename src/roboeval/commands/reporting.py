@@ -224,6 +224,7 @@ def judged_run(
     """A run with its verdicts, those of the ablation, and what the check says of its programs."""
     from dataclasses import replace
 
+    from roboeval.engines import Local
     from roboeval.report.reading import read_run, scored
     from roboeval.resampling import ran
     from roboeval.run import evaluation_key
@@ -243,4 +244,4 @@ def judged_run(
         alone = open_evaluation(folder.path, suite, suite_name, ablated=True)
         run = replace(run, ablated=scored(watched(alone.rows(), "reading", alone.scope.total), suite))
         expect_current(alone, suite, suite_name)
-    return replace(run, trials=checked(evaluation, suite, ended, workers=workers)) if check else run
+    return replace(run, trials=checked(evaluation, suite, ended, engine=Local(workers))) if check else run

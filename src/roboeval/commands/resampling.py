@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.commands.options import (
+    EngineOption,
     JsonOption,
     RunArgument,
     SuiteOption,
-    cores,
+    as_judged,
+    engine_named,
     expect_current,
     load,
     open_evaluation,
@@ -19,6 +21,7 @@ from roboeval.commands.options import (
 from roboeval.terminal import print_json, print_rich, watched
 
 if TYPE_CHECKING:
+    from roboeval.engines import OpenEngine
     from roboeval.evaluation import Evaluation
     from roboeval.records import Key
     from roboeval.resampling import Prompt
@@ -38,18 +41,20 @@ def resample(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
     ] = None,
+    engine: EngineOption = "local",
     json: JsonOption = False,
 ) -> None:
     """What asking again for programs that a check rejects would have given, from a judged run."""
     from roboeval.resampling import LIMITS, curve_data, ran, render
     from roboeval.tables import key_of
 
-    judged_by = load(suite)
+    checker = engine_named(engine, workers)
+    judged_by = as_judged(run, load(suite), ablated=False)
     evaluation = open_evaluation(run, judged_by, suite, ablated=False)
     rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
     ended = {key_of(row): (ran(row), bool(row["passed"])) for row in rows}
     expect_current(evaluation, judged_by, suite)
-    prompts = checked(evaluation, judged_by, ended, samples=samples, seed=seed, workers=workers or cores())
+    prompts = checked(evaluation, judged_by, ended, samples=samples, seed=seed, engine=checker)
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
         print_json({"suite": judged_by.name, "samples": samples, "seed": seed, **curve_data(prompts, limits)})
@@ -64,7 +69,7 @@ def checked(
     *,
     samples: int = 5,
     seed: int = 0,
-    workers: int,
+    engine: OpenEngine,
 ) -> tuple[Prompt, ...]:
     """The completions of a run by prompt, as the check sees them; what it said stays in the run.
 
@@ -74,14 +79,14 @@ def checked(
         ended: which completions, and of each whether it ran without an error and whether it passed.
         samples: how many worlds to imagine for each program.
         seed: from which they are drawn.
-        workers: how many programs are checked at the same time.
+        engine: where programs are checked.
     """
     from roboeval.checks import Checks
     from roboeval.resampling import Trial, by_prompt
 
     programs = {c.key: (c.task, c.program_sha256) for c in evaluation.judged() if c.key in ended}
     checks = Checks(evaluation.run, suite, samples=samples, seed=seed)
-    checking = checks.add((c for c in evaluation.judged() if c.key in ended), workers=workers)
+    checking = checks.add((c for c in evaluation.judged() if c.key in ended), engine=engine)
     for _ in watched(checking, "checking", len(set(programs.values()))):
         pass
     return by_prompt(

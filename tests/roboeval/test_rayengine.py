@@ -1,0 +1,227 @@
+"""Judging on a Ray cluster: a head and two nodes, started as processes that only this machine reaches."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.simulator.distinct import MOST_AHEAD
+from codebotler.simulator.engine import NO_SECCOMP, EngineError
+from codebotler.simulator.lane import Lane
+from command_line import ENVIRONMENT, roboeval
+from roboeval import rayengine
+from roboeval.engines import Local
+from roboeval.rayengine import LARGEST, OURS, Cluster, Shards, Told, call_all
+from roboeval.records import recorded_completions
+from roboeval.suite import Suite
+from roboeval.verdicts import evaluate
+
+os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0123456789abcdef" * 4}  # read when it is imported
+ray = pytest.importorskip("ray")
+cluster_utils = pytest.importorskip("ray.cluster_utils")
+
+HERE = "127.0.0.1"
+
+
+class Nodes:
+    """A head without a core, and nodes with one each, as processes of this machine."""
+
+    def __init__(self) -> None:
+        head = {"num_cpus": 0, "node_ip_address": HERE, "include_dashboard": False}
+        self._cluster = cluster_utils.Cluster(initialize_head=True, head_node_args=head)
+        self._nodes = [self._cluster.add_node(num_cpus=1, node_ip_address=HERE) for _ in range(2)]
+        self.address = str(self._cluster.address)
+
+    def kill(self) -> None:
+        """Kill a node with all that belongs to it, as a machine that loses its power."""
+        self._cluster.remove_node(self._nodes.pop(), allow_graceful=False)
+
+    def end(self) -> None:
+        self._cluster.shutdown()
+
+
+@pytest.fixture(scope="module")
+def nodes() -> Iterator[Nodes]:
+    nodes = Nodes()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_ADDRESS", nodes.address)
+        yield nodes
+    nodes.end()
+
+
+def environment(nodes: Nodes) -> dict[str, str]:
+    return {**ENVIRONMENT, **os.environ, "RAY_ADDRESS": nodes.address}
+
+
+def test_the_command_writes_the_same_bytes(nodes: Nodes, tmp_path: Path) -> None:
+    local = roboeval("evaluate", "recorded:hasty", "--out", "local", cwd=tmp_path)
+    far = roboeval(
+        *("evaluate", "recorded:hasty", "--out", "far", "--engine", "ray"),
+        cwd=tmp_path,
+        environment=environment(nodes),
+    )
+    assert (far.status, far.out.replace("far", "local")) == (0, local.out), far
+    assert re.fullmatch(r"verdicts are in far; .*\n", far.err), far.err
+    for name in ("paper.jsonl", "paper.sha256", "paper.json"):
+        there, here = (tmp_path / run / "evaluations" / name for run in ("far", "local"))
+        assert there.read_bytes() == here.read_bytes()
+
+
+def test_checks_are_the_same(nodes: Nodes, tmp_path: Path) -> None:
+    few = ("--tasks", "LunchTime,GetDrink")
+    for name in ("local", "far"):
+        assert roboeval("evaluate", "recorded:careful", *few, "--out", name, cwd=tmp_path).status == 0
+    local = roboeval("resample", "local", "--json", cwd=tmp_path)
+    far = roboeval(
+        *("resample", "far", "--json", "--engine", "ray"), cwd=tmp_path, environment=environment(nodes)
+    )
+    assert (far.status, json.loads(far.out)) == (0, json.loads(local.out)), far
+    checks = [(tmp_path / name / "checks" / "paper.jsonl").read_bytes() for name in ("far", "local")]
+    assert checks[0] == checks[1] != b""
+
+
+@pytest.mark.usefixtures("nodes")
+def test_keys_are_read_as_they_are_needed_and_equal_ones_are_one_call() -> None:
+    read: list[int] = []
+
+    def keys() -> Iterator[int]:
+        for number in range(100_000):
+            read.append(number)
+            yield number % 3000
+
+    with Cluster(2) as cluster:
+        results = cluster.map_distinct(
+            lambda _, key: (key, time.time_ns()), keys(), name=lambda key: str(key).encode()
+        )
+        first = [next(results) for _ in range(50)]
+        assert [key for key, _ in first] == list(range(50))
+        assert len(read) <= 50 + MOST_AHEAD
+        more = [next(results) for _ in range(6000)]
+        del results
+    assert more[2950:3000] == first  # the very same calls
+    assert len(read) <= 6050 + MOST_AHEAD
+
+
+@pytest.mark.usefixtures("nodes")
+def test_what_a_call_throws_is_thrown_here() -> None:
+    def broken(_lane: Lane, key: int) -> int:
+        return 1 // (key - 1)
+
+    with Cluster() as cluster:
+        results = cluster.map_distinct(broken, [0, 1], name=lambda key: str(key).encode())
+        with pytest.raises(ZeroDivisionError):
+            list(results)
+
+
+def test_a_node_that_is_killed_in_the_middle_loses_nothing(nodes: Nodes, suite: Suite) -> None:
+    completions = list(recorded_completions("recorded:hasty", suite))
+    here = list(evaluate(completions, suite, engine=Local(2)))
+    with Cluster() as cluster:
+        assert cluster._cores() == 2
+        there: list[dict[str, Any]] = []
+        for row in evaluate(completions, suite, engine=Same(cluster)):
+            there.append(row)
+            if len(there) == 20:
+                nodes.kill()
+        assert there == here
+        assert cluster._cores() == 1  # it was really gone
+
+
+class Same:
+    """A cluster that is open already."""
+
+    def __init__(self, cluster: Cluster) -> None:
+        self.cluster = cluster
+
+    def __enter__(self) -> Cluster:
+        return self.cluster
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+
+def test_a_cluster_without_a_core_ends_with_a_sentence(nodes: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rayengine, "PATIENCE", 1)
+    nodes.kill()
+    with Cluster() as cluster:
+        results = cluster.map_distinct(lambda _, key: key, [1, 2], name=lambda key: str(key).encode())
+        with pytest.raises(EngineError, match="has no core left"):
+            list(results)
+
+
+# --- without a cluster
+
+
+def test_shards_are_small_at_first() -> None:
+    given: list[list[int]] = []
+
+    def give(keys: Any) -> int:  # noqa: ANN401
+        given.append(list(keys))
+        return len(given)
+
+    shards: Shards[int] = Shards(give)
+    keys = iter(range(1000))
+    for _ in range(60):
+        for _, key in zip(range(shards.size(4)), keys, strict=False):
+            shards.add(str(key).encode(), key)
+        shards.send()
+    sizes = list(map(len, given))
+    assert sizes[:8] == [1] * 8
+    assert sizes == sorted(sizes)
+    assert sizes[-1] == LARGEST
+    assert [key for those in given for key in those] == list(range(sum(sizes)))
+    shards.send()  # there is nothing in it
+    assert len(given) == 60
+
+
+def test_another_version_does_not_judge() -> None:
+    told = call_all(lambda _, key: key, [1], ("0.0.1", "3.9"))
+    assert told.values == ()
+    assert "and not codebotler 0.0.1 with Python 3.9" in str(told.complaint)
+    assert call_all(lambda _, key: key, [1], OURS).values == (1,)
+
+
+def test_a_wall_that_is_missing_is_told_once_or_refused(caplog: pytest.LogCaptureFixture) -> None:
+    bare = Told((1,), has_seccomp=False, machine="far")
+    lenient = Cluster()
+    for _ in range(3):
+        lenient._look_at_walls(bare)
+    assert caplog.messages == [f"far: {NO_SECCOMP}"]
+    with pytest.raises(EngineError, match=r"^far: programs are less isolated"):
+        Cluster(require_isolation=True)._look_at_walls(bare)
+    Cluster(require_isolation=True)._look_at_walls(Told((1,)))
+
+
+ALONE = """
+import ray
+import psutil  # which comes with it
+from roboeval.rayengine import Cluster
+with Cluster() as cluster:
+    print(list(cluster.map_distinct(lambda lane, key: key, [1, 2, 1], name=lambda key: b"%d" % key)))
+    print([node["NodeManagerAddress"] for node in ray.nodes()])
+    names = [(p.name(), [c.laddr.ip for c in p.net_connections("tcp") if c.status == "LISTEN"])
+             for p in psutil.Process().children(recursive=True)]
+    print({ip for _, ips in names for ip in ips})
+print(ray.is_initialized())
+"""
+
+
+def test_a_cluster_is_started_where_there_is_none_and_only_this_machine_reaches_it(tmp_path: Path) -> None:
+    environment = {name: value for name, value in os.environ.items() if name != "RAY_ADDRESS"}
+    ended = subprocess.run(
+        [sys.executable, "-c", ALONE],
+        env={**environment, "RAY_TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.stdout.splitlines() == ["[1, 2, 1]", "['127.0.0.1']", "{'127.0.0.1'}", "False"], ended
