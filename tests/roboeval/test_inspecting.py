@@ -133,7 +133,7 @@ def test_a_sample_is_a_prompt_with_what_our_command_asks(paper: Suite) -> None:
 def scored(program: str) -> Any:  # noqa: ANN401 - Inspect has no types here
     about = {"task": "SayGoodDay", "prompt": 0}
     state = SimpleNamespace(metadata=about, output=SimpleNamespace(completion=program))
-    return inspecting.verdict()(state, Target(""))  # type: ignore[arg-type]  # all that is looked at
+    return inspecting.verdict()(state, Target(""))  # all of a state that is looked at
 
 
 def test_what_a_log_cannot_hold_is_no_reason_to_stop() -> None:
