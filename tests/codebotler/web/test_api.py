@@ -98,7 +98,6 @@ def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None
         Server(answer=lambda asked: HELLO if "cellar" in json.dumps(asked.body) else BAD) as model,
         PageServer(tmp_path, "--model", "completions:m", "--base-url", model.url) as server,
     ):
-        assert server.call("POST", "/api/missions/current/again", {}).status == 409
         server.call("POST", "/api/missions", {"instruction": "say hello"})
         for repair, problems in ((True, 1), (False, 0), (False, 1)):
             now = until(server, lambda now: now["check"] is not None and not now["busy"])
@@ -150,7 +149,9 @@ def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
         ("GET", "/api/nothing", None, 404),
         ("GET", "/api/missions/20200101-000000", None, 404),
         ("GET", "/api/missions/..%2f..%2fetc/events.jsonl", None, 404),
-        ("POST", "/api/missions/20200101-000000/stop", None, 409),
+        ("POST", "/api/missions/20200101-000000/stop", None, 404),
+        ("GET", "/api/missions/nosuch/events", None, 404),
+        ("GET", "/api/missions/nosuch/events.jsonl", None, 404),
         ("POST", "/api/missions", {}, 409),
         ("POST", "/api/missions", {"program": HELLO, "more": 1}, 422),
         ("POST", "/api/missions", b"{", 422),
@@ -164,6 +165,52 @@ def test_what_is_asked_wrongly_is_said(
     assert answer.status == status, answer.text
     if status == 201:
         assert "no recorded model" in until(server, lambda now: now["is_over"])["trouble"]
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("DELETE", "/api/missions", "GET, POST"),
+        ("DELETE", "/api/missions/current", "GET"),
+        ("POST", "/api/missions/current/program", "PUT"),
+        ("GET", "/api/check", "POST"),
+        ("PATCH", "/api", "GET"),
+    ],
+)
+def test_another_method_is_told_which_are_taken(
+    server: PageServer, method: str, path: str, allowed: str
+) -> None:
+    answer = server.call(method, path)
+    assert (answer.status, answer.headers.get("allow")) == (405, allowed)
+    assert answer.data["detail"] == f"this address takes {allowed.replace(', ', ' and ')} only"
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/events"),
+        ("GET", "/events.jsonl"),
+        ("GET", "/events.mcap"),
+        ("POST", "/stop"),
+        ("POST", "/again"),
+    ],
+)
+def test_before_there_is_a_mission_that_is_said(tmp_path: Path, method: str, path: str) -> None:
+    with PageServer(tmp_path) as server:
+        body = {} if path == "/again" else None
+        answer = server.call(method, f"/api/missions/current{path}", body)
+        none = "there is no mission yet; POST /api/missions begins one"
+        assert (answer.status, answer.data["detail"]) == (404, none)
+
+
+def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServer) -> None:
+    before = begun(server, HELLO)["id"]
+    begun(server, HELLO)
+    for method, what in (("GET", "events"), ("POST", "stop")):
+        answer = server.call(method, f"/api/missions/{before}/{what}")
+        told = f"mission {before} is not the one at hand; only what it left can be read"
+        assert (answer.status, answer.data["detail"]) == (409, told)
+    assert server.call("GET", f"/api/missions/{before}/events.jsonl").status == 200
 
 
 def test_the_api_is_described(server: PageServer) -> None:
