@@ -96,6 +96,8 @@ def _tell_links(place: Place, port: int, access: Access, desk: Desk | None) -> N
     ends = "ends the page and stops the robot" if desk else "ends the page"
     note(f"open this link in a browser; Ctrl-C {ends}:\n")
     note(f"    {address}{query(access.operator or '')}\n")
+    if not place.is_loopback:
+        note("other machines get in as well, by this link only; what they send and see is not encrypted\n")
     if desk and desk.face is not None:
         where = "here; --host lets other machines in" if place.is_loopback else "on the robot's tablet"
         note(f"the robot's face, which can run nothing, to be opened {where}:\n")

@@ -5,10 +5,12 @@ from __future__ import annotations
 import http.client
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +109,31 @@ def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None
     with PageServer(tmp_path) as server:
         begun(server, HELLO)
         assert server.call("POST", "/api/missions/current/again", {}).status == 409, "nobody wrote it"
+
+
+def test_who_does_not_read_holds_nothing_up(tmp_path: Path) -> None:
+    """Twenty clients follow a mission that tells more than a connection holds, and read none of it."""
+    many = "def task_program():\n    for n in range(115):\n        say(str(n) + 'x' * 8000)\n"
+    with PageServer(tmp_path, "--speed", "0") as server, ExitStack() as opened:
+        view = begun(server, many)
+        request = (
+            f"GET /api/missions/{view['id']}/events HTTP/1.1\r\nHost: localhost\r\n"
+            f"Authorization: Bearer {server.token}\r\n\r\n"
+        )
+        for _ in range(20):
+            lazy = opened.enter_context(socket.socket())
+            lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            lazy.connect(("127.0.0.1", server.port))
+            lazy.sendall(request.encode())
+        approval = {"program": view["digest"]}
+        assert server.call("POST", "/api/missions/current/approve", approval).status == 200
+        events = stream(server, view["id"])
+        assert sum(len(json.dumps(event)) for _, event in events) > 900_000
+        assert events[-1][1]["state"] == "done"
+        assert begun(server, HELLO)["state"] == "checked"
+        began = time.monotonic()
+        server.end()
+        assert time.monotonic() - began < 8
 
 
 def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:

@@ -146,6 +146,10 @@ def test_a_token_is_made_for_each_start() -> None:
     ("arguments", "told"),
     [
         (["--no-token", "--host", "0.0.0.0"], "only for this machine"),
+        (["--no-token", "--host", "::"], "only for this machine"),
+        (["--no-token", "--host", "0"], "only for this machine"),
+        (["--no-token", "--host", "127.example"], "only for this machine"),
+        (["--no-token", "--host", ""], "only for this machine"),
         (["--no-token", "--token", "x" * 20], "only for this machine"),
         (["--token", "short"], "can be guessed"),
         (["--host", "999.1.1.1"], "nobody can listen"),
@@ -157,6 +161,19 @@ def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
     assert ended.returncode == 2
     assert told in ended.stderr
+
+
+def test_other_machines_need_the_token_and_that_is_said(tmp_path: Path) -> None:
+    with PageServer(tmp_path, "--host", "0.0.0.0") as server:
+        assert server.token
+        assert "other machines get in as well, by this link only" in server.said
+        for path in ("/", "/api/robot", "/static/page.css"):
+            assert server.ask("GET", path).status == 401
+            assert server.ask("GET", path, host=f"192.0.2.7:{server.port}").status == 401
+            assert server.ask("GET", path, host="evil.example").status == 421
+        assert server.call("GET", "/api/robot").status == 200
+    with PageServer(tmp_path) as server:
+        assert "other machines" not in server.said
 
 
 def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) -> None:
