@@ -38,7 +38,7 @@ class Words(TextElement):
 
 def scroll_up() -> None:
     """Where the panes stand below each other, show the first one; that is the one that matters now."""
-    ui.run_javascript("matchMedia('(max-width: 760px)').matches && scrollTo(0, 0)")
+    ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
 
 
 def warn(sentence: str, seconds: float = 5.0) -> None:

@@ -304,6 +304,35 @@ def test_what_is_sent_has_a_limit(server: PageServer) -> None:
     assert server.call("POST", "/api/check", {"program": "x" * 300_000}).status == 422
 
 
+def test_what_is_told_to_be_too_large_is_not_waited_for(server: PageServer) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
+    connection.putrequest("POST", "/api/check")
+    connection.putheader("Authorization", f"Bearer {server.token}")
+    connection.putheader("Content-Length", str(MOST_BYTES + 1))
+    connection.endheaders()
+    assert connection.getresponse().status == 413
+    connection.close()
+
+
+def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
+    passed: list[Message] = []
+
+    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI has it
+        while len(passed) < 9 and (not passed or passed[-1]["type"] == "http.request"):
+            passed.append(await receive())
+
+    async def receive() -> Message:
+        return {"type": "http.request", "body": b"x" * (MOST_BYTES // 2), "more_body": True}
+
+    async def send(message: Message) -> None:
+        raise AssertionError(message)
+
+    headers = [(b"host", b"localhost"), (b"authorization", b"Bearer an operator's")]
+    scope = {"type": "http", "method": "POST", "path": "/api/check", "scheme": "http", "headers": headers}
+    asyncio.run(Guard(behind, Rules(Access("an operator's", "a face's")))(scope, receive, send))
+    assert [message["type"] for message in passed] == ["http.request", "http.request", "http.disconnect"]
+
+
 def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
     pieces = (b'{"program": "' if n == 0 else b"x" * 100_000 for n in range(MOST_BYTES // 100_000 + 3))
