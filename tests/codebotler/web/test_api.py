@@ -224,8 +224,7 @@ def test_another_method_is_told_which_are_taken(
 )
 def test_before_there_is_a_mission_that_is_said(tmp_path: Path, method: str, path: str) -> None:
     with PageServer(tmp_path) as server:
-        body = {} if path == "/again" else None
-        answer = server.call(method, f"/api/missions/current{path}", body)
+        answer = server.call(method, f"/api/missions/current{path}", {} if path == "/again" else None)
         none = "there is no mission yet; POST /api/missions begins one"
         assert (answer.status, answer.data["detail"]) == (404, none)
 
