@@ -39,7 +39,6 @@ MODULES = (
     "codebotler.models.open",
     "codebotler.perception",
     "roboeval.suite",
-    "roboeval.task",
     "roboeval.evaluate",
     "roboeval.records",
     "roboeval.metrics",
