@@ -16,14 +16,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from codebotler.check import SAMPLES, Sample, Settings, check_on
+from codebotler.checker import SAMPLES, Sample, Settings, check_on
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.imagined import ImaginedRobot, Plan
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.lots import Lot
-from roboeval.evaluate import evaluate
 from roboeval.records import Completion, recorded_completions
 from roboeval.suite import Suite, load_suite
+from roboeval.verdicts import evaluate
 
 WORKERS = int(os.environ.get("WORKERS", "2"))
 SEEDS = int(os.environ.get("SEEDS", "20"))

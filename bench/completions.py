@@ -15,9 +15,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from roboeval.evaluate import evaluate
 from roboeval.records import read_completions, recorded_completions, to_line
 from roboeval.suite import Suite, load_suite
+from roboeval.verdicts import evaluate
 
 ORIGINAL = 0.354  # seconds a run
 ROWS = tuple(int(n) for n in os.environ.get("ROWS", "1000,10000,100000").split(","))

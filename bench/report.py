@@ -17,7 +17,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from roboeval.evaluate import evaluate, head
 from roboeval.evaluation import Evaluation
 from roboeval.records import Completion, recorded_completions, to_line
 from roboeval.report.contents import Wishes, headline, sections
@@ -27,6 +26,7 @@ from roboeval.resampling import Trial, by_prompt
 from roboeval.run import Run, to_text
 from roboeval.suite import Suite, load_suite
 from roboeval.tables import key_of
+from roboeval.verdicts import evaluate, head
 
 MODELS = int(os.environ.get("MODELS", "5"))
 COMPLETIONS = int(os.environ.get("COMPLETIONS", "50"))  # of each prompt

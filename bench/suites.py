@@ -12,9 +12,9 @@ from functools import partial
 
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluate import judge
 from roboeval.records import recorded_completions
 from roboeval.suite import Suite, load_suite
+from roboeval.verdicts import judge
 
 ROUNDS = 3
 

@@ -2,9 +2,7 @@
 
 from codebotler.rtl import explain
 from codebotler.tracefile import trace_from
-from roboeval.evaluate import evaluate
-from roboeval.records import Completion
-from roboeval.suite import load_suite
+from roboeval import Completion, evaluate, load_suite
 
 PROGRAM = """
 def task_program():

@@ -13,6 +13,7 @@ SHOWS = {
     "judge_a_program.py": "looks_into_every_lab: the robot went to sam's lab at step 1 but did not look",
     "run_a_program.py": "finished\ngoto: kitchen\ncheck: mug\nsay: True\n",
     "rtl.py": 'the robot never said anything with "lobby"',
+    "toy_policy.py": "            say('good day')\n\nits reward: 1.0\n",
 }
 
 

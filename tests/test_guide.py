@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from codebotler.check import check
+from codebotler.checker import check
 from codebotler.simulator.engine import run
 from codebotler.simulator.sandbox.stdlib import LISTED
 from codebotler.trace import Status

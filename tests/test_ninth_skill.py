@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.badinput import BadInput
-from codebotler.check import check
+from codebotler.checker import check
 from codebotler.program import Problem, Program
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse

@@ -40,16 +40,21 @@ NOT_RUN = {
 }
 """Why blocks are not run, page by page: no other reason, and no further block."""
 
+RUN_BY = {"library.md": "tests/test_library.py"}
+"""Pages that another test follows as a whole."""
+
 LESS = {
     "README.md": [("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report")],
     "benchmark-pages.md": [("--num-completions 1", "--num-completions 1 --tasks LunchTime")],
     "evaluate-your-model.md": [("--num-completions 50", "--num-completions 1 --tasks LunchTime")],
     "index.md": [("recorded:hasty", "recorded:hasty --tasks LunchBreak")],
+    "report.md": [("--num-completions 4", "--num-completions 4 --tasks LunchTime,LunchBreak,SetTemperature")],
     "roboeval-plus.md": [("--worlds 200", "--worlds 31")],
     "tutorial.md": [("--num-completions 2", "--num-completions 1 --tasks LunchTime --no-report")],
 }
 """What a reader is told to do, and what is done here instead: the same with fewer programs."""
 
+FOLLOWED = [page for page in PAGES if page not in RUN_BY]
 CODE, DATA = {"sh", "python"}, {"yaml", "json", "text"}
 COMMAND = re.compile(r"^(?:\.venv/|codebotler |roboeval |python |pip |export |make |apt)", re.MULTILINE)
 MODEL = "http://localhost:8000/v1"
@@ -176,7 +181,7 @@ def is_printed(told: str, printed: str) -> bool:
     return re.search(re.escape(told).replace(r"\.\.\.", ".*?"), printed) is not None
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if any(b.language in CODE for b in blocks(page))])
+@pytest.mark.parametrize("page", [page for page in FOLLOWED if any(b.language in CODE for b in blocks(page))])
 def test_every_block_of_a_page_runs(followed: Callable[[str], Reader], page: str) -> None:
     followed(page)
 
@@ -184,6 +189,7 @@ def test_every_block_of_a_page_runs(followed: Callable[[str], Reader], page: str
 def test_what_is_not_run_is_marked_and_listed() -> None:
     marked = {page: [block.not_run for block in blocks(page) if block.not_run] for page in PAGES}
     assert {page: reasons for page, reasons in marked.items() if reasons} == NOT_RUN
+    assert all(page in (ROOT / test).read_text() for page, test in RUN_BY.items())
     for page, path in PAGES.items():
         assert path.read_text().count("\n```") == 2 * len(blocks(page)), page
         for block in blocks(page):
@@ -214,7 +220,9 @@ SHOWN_ELSEWHERE = {  # texts that no command of their page prints, and the tests
 }
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if any(b.language == "text" for b in blocks(page))])
+@pytest.mark.parametrize(
+    "page", [page for page in FOLLOWED if any(b.language == "text" for b in blocks(page))]
+)
 def test_what_a_page_says_is_printed_is_printed(followed: Callable[[str], Reader], page: str) -> None:
     elsewhere = tuple(SHOWN_ELSEWHERE.get(page, []))
     told = [block.text for block in blocks(page) if block.language == "text"]

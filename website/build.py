@@ -25,24 +25,14 @@ PAGES, SITE = ROOT / "build" / "pages", ROOT / "build" / "site"
 
 WIDTH = 82  # letters in a line of the site
 
-MODULES = (
-    "codebotler.simulator",
-    "codebotler.check",
-    "codebotler.program",
-    "codebotler.world",
-    "codebotler.trace",
-    "codebotler.skills",
-    "codebotler.rtl",
-    "codebotler.mission",
-    "codebotler.robots.base",
-    "codebotler.models.base",
-    "codebotler.models.open",
-    "codebotler.perception",
-    "roboeval.suite",
-    "roboeval.evaluate",
-    "roboeval.records",
-    "roboeval.metrics",
-)
+MODULES = {
+    "codebotler": (
+        *("codebotler", "codebotler.simulator", "codebotler.program", "codebotler.world", "codebotler.trace"),
+        *("codebotler.skills", "codebotler.rtl", "codebotler.mission", "codebotler.robots.base"),
+        *("codebotler.models.base", "codebotler.models.open", "codebotler.perception"),
+    ),
+    "roboeval": ("roboeval", "roboeval.suite", "roboeval.records", "roboeval.metrics"),
+}
 """What somebody calls from a program of their own."""
 
 
@@ -95,8 +85,7 @@ def _examples() -> str:
 def _python(package: str) -> str:
     about = "What programs of your own may call; [examples](examples.md) show it at work."
     head = f"# {package} from Python\n\n{about}"
-    modules = [module for module in MODULES if module.startswith(package)]
-    return "\n\n".join([head, *(f"::: {module}" for module in modules)]) + "\n"
+    return "\n\n".join([head, *(f"::: {module}" for module in MODULES[package])]) + "\n"
 
 
 def _commands(name: str, app: typer.Typer) -> str:

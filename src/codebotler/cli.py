@@ -112,7 +112,7 @@ def check(
     workers: Annotated[int, typer.Option(min=1, help="Runs that go on at the same time.")] = 1,
 ) -> None:
     """Look for problems in a program, in its text and in imagined worlds; status 1 if there are any."""
-    from codebotler.check import check as look_for_problems
+    from codebotler.checker import check as look_for_problems
     from codebotler.checking import check_view, read_program
     from codebotler.terminal import busy, print_json, print_rich
     from codebotler.world import World

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from codebotler.check import check
+from codebotler.checker import check
 from codebotler.generation import Attempt, Generation, generate, untold
 from codebotler.models.base import Model, Settings
 from codebotler.models.open import kind_of, open_model

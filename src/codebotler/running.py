@@ -11,7 +11,7 @@ from pathlib import Path
 
 from codebotler.archiving import tell_interrupted
 from codebotler.badinput import BadInput
-from codebotler.check import check
+from codebotler.checker import check
 from codebotler.checking import check_view, read_program
 from codebotler.drives import named_rooms
 from codebotler.generating import generated

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from codebotler import __version__
 from codebotler.badinput import BadInput
-from codebotler.check import Settings, check_on
+from codebotler.checker import Settings, check_on
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.imagined import Plan
 from roboeval.records import Appender, Completion, read_rows, to_line

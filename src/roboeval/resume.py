@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.badinput import BadInput
-from roboeval.evaluate import evaluate, head
 from roboeval.records import HASH_LINE, Appender, Completion, length_before, name_of, read_judged, to_line
 from roboeval.run import Run, evaluation_key, load_head, to_text, write_whole
 from roboeval.suite import Suite
+from roboeval.verdicts import evaluate, head
 
 
 def evaluate_run(

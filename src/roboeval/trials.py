@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 from codebotler.models.recorded import NAMES, Reply, read_replies, recorded_model
 from codebotler.simulator.engine import run
-from roboeval.evaluate import judge
 from roboeval.suite import Suite, Task
 from roboeval.taxonomy import Verdict
+from roboeval.verdicts import judge
 
 Verdicts: TypeAlias = Sequence[Verdict]
 """How one program did in all worlds of a task, or of its ablation."""

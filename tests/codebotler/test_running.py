@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.check import check
+from codebotler.checker import check
 from codebotler.mission import Mission, State
 from codebotler.models.base import Heard, Reply, Usage, unheard
 from codebotler.prompts import Prompt

@@ -10,7 +10,7 @@ def task_program():
         "codebotler.trace",
         "codebotler.simulator.robot",
         "codebotler.simulator.engine",
-        "roboeval.evaluate",
+        "roboeval.verdicts",
         "roboeval.suite",
         "pydantic",
         "yaml",

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from roboeval.evaluate import evaluate
 from roboeval.records import Completion, read_completions
 from roboeval.suite import Suite
+from roboeval.verdicts import evaluate
 
 KINDS_OF_TRACE = {
     "goto": "GoTo",

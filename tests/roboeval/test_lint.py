@@ -18,13 +18,13 @@ from codebotler.rtl import Formula, Regex, Without, Words, holds, parse
 from codebotler.rtl.formula import CutName
 from codebotler.trace import Event, Option, Trace
 from roboeval.catalogue import new_task
-from roboeval.evaluate import evaluate
 from roboeval.findings import Finding, render
 from roboeval.lint import lint
 from roboeval.records import Completion
 from roboeval.satisfiability import Automaton, Reasoner, Undecided
 from roboeval.suite import Suite, load_suite
 from roboeval.trials import tried
+from roboeval.verdicts import evaluate
 from roboeval.witnesses import can_match, representative_texts, samples
 
 Lint = Callable[..., list[Finding]]

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from codebotler.models.recorded import Reply, recorded_model
-from roboeval.evaluate import evaluate
 from roboeval.records import Completion, recorded_completions
 from roboeval.suite import Suite, Task, load_suite
 from roboeval.taxonomy import CLASSES
+from roboeval.verdicts import evaluate
 
 TASKS = list(load_suite("paper").tasks.values())
 MODELS = ("careful", "hasty")

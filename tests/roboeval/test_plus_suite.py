@@ -12,10 +12,10 @@ import yaml
 from codebotler.models.recorded import NAMES, recorded_model
 from codebotler.simulator.engine import run
 from codebotler.world import World
-from roboeval.evaluate import judge
 from roboeval.mutation.variants import variants
 from roboeval.suite import Suite, Task, load_suite
 from roboeval.taxonomy import Verdict
+from roboeval.verdicts import judge
 
 HERE = Path(__file__).parent
 KNOWN: list[dict[str, Any]] = yaml.safe_load((HERE / "plus" / "known.yaml").read_text())

@@ -15,7 +15,6 @@ from codebotler.rtl import parse
 from codebotler.simulator.rules import Rules
 from codebotler.trace import Event, Option, Outcome, RunError, Status
 from codebotler.world import Person, Room, World
-from roboeval.evaluate import evaluation, judge, judgement
 from roboeval.records import Completion
 from roboeval.show import (
     Selection,
@@ -29,6 +28,7 @@ from roboeval.show import (
     view_data,
 )
 from roboeval.suite import Requirement, Scenario, Suite, Task
+from roboeval.verdicts import evaluation, judge, judgement
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800"
 SHOWN = r"[red]x[/red]\x1b[2J\x07\u202e\ud800"

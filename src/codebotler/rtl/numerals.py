@@ -11,7 +11,7 @@ _ONES = [
 ]
 _TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"]
 _WORDS = {word: n for n, word in enumerate(_ONES)} | {word: 20 + 10 * n for n, word in enumerate(_TENS)}
-_NOTHING = r"no one|no-one|noone|nobody|nothing|none|neither|no"
+_NOTHING = r"no one|no-one|noone|nobody|nothing|none|neither|not (?:one|a single)|no"
 
 _NEAR = 60  # characters within which words belong together; without an end, long texts would take for ever
 
@@ -30,13 +30,15 @@ _PRONOUN = re.compile(
     re.IGNORECASE,
 )
 _OF = re.compile(r"(?:\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$", re.IGNORECASE)
+_NOT = re.compile(r"(?:\bnot|n['\u2019]t)\s+$", re.IGNORECASE)
 _TOGETHER = re.compile(r"\s*(?:or|to|-|\u2013|,|/|maybe|perhaps)?\s*(?:or|maybe|perhaps)?\s*", re.IGNORECASE)
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
     """The numbers in a text, as positions and values; those between which it leaves the choice are together.
 
-    `no`, `nobody` and the like are 0. Of `2 of 4` only 2 is told; `one` in `the one` is no number.
+    `no`, `nobody` and the like are 0. Of `2 of 4` only 2 is told; `one` in `the one` is no number, and what
+    is `not 3` has none.
 
     Args:
         text: any text.
@@ -61,7 +63,7 @@ def _is_none(match: re.Match[str], text: str) -> bool:
     before = text[max(0, match.start() - _NEAR) : match.start()]
     if match["word"] and match["word"].lower() == "one" and _PRONOUN.search(before):
         return True
-    return _OF.search(before) is not None and not match["nothing"]
+    return not match["nothing"] and (_OF.search(before) or _NOT.search(before)) is not None
 
 
 def _value(match: re.Match[str]) -> float:

@@ -9,8 +9,8 @@ import os
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from typing import Self, TypeVar
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import ParamSpec, Self, TypeVar
 
 from codebotler.simulator.distinct import Distinct
 from codebotler.simulator.lane import EngineError, Lane
@@ -29,6 +29,7 @@ ON_WINDOWS = "programs are run on Linux and macOS only; on Windows, use this ins
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")
+Arguments = ParamSpec("Arguments")
 
 
 def run(
@@ -146,6 +147,17 @@ class Lanes:
             os.sched_setaffinity(0, {core})
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
             lane.stay_on(core)
+
+    def submit(
+        self, function: Callable[Arguments, Value], *args: Arguments.args, **kwargs: Arguments.kwargs
+    ) -> Future[Value]:
+        """Call a function in one of the threads, which may ask for its lane there; from any thread."""
+        return self._pool.submit(function, *args, **kwargs)
+
+    def forget(self) -> None:
+        """Let go of all in a forked process: the lanes, and the threads, are those of the process before."""
+        for lane in self._lanes:
+            lane.forget()
 
     def map_distinct(
         self, function: Callable[[Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]

@@ -29,16 +29,23 @@ def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
         descriptors: what it is handed.
     """
     handed = (codes().fileno(), *descriptors)
-    return subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
-        [sys.executable, *FLAGS, str(SANDBOX / "start.py"), role, *map(str, handed)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        cwd="/",
-        env={"PYTHONHASHSEED": "0", "TZ": "UTC", "LC_ALL": "C.UTF-8", "PYTHONUTF8": "1", "LD_BIND_NOW": "1"},
-        pass_fds=handed,
-        start_new_session=True,
-    )
+    with ONE_AT_A_TIME:
+        return subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
+            [sys.executable, *FLAGS, str(SANDBOX / "start.py"), role, *map(str, handed)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            cwd="/",
+            env={
+                "PYTHONHASHSEED": "0",
+                "TZ": "UTC",
+                "LC_ALL": "C.UTF-8",
+                "PYTHONUTF8": "1",
+                "LD_BIND_NOW": "1",
+            },
+            pass_fds=handed,
+            start_new_session=True,
+        )
 
 
 def codes() -> IO[bytes]:
@@ -48,6 +55,13 @@ def codes() -> IO[bytes]:
 
 
 ONE_AT_A_TIME = threading.Lock()
+# Who forks this process in the middle of a start would get half of it: a lock that nobody opens, and the end
+# of a pipe on whose closing the start waits.
+os.register_at_fork(
+    before=ONE_AT_A_TIME.acquire,
+    after_in_parent=ONE_AT_A_TIME.release,
+    after_in_child=ONE_AT_A_TIME.release,
+)
 
 
 @cache

@@ -99,6 +99,12 @@ class Lane:
         while self._zygotes:
             self._zygotes.popitem()[1].close()
 
+    def forget(self) -> None:
+        """Close what a forked process has inherited, and let the processes be, which are not its own."""
+        self._preparer.forget()
+        while self._zygotes:
+            self._zygotes.popitem()[1].forget()
+
     def _try(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         try:
             robot = new_robot()

@@ -83,6 +83,11 @@ class Preparer:
         if child is not None:
             child.end()
 
+    def forget(self) -> None:
+        """Close its line in a forked process, whose child it is not."""
+        if self._child is not None:
+            self._child.hang_up()
+
     def _prepare(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
         if len(source) > LONG or self._served >= SERVES:
             self.close()

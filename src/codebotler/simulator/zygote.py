@@ -76,6 +76,12 @@ class Zygote:
         os.close(self._report)
         self._door.close()
 
+    def forget(self) -> None:
+        """Close its lines in a forked process, whose child it is not."""
+        self._process.returncode = 0  # whatever becomes of it, nobody here waits for that
+        os.close(self._report)
+        self._door.close()
+
     def _teach(self) -> None:
         """Let the zygote itself run a program, so that its children have less to learn."""
         child = Child(lambda: self.pid, self._ask_for_line(), self._process.wait, closes=False)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Self
 
 from codebotler.archive import recover
-from codebotler.check import check
+from codebotler.checker import check
 from codebotler.mission import GRACE, MissionError
 from codebotler.missionlog import Line, Summary
 from codebotler.models.base import Model

@@ -12,6 +12,7 @@ from roboeval.commands.options import (
     JsonOption,
     RunArgument,
     SuiteOption,
+    as_judged,
     cores,
     expect_current,
     load,
@@ -49,7 +50,7 @@ def find(
 
     if negated and formula is None:
         fail("--not is about a formula; name one, or leave --not out")
-    known = load(suite)
+    known = as_judged(run, load(suite), ablated=ablation)
     question = Question(formula, negated, None if task is None else known.task(task).name, world)
     expect_question(question, known, ablated=ablation)
     evaluation = open_evaluation(run, known, suite, ablated=ablation)

@@ -58,10 +58,10 @@ def evaluate(
     json: JsonOption = False,
 ) -> None:
     """Say of every completion whether it does what was asked."""
-    from roboeval.evaluate import evaluate as judge_all
     from roboeval.evaluation import Scope
     from roboeval.resume import evaluate_run
     from roboeval.run import Run, open_source, tasks_to_judge
+    from roboeval.verdicts import evaluate as judge_all
 
     refuse_what_comes_later(engine)
     judged_by = load(suite)

@@ -12,6 +12,7 @@ from roboeval.commands.options import (
     AblationOption,
     JsonOption,
     SuiteOption,
+    as_judged,
     command,
     cores,
     expect_current,
@@ -21,12 +22,13 @@ from roboeval.commands.options import (
     options_of,
 )
 from roboeval.commands.resampling import checked
-from roboeval.terminal import note, print_json, print_rich, watched
+from roboeval.terminal import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
     from roboeval.evaluation import Evaluation
     from roboeval.records import Key
     from roboeval.report.reading import JudgedRun
+    from roboeval.reversals import Judged
     from roboeval.suite import Suite
 
 
@@ -41,6 +43,9 @@ def report(
         list[str] | None,
         typer.Option(help="MODEL=INPUT/OUTPUT, of a million tokens each; may be given several times."),
     ] = None,
+    beside: Annotated[
+        str | None, typer.Option(help="Another suite that judged the runs: what its checks change.")
+    ] = None,
     check: Annotated[
         bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
     ] = True,
@@ -49,6 +54,8 @@ def report(
     ] = None,
 ) -> None:
     """Draw the figures of the paper, and one page about how models do, why, and how sure that is."""
+    from dataclasses import replace
+
     from codebotler.terminal import busy
     from roboeval.report.contents import Wishes, headline, sections
     from roboeval.report.cost import expect_known, price_from
@@ -56,17 +63,25 @@ def report(
     from roboeval.report.writing import pieces, write_report
 
     prices = tuple(map(price_from, price or ()))
-    known = load(suite)
+    known = as_judged(runs[0], load(suite), ablated=False)
     evaluations = [open_evaluation(run, known, suite, ablated=False) for run in runs]
     expect_alike(runs, evaluations, known, suite)
     how = How(check=check, workers=workers or cores())
     read = named_apart([judged_run(one, known, suite, **how) for one in evaluations])
+    if beside is not None:
+        if beside == suite:
+            fail(f'--beside takes another suite than "{suite}", by which the report judges')
+        read = [
+            replace(one, beside=judged_by(run, beside, ablated=False)[1])
+            for one, run in zip(read, runs, strict=True)
+        ]
     expect_known(prices, read)
     words = [
         *map(str, runs),
         "--out",
         out,
         *(["--published"] * published),
+        *([] if beside is None else ["--beside", beside]),
         *([] if check else ["--no-check"]),
     ]
     words += [word for text in price or () for word in ("--price", text)]
@@ -80,20 +95,44 @@ def report(
 
 
 def compare(
-    first: Annotated[Path, typer.Argument(help="A run that was judged.", parser=named("a run"))],
-    second: Annotated[Path, typer.Argument(help="Another one.", parser=named("a run"))],
+    runs: Annotated[
+        list[Path],
+        typer.Argument(help="Two runs that were judged; with --suites, one or more.", parser=named("a run")),
+    ],
     suite: SuiteOption = "paper",
+    suites: Annotated[
+        str | None,
+        typer.Option(help="Two suites, such as paper,plus: what the second changes, of each run."),
+    ] = None,
+    most: Annotated[
+        int, typer.Option("--groups", min=0, help="With --suites: how many groups of programs to show.")
+    ] = 10,
     ablation: AblationOption = False,
     json: JsonOption = False,
 ) -> None:
     """Say by how much the second run passes more often than the first, and how sure that is."""
+    if suites is not None:
+        compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
+    elif len(runs) == PAIR:
+        compare_runs(runs, suite, ablated=ablation, as_json=json)
+    else:
+        fail(
+            f"a comparison takes two runs, and {len(runs)} {'is' if len(runs) == 1 else 'are'} named; "
+            "with --suites it takes any number"
+        )
+
+
+PAIR = 2
+
+
+def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
+    """Print which of two runs is better."""
     from roboeval.comparison import compared, comparison_data, prompts, render, told_of, unlike
     from roboeval.metrics import score_by_prompt
     from roboeval.run import load_head
 
-    known = load(suite)
-    paths = first, second
-    evaluations = [open_evaluation(path, known, suite, ablated=ablation) for path in paths]
+    known = as_judged(paths[0], load(suite), ablated=ablated)
+    evaluations = [open_evaluation(path, known, suite, ablated=ablated) for path in paths]
     expect_alike(paths, evaluations, known, suite)
     scores, abouts = [], []
     for evaluation in evaluations:
@@ -108,11 +147,52 @@ def compare(
         note(f"warning: {difference}")
     if result.left_out:
         note(f"left out, since only one of them has them: {prompts(result.left_out)}")
-    names = str(first), str(second)
-    if json:
+    names = str(paths[0]), str(paths[1])
+    if as_json:
         print_json({**comparison_data(result, names), "warnings": unlike(*abouts)})
     else:
         print_rich(render(result, names))
+
+
+def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
+    """Print what a second suite changes."""
+    from roboeval.records import how_many
+    from roboeval.reversals import render, reversals, reversals_data
+
+    if len({path.resolve() for path in paths}) < len(paths):
+        fail("a run is named twice; name each once")
+    found = []
+    for path in paths:
+        first, second = (judged_by(path, name, ablated=ablated) for name in two_suites(suites))
+        programs = {completion.key: completion.program for completion in first[0].judged()}
+        found.append(reversals(str(path), first[1], second[1], programs))
+    for one in found:
+        if one.left_out:
+            note(f"{one.name}: left out, since only one suite has judged them: {how_many(one.left_out)}")
+    if as_json:
+        print_json(reversals_data(found))
+    else:
+        print_rich(render(found, most=most))
+
+
+def two_suites(text: str) -> tuple[str, str]:
+    """The suites that a user names, in their order."""
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != PAIR or len({*names}) != PAIR or not all(names):
+        fail(f'--suites takes two suites with a comma between them, such as paper,plus, and not "{text}"')
+    return names[0], names[1]
+
+
+def judged_by(path: Path, suite_name: str, *, ablated: bool) -> tuple[Evaluation, Judged]:
+    """A run as a suite judges it, in the worlds in which it was judged."""
+    from roboeval.reversals import Judged
+
+    suite = as_judged(path, load(suite_name), ablated=ablated)
+    evaluation = open_evaluation(path, suite, suite_name, ablated=ablated)
+    rows = watched(evaluation.rows(), "reading", evaluation.scope.total)
+    judged = Judged.of(rows, suite, ablated=ablated)
+    expect_current(evaluation, suite, suite_name)
+    return evaluation, judged
 
 
 def expect_alike(

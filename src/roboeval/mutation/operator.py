@@ -17,6 +17,12 @@ TELLING = re.compile(r"\b(tell|say|speak|report|inform|hear|know|announce|sugges
 STAYING_OUT = re.compile(
     r"\b(no other room|nowhere else|no place besides|(other|remaining) rooms|just the labs|straight|directly)"
 )
+BRINGING_HERE = re.compile(
+    r"\b(bring|fetch|carry|take|have|come back)\b[^.:;]*\b(here|to me|with me|with it)\b", re.IGNORECASE
+)
+PUTTING_DOWN = re.compile(
+    r"\b((put|set|lay|leav)(e|ting|ing)? (it|them|that) (down|here|there)|put down)\b", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -52,6 +58,11 @@ class Setting:
         """Whether some phrasing asks for it; what none asks for, a program may leave out."""
         return not self.phrasings or any(what.search(phrasing) for phrasing in self.phrasings)
 
+    @property
+    def may_be_held(self) -> bool:
+        """Whether some phrasing is content with what is brought back and still held."""
+        return any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in self.phrasings)
+
     def idle_rooms(self, source: Source) -> tuple[str, ...]:
         """The rooms of whose names no word stands in any text of a program."""
         told = {word for text in source.texts for word in re.findall(r"\w+", text)}
@@ -85,6 +96,15 @@ def where(what: re.Pattern[str], edits: Edits) -> Edits:
 
     def only(source: Source, setting: Setting) -> Iterable[Edit]:
         return edits(source, setting) if setting.asks_for(what) else ()
+
+    return only
+
+
+def where_put_down(edits: Edits) -> Edits:
+    """Edits of programs for those instructions only that are not content with what is held."""
+
+    def only(source: Source, setting: Setting) -> Iterable[Edit]:
+        return () if setting.may_be_held else edits(source, setting)
 
     return only
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from roboeval.mutation.operator import Operator, Setting, others
+from roboeval.mutation.operator import Operator, Setting, others, where_put_down
 from roboeval.mutation.rewriting import Edit, Source, argument, literal, step, text_of
 
 
@@ -54,10 +54,12 @@ def place_where_found(source: Source, _: Setting) -> Iterator[Edit]:
 
 
 OPERATORS = (
-    Operator("forget-to-place", "Does not put down what it brings.", forget_to_place),
+    Operator("forget-to-place", "Does not put down what it brings.", where_put_down(forget_to_place)),
     Operator("forget-to-pick", "Does not pick up what it should bring.", forget_to_pick),
     Operator("bring-nothing", "Drives about without picking up or putting down anything.", neither),
-    Operator("place-by-words", "Says that it brings something, and keeps it.", place_by_words),
+    Operator(
+        "place-by-words", "Says that it brings something, and keeps it.", where_put_down(place_by_words)
+    ),
     Operator("wrong-thing", "Brings another thing.", wrong_thing),
     Operator("place-where-found", "Puts a thing down where it found it.", place_where_found),
 )

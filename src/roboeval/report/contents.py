@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from roboeval.records import how_many
 from roboeval.report import (
+    beside,
     causes,
     cost,
     differences,
@@ -120,6 +121,7 @@ def sections(runs: Sequence[JudgedRun], suite: Suite, wishes: Wishes) -> list[Se
     found = [
         _results(runs, suite),
         _differences(runs),
+        _beside(runs, suite),
         _thresholds(runs),
         _causes(runs, published=wishes.published),
         _failures(runs, suite),
@@ -211,6 +213,12 @@ def _differences(runs: Sequence[JudgedRun]) -> Section:
     found = differences.difference_sheet(runs)
     parts = () if found is None else (Prose(tuple(found[1])), found[0])
     return Section("differences", "Which is better", parts)
+
+
+def _beside(runs: Sequence[JudgedRun], suite: Suite) -> Section:
+    found = beside.reversed_in(runs, suite)
+    parts = _parts(Prose(beside.sentences(found)), *beside.sheets(found)) if found else ()
+    return Section("beside", "What other checks change", parts)
 
 
 def _failures(runs: Sequence[JudgedRun], suite: Suite) -> Section:

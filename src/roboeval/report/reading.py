@@ -15,6 +15,7 @@ from roboeval.evaluation import Evaluation
 from roboeval.metrics import TaskScore, score_by_prompt
 from roboeval.records import Completion, Key
 from roboeval.resampling import Prompt
+from roboeval.reversals import Judged
 from roboeval.run import load_head
 from roboeval.suite import Suite
 from roboeval.tables import Row
@@ -58,6 +59,7 @@ class JudgedRun:
         total: how many completions there are to judge.
         ablated: scores where only common sense is required; None where nobody judged that.
         trials: its completions as the check sees them; None where they were not checked.
+        beside: the same as another suite judges it; None where nobody asked for that.
         is_mixed: whether several models wrote the completions.
     """
 
@@ -72,6 +74,7 @@ class JudgedRun:
     total: int
     ablated: tuple[TaskScore, ...] | None = None
     trials: tuple[Prompt, ...] | None = None
+    beside: Judged | None = None
     is_mixed: bool = False
 
     @cached_property

@@ -15,8 +15,8 @@ from roboeval.run import write_whole
 
 FORMATS = ("png", "pdf")
 OPTIONAL = {
-    *("abilities", "accepted", "budget", "coming-back", "cost", "differences", "failures", "published"),
-    *("rejection-sampling", "rejection-sampling-curves"),
+    *("abilities", "accepted", "beside", "beside-tasks", "budget", "coming-back", "cost", "differences"),
+    *("failures", "published", "rejection-sampling", "rejection-sampling-curves", "reversals"),
 }
 """Figures and tables that not every report has."""
 

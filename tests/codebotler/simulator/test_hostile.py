@@ -37,9 +37,9 @@ from codebotler.simulator.rules import Rules
 from codebotler.trace import Event, Outcome, Status
 from codebotler.tracefile import outcome_data
 from codebotler.world import Person, Room, World
-from roboeval.evaluate import judge
 from roboeval.records import to_line
 from roboeval.suite import Requirement, Scenario
+from roboeval.verdicts import judge
 
 PROGRAMS = sorted((Path(__file__).parents[2] / "hostile").glob("*.py"))
 AS_WRITTEN = Rules(literals="as-written")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.check import check
+from codebotler.checker import check
 from codebotler.web.floorplan import MOST_ROOMS, floorplan
 from codebotler.web.progress import MOST, Moment, Progress, line_of
 from codebotler.web.strip import MOST_STRIPS, Deed, strips

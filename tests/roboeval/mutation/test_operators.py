@@ -157,3 +157,21 @@ def test_what_no_phrasing_asks_for_may_be_left_out(name: str, body: str, asking:
         for phrasings in ((), ("Go to the lobby.",), ("Go to the lobby.", asking))
     }
     assert [*made.values()] == [1, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("phrasings", "made"),
+    [
+        (("Bring it to the lobby.",), 1),
+        (("Fetch it here.",), 0),
+        (("Bring it back here and put it down.",), 1),
+        (("Bring it back here and put it down.", "Come back with it."), 0),
+    ],
+)
+@pytest.mark.parametrize("name", ["forget-to-place", "place-by-words"])
+def test_what_is_only_to_be_brought_here_may_be_held(
+    name: str, phrasings: tuple[str, ...], made: int
+) -> None:
+    source = read(program("pick('mug')\nplace('mug')"))
+    assert source is not None
+    assert len([*BY_NAME[name](source, Setting.of([WORLD], phrasings))]) == made

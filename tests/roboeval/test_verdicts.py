@@ -7,10 +7,10 @@ import pytest
 
 from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.world import Room, World
-from roboeval.evaluate import evaluate, judge
 from roboeval.records import Completion
 from roboeval.suite import Scenario, Suite, load_suite
 from roboeval.taxonomy import Failure, Verdict, failure
+from roboeval.verdicts import evaluate, judge
 
 SUITE = "name: mine\nversion: 1\n"
 TASK = """\

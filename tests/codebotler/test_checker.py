@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from codebotler.badinput import BadInput
-from codebotler.check import MORE, Check, Sample, Settings, check, check_on
+from codebotler.checker import MORE, Check, Sample, Settings, check, check_on
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.lane import Lane

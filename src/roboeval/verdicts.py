@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 from collections import deque
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from typing import Any
 
 from codebotler import __version__
@@ -30,14 +31,20 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
         outcome: of the run.
         scenario: the world in which it ran, with its requirements.
     """
-    waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
-    if outcome.status is not Status.FINISHED and not waited:
+    if not may_satisfy(outcome, scenario):
         return Verdict(scenario.world.about, outcome, (), satisfied=False)
-    failed = tuple(r for r in scenario.require if not _is_met(r, outcome.trace))
+    failed = tuple(r for r in scenario.require if not is_met(r, outcome.trace))
     return Verdict(scenario.world.about, outcome, failed, satisfied=not failed)
 
 
-def _is_met(requirement: Requirement, trace: Trace) -> bool:
+def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
+    """Whether a run ended so that the requirements decide: by itself, or waiting where that is allowed."""
+    waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
+    return waited or outcome.status is Status.FINISHED
+
+
+def is_met(requirement: Requirement, trace: Trace) -> bool:
+    """Whether a trace satisfies a requirement; one that cannot be judged is not satisfied."""
     try:
         return holds(requirement.formula, trace)
     except CannotJudge:
@@ -51,6 +58,7 @@ def evaluate(
     ablated: bool = False,
     workers: int = 1,
     require_isolation: bool = False,
+    lanes: Lanes | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Judge completions, yielding one row each in their order; equal programs of a task run once.
 
@@ -60,6 +68,8 @@ def evaluate(
         ablated: whether to require common sense only; then all tasks have an ablation.
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+        lanes: what runs programs, for who judges now and then; without it, as many as `workers` are started
+            and ended.
 
     Raises:
         EngineError: no isolated process can be started.
@@ -71,7 +81,7 @@ def evaluate(
         return judgement([judge(run(program, scenario.world), scenario) for scenario in scenarios])
 
     def run(program: str, world: World) -> Outcome:
-        return lanes.here().run(program, lambda: SimulatedRobot(world, suite.rules))
+        return open_lanes.here().run(program, lambda: SimulatedRobot(world, suite.rules))
 
     waiting: deque[Completion] = deque()
 
@@ -80,8 +90,9 @@ def evaluate(
             waiting.append(completion)
             yield completion.task, completion.program
 
-    with Lanes(workers, require_isolation=require_isolation) as lanes:
-        for told in lanes.map_distinct(judged, works(), name=lambda work: digest(*work)):
+    own = nullcontext(lanes) if lanes else Lanes(workers, require_isolation=require_isolation)
+    with own as open_lanes:
+        for told in open_lanes.map_distinct(judged, works(), name=lambda work: digest(*work)):
             yield evaluation(waiting.popleft(), told)
 
 

@@ -1,0 +1,132 @@
+"""The public names: typed, documented, as they are shown, and cheap to import."""
+
+import json
+import re
+import subprocess
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import codebotler
+import roboeval
+
+DOCS = Path(__file__).parent.parent / "docs"
+PAGE = (DOCS / "library.md").read_text()
+EXAMPLES = re.findall(r"^```python\n(.*?)^```\n\n```text\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+PACKAGES = {"codebotler": codebotler.__all__, "roboeval": roboeval.__all__}
+NAMES = [(package, name) for package, names in PACKAGES.items() for name in names]
+WEB = {"nicegui", "fastapi", "starlette", "uvicorn", "websockets"}
+MODELS = {"pydantic_ai", "openai", "anthropic", "google.genai", "httpx", "tenacity", "torch", "transformers"}
+FIGURES = {"matplotlib", "numpy", "polars", "PIL"}
+DRAWING = {"rich"}
+WORK = {"yaml", "asyncio"}
+
+
+def imported_by(code: str) -> set[str]:
+    script = f"{code}\nimport json, sys\nprint('\\n' + json.dumps(sorted(sys.modules)))"
+    command = [sys.executable, "-c", script]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True)
+    return {*json.loads(ended.stdout.splitlines()[-1])}
+
+
+def test_an_interpreter_that_imports_such_a_library_is_seen_through() -> None:
+    assert "numpy" in imported_by("import numpy")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_importing_a_package_imports_next_to_nothing(package: str) -> None:
+    new = imported_by(f"import {package}") - imported_by("")
+    assert new <= {package, "__future__"}
+
+
+@pytest.mark.parametrize(
+    "code", [f"from {package} import {', '.join(names)}" for package, names in PACKAGES.items()]
+)
+def test_using_the_names_imports_no_library_for_pages_figures_or_models(code: str) -> None:
+    allowed = {"tenacity"} if "generate" in code else set()  # small, and tries requests again
+    assert not (imported_by(code) & (WEB | MODELS | FIGURES | DRAWING) - allowed)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], [], ["run", "--help"], ["serve", "--help"]])
+@pytest.mark.parametrize("package", PACKAGES)
+def test_help_imports_nothing_that_a_command_works_with(package: str, arguments: list[str]) -> None:
+    code = (
+        f"import sys\nsys.argv = {['x', *arguments]}\nfrom {package}.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass"
+    )
+    imported = imported_by(code)
+    assert "typer" in imported
+    assert not imported & (WEB | MODELS | FIGURES | DRAWING | WORK)
+    if arguments == ["--help"]:  # otherwise typer needs it
+        assert "pydantic" not in imported
+
+
+@pytest.mark.parametrize(("package", "name"), NAMES)
+def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -> None:
+    """A module of the same name would take its place as soon as anybody imports the module."""
+    found = getattr(import_module(package), name)
+    assert name == "__version__" or found.__doc__
+    assert find_spec(f"{package}.{name}") is None
+    assert name in dir(import_module(package))
+
+
+def test_names_stay_what_they_are_whatever_else_is_imported() -> None:
+    code = (
+        "import roboeval.verdicts, codebotler.checker, codebotler.generation, roboeval.cli, codebotler.cli\n"
+    )
+    uses = "from roboeval import evaluate\nfrom codebotler import check, generate\n"
+    imported_by(code + uses + "assert callable(evaluate) and callable(check) and callable(generate)")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_name_that_is_not_there_is_an_ordinary_error(package: str) -> None:
+    with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'evalute'"):
+        _ = import_module(package).evalute
+    assert not hasattr(import_module(package), "pages")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_the_page_lists_the_public_names(package: str) -> None:
+    table = re.search(rf"^\| from `{package}` \|.*?\n\n", PAGE + "\n", re.DOTALL | re.MULTILINE)
+    assert table is not None
+    firsts = re.findall(r"^\| (`.*?) \|", table[0], re.MULTILINE)
+    assert sorted(re.findall(r"`(\w+)`", " ".join(firsts))) == sorted(PACKAGES[package])
+
+
+@pytest.mark.parametrize(("code", "shown"), EXAMPLES)
+def test_an_example_prints_what_the_page_shows(code: str, shown: str) -> None:
+    assert len(code.splitlines()) == 3
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ended.stdout == shown
+
+
+def test_all_four_examples_are_there() -> None:
+    assert len(EXAMPLES) == 4
+
+
+NOTEBOOK = """
+import asyncio
+from codebotler import BadInput, generate
+async def cell():
+    return generate(INSTRUCTION, rooms=["kitchen", "jill's office", "start_loc"])
+assert asyncio.run(cell()).program == generate(INSTRUCTION).program
+for wrong in ({"retries": -1}, {"model": "nobody"}, {"temperature": -1}):
+    try:
+        generate(INSTRUCTION, **wrong)
+    except BadInput as error:
+        print(error)
+"""
+
+
+def test_generate_works_in_a_notebook_and_refuses_what_makes_no_sense() -> None:
+    instruction = re.search(r'generate\((".*?")', PAGE)
+    assert instruction is not None
+    code = NOTEBOOK.replace("INSTRUCTION", instruction[1])
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    retries, model, temperature = ended.stdout.splitlines()
+    assert retries == "the number of retries is -1, but it must be at least 0"
+    assert model.startswith('"nobody" names no model')
+    assert temperature.startswith("the temperature is -1")
