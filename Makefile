@@ -7,7 +7,7 @@
 # one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
 # Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make pictures` makes those of the
-# guide anew.
+# guide anew. `make docs` makes the documentation as a site, in build/site.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -24,7 +24,8 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo serve test test-ros1 test-browser pictures test-transformers test-pyrobosim test-inspect test-faults fuzz lint bench clean
+.PHONY: demo serve docs test test-ros1 test-browser pictures test-transformers test-pyrobosim test-inspect \
+	test-faults fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -85,6 +86,9 @@ lint: $(VENV)/linted
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(VENV)/documented
+	$(BIN)/python website/build.py
+
 bench: $(VENV)/installed
 	$(BIN)/python bench/evaluate.py
 	$(BIN)/python bench/completions.py
@@ -144,5 +148,11 @@ $(VENV)/linted: $(VENV)/tested
 	@$(PIP) install --constraint constraints.txt --group lint | { $(DOTS); }
 	@touch $@
 
+$(VENV)/documented: $(VENV)/installed
+	@printf "installing what the site needs "
+	@$(PIP) install --constraint constraints.txt --group docs | { $(DOTS); }
+	@touch $@
+
 clean:
-	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) $(INSPECT_VENV) dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) $(INSPECT_VENV) build dist .hypothesis .mypy_cache \
+		.pytest_cache .ruff_cache .import_linter_cache
