@@ -46,7 +46,8 @@ RUN_BY = {"library.md": "tests/test_library.py"}
 LESS = {
     "README.md": [
         ("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report"),
-        (" serve ", " serve --help "),  # other pages serve
+        ("roboeval serve ", "roboeval serve --help "),  # other pages serve
+        ("codebotler serve ", "codebotler serve --help "),
     ],
     "benchmark-pages.md": [("--num-completions 1", "--num-completions 1 --tasks LunchTime")],
     "evaluate-your-model.md": [("--num-completions 50", "--num-completions 1 --tasks LunchTime")],
@@ -66,7 +67,7 @@ SHIM = """\
 #!{python}
 import os, re, signal, socket, subprocess, sys, urllib.error, urllib.request
 command = [sys.executable, "-m", "{name}.cli", *sys.argv[1:]]
-if sys.argv[1:2] != ["serve"]:
+if sys.argv[1:2] != ["serve"] or "--help" in sys.argv:
     os.execv(sys.executable, command)
 with socket.create_server(("127.0.0.1", 0)) as free:
     port = str(free.getsockname()[1])
