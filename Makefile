@@ -95,6 +95,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/generate.py
 	$(BIN)/python bench/faulty_server.py
 	$(BIN)/python bench/check.py
+	$(BIN)/python bench/reward.py
 	$(BIN)/python bench/report.py
 	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
@@ -137,8 +138,7 @@ $(INSPECT_VENV)/tested: $(SOURCES) constraints-inspect.txt
 	@echo "making an environment with Inspect in $(INSPECT_VENV), which takes a minute"
 	@$(PYTHON) -m venv --clear $(INSPECT_VENV)
 	@$(INSPECT_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@grep -v "^python-dateutil==" constraints.txt >$(INSPECT_VENV)/constraints.txt # Inspect needs an older one
-	@$(INSPECT_VENV)/bin/python -m pip --disable-pip-version-check install --constraint $(INSPECT_VENV)/constraints.txt \
+	@$(INSPECT_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
 		--constraint constraints-inspect.txt "$(PACKAGE)[inspect]" --group test | { $(DOTS); }
 	@touch $@
 
