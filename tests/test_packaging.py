@@ -28,7 +28,7 @@ ON_TOP = {
         "mkdocs.yml",
         "pyproject.toml",
     ),
-    *("constraints.txt", "constraints-pyrobosim.txt", "constraints-transformers.txt"),
+    *(path.name for path in ROOT.glob("constraints*.txt")),
     *("bench", "docs", "examples", "packaging", "src", "tests", "website"),
 }
 """Of what a source archive is made."""

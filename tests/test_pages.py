@@ -44,15 +44,19 @@ RUN_BY = {"library.md": "tests/test_library.py"}
 """Pages that another test follows as a whole."""
 
 LESS = {
-    "README.md": [("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report")],
+    "README.md": [
+        ("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report"),
+        ("roboeval serve ", "roboeval serve --help "),  # other pages serve
+        ("codebotler serve ", "codebotler serve --help "),
+    ],
     "benchmark-pages.md": [("--num-completions 1", "--num-completions 1 --tasks LunchTime")],
     "evaluate-your-model.md": [("--num-completions 50", "--num-completions 1 --tasks LunchTime")],
     "index.md": [("recorded:hasty", "recorded:hasty --tasks LunchBreak")],
     "report.md": [("--num-completions 4", "--num-completions 4 --tasks LunchTime,LunchBreak,SetTemperature")],
-    "roboeval-plus.md": [("--worlds 200", "--worlds 31")],
+    "roboeval-plus.md": [("--worlds 200", "--worlds 31"), ("--num-completions 3", "--num-completions 1")],
     "tutorial.md": [("--num-completions 2", "--num-completions 1 --tasks LunchTime --no-report")],
 }
-"""What a reader is told to do, and what is done here instead: the same with fewer programs."""
+"""What a reader is told to do, and what is done here instead: the same with less."""
 
 FOLLOWED = [page for page in PAGES if page not in RUN_BY]
 CODE, DATA = {"sh", "python"}, {"yaml", "json", "text"}
@@ -63,7 +67,7 @@ SHIM = """\
 #!{python}
 import os, re, signal, socket, subprocess, sys, urllib.error, urllib.request
 command = [sys.executable, "-m", "{name}.cli", *sys.argv[1:]]
-if sys.argv[1:2] != ["serve"]:
+if sys.argv[1:2] != ["serve"] or "--help" in sys.argv:
     os.execv(sys.executable, command)
 with socket.create_server(("127.0.0.1", 0)) as free:
     port = str(free.getsockname()[1])
