@@ -13,6 +13,8 @@ BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assert
 <script src="/static/stop.js"></script>"""
 ROBOT = (("Robot", "/"), ("Missions", "/missions"))
 FACE = ("Face", "/face")
+PATIENCE = 60.0
+"""Seconds that a page may take to be put together: a run is read when it is first looked at."""
 
 
 @dataclass(frozen=True)

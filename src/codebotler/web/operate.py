@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from codebotler.web.desk import Desk
-from codebotler.web.frame import Frame
+from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.instruct import Instruct
 from codebotler.web.past import add as add_past
 from codebotler.web.programpane import ProgramPane
@@ -26,7 +26,7 @@ def add(desk: Desk, frame: Frame) -> None:
         frame: what all pages have.
     """
 
-    @ui.page("/", response_timeout=10.0)
+    @ui.page("/", response_timeout=PATIENCE)
     async def operate() -> None:
         frame("Robot", "/", PARTS)
         Words("h1", "Operate the robot", "unseen")
