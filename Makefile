@@ -3,16 +3,17 @@
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
 # `make test-transformers` tests models and detectors that run on this machine, with a Python for which there is a
 # torch (3.11); it makes an environment of its own, since nothing else needs so much. `make test-pyrobosim` tests the
-# robot in pyrobosim, in an environment of its own, too. `make test-faults` asks a server that fails
+# robot in pyrobosim, and `make test-inspect` the benchmark in Inspect, in environments of their own, too. `make test-faults` asks a server that fails
 # one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
 # Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make pictures` makes those of the
-# guide anew.
+# guide anew. `make docs` makes the documentation as a site, in build/site.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
 TORCH_VENV ?= .venv-transformers
 PYROBOSIM_VENV ?= .venv-pyrobosim
+INSPECT_VENV ?= .venv-inspect
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -23,7 +24,8 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo serve test test-ros1 test-browser pictures test-transformers test-pyrobosim test-faults fuzz lint bench clean
+.PHONY: demo serve docs test test-ros1 test-browser pictures test-transformers test-pyrobosim test-inspect \
+	test-faults fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -45,7 +47,8 @@ test: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --ignore tests/ros1 --ignore tests/browser \
 		--ignore tests/codebotler/models/test_local.py \
 		--ignore tests/codebotler/perception/test_zeroshot.py \
-		--ignore tests/codebotler/robots/test_pyrobosim.py $(TESTS)
+		--ignore tests/codebotler/robots/test_pyrobosim.py \
+		--ignore tests/roboeval/test_inspecting.py $(TESTS)
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
@@ -65,6 +68,9 @@ test-transformers: $(TORCH_VENV)/tested
 test-pyrobosim: $(PYROBOSIM_VENV)/tested
 	$(PYROBOSIM_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py
 
+test-inspect: $(INSPECT_VENV)/tested
+	$(INSPECT_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/test_inspecting.py
+
 test-faults: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m
 
@@ -80,12 +86,16 @@ lint: $(VENV)/linted
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(VENV)/documented
+	$(BIN)/python website/build.py
+
 bench: $(VENV)/installed
 	$(BIN)/python bench/evaluate.py
 	$(BIN)/python bench/completions.py
 	$(BIN)/python bench/generate.py
 	$(BIN)/python bench/faulty_server.py
 	$(BIN)/python bench/check.py
+	$(BIN)/python bench/reward.py
 	$(BIN)/python bench/report.py
 	$(BIN)/python bench/stop.py
 	$(BIN)/python bench/ros1.py
@@ -124,10 +134,24 @@ $(PYROBOSIM_VENV)/tested: $(SOURCES) constraints-pyrobosim.txt
 		--constraint constraints-pyrobosim.txt "$(PACKAGE)[pyrobosim]" --group test | { $(DOTS); }
 	@touch $@
 
+$(INSPECT_VENV)/tested: $(SOURCES) constraints-inspect.txt
+	@echo "making an environment with Inspect in $(INSPECT_VENV), which takes a minute"
+	@$(PYTHON) -m venv --clear $(INSPECT_VENV)
+	@$(INSPECT_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(INSPECT_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
+		--constraint constraints-inspect.txt "$(PACKAGE)[inspect]" --group test | { $(DOTS); }
+	@touch $@
+
 $(VENV)/linted: $(VENV)/tested
 	@printf "installing what linters need "
 	@$(PIP) install --constraint constraints.txt --group lint | { $(DOTS); }
 	@touch $@
 
+$(VENV)/documented: $(VENV)/installed
+	@printf "installing what the site needs "
+	@$(PIP) install --constraint constraints.txt --group docs | { $(DOTS); }
+	@touch $@
+
 clean:
-	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) dist .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) $(INSPECT_VENV) build dist .hypothesis .mypy_cache \
+		.pytest_cache .ruff_cache .import_linter_cache

@@ -1,69 +1,268 @@
-"""The pages for users: every command on them runs, in their order, as it stands there."""
+"""The pages for users: every command and all code on them runs, in their order, as it stands there.
+
+What cannot run here is marked, `<!-- not run: WHY -->` or `<!-- run by TEST -->`, and listed below.
+"""
 
 import csv
+import doctest
+import json
 import os
 import re
 import runpy
-import shlex
+import stat
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+import yaml
 
 from codebotler.mission import State
 from codebotler.missionview import WORDS
 from server import Server
 
-DOCS = Path(__file__).parent.parent / "docs"
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+PAGES = {path.name: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.md")))}
+
+NOT_RUN = {
+    "README.md": ["makes an environment of its own"],
+    "evaluate-your-model.md": ["needs a key, and costs money"],
+    "index.md": ["makes an environment of its own"],
+    "install.md": ["makes an environment of its own", "makes an environment of its own"],
+    "perception.md": ["needs a robot with a camera"],
+    "roboeval-plus.md": ["takes minutes"],
+    "robots.md": ["needs pyrobosim, with which `make test-pyrobosim` tests the robot"],
+    "ros.md": ["needs root, and a Debian or Ubuntu"],
+    "tutorial.md": ["makes an environment of its own"],
+}
+"""Why blocks are not run, page by page: no other reason, and no further block."""
+
+RUN_BY = {"library.md": "tests/test_library.py"}
+"""Pages that another test follows as a whole."""
+
+LESS = {
+    "README.md": [
+        ("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report"),
+        ("roboeval serve ", "roboeval serve --help "),  # other pages serve
+        ("codebotler serve ", "codebotler serve --help "),
+    ],
+    "benchmark-pages.md": [("--num-completions 1", "--num-completions 1 --tasks LunchTime")],
+    "evaluate-your-model.md": [("--num-completions 50", "--num-completions 1 --tasks LunchTime")],
+    "index.md": [("recorded:hasty", "recorded:hasty --tasks LunchBreak")],
+    "report.md": [("--num-completions 4", "--num-completions 4 --tasks LunchTime,LunchBreak,SetTemperature")],
+    "roboeval-plus.md": [("--worlds 200", "--worlds 31"), ("--num-completions 3", "--num-completions 1")],
+    "tutorial.md": [("--num-completions 2", "--num-completions 1 --tasks LunchTime --no-report")],
+}
+"""What a reader is told to do, and what is done here instead: the same with less."""
+
+FOLLOWED = [page for page in PAGES if page not in RUN_BY]
+CODE, DATA = {"sh", "python"}, {"yaml", "json", "text"}
+COMMAND = re.compile(r"^(?:\.venv/|codebotler |roboeval |python |pip |export |make |apt)", re.MULTILINE)
+MODEL = "http://localhost:8000/v1"
+
+SHIM = """\
+#!{python}
+import os, re, signal, socket, subprocess, sys, urllib.error, urllib.request
+command = [sys.executable, "-m", "{name}.cli", *sys.argv[1:]]
+if sys.argv[1:2] != ["serve"] or "--help" in sys.argv:
+    os.execv(sys.executable, command)
+with socket.create_server(("127.0.0.1", 0)) as free:
+    port = str(free.getsockname()[1])
+page = subprocess.Popen([*command, "--port", port], stderr=subprocess.PIPE, text=True)
+try:
+    link = next(line.strip() for line in page.stderr if "http://" in line)
+    link = re.sub(r"//[^/]*", "//localhost:" + port, link)
+    browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+    for again in range(5):  # on a busy machine a page may come too late; who sees that loads it again
+        try:
+            browser.open(link, timeout=30)
+            break
+        except urllib.error.HTTPError as error:
+            if error.code != 500 or again == 4:
+                raise
+    page.send_signal(signal.SIGINT)
+    sys.exit(0 if page.wait(30) in (0, 130) else 1)
+finally:
+    page.kill()
+"""
+"""In the place of a command: a page is served until somebody has opened it and pressed Ctrl-C."""
+
+PIP = """\
+#!{python}
+import os, sys
+offline = ["--quiet", "--no-compile", "--no-index", "--no-deps", "--no-build-isolation", "--target", {site!r}]
+os.execv(sys.executable, [sys.executable, "-m", "pip", *sys.argv[1:], *offline])
+"""
 
 
-def run(commands: str, folder: Path, url: str) -> str:
-    """Run what a reader would paste, with a model that answers quickly, and fewer completions."""
-    for name in ("roboeval", "codebotler"):
-        here = f"{shlex.quote(sys.executable)} -m {name}.cli"
-        commands = commands.replace(f".venv/bin/{name}", here)
-    commands = commands.replace("http://localhost:8000/v1", url)
-    commands = commands.replace("--num-completions 50", "--num-completions 1 --tasks LunchTime")
-    ended = subprocess.run(
-        ["bash", "-e", "-o", "pipefail", "-c", commands],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        env={**os.environ, "COLUMNS": "100"},
-    )
-    assert ended.returncode == 0, (commands, ended.stderr)
-    return ended.stdout
+@dataclass(frozen=True)
+class Block:
+    """What stands between fences on a page."""
+
+    language: str
+    text: str
+    not_run: str = ""
+    run_by: str = ""
 
 
-def blocks(page: str, language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", (DOCS / page).read_text(), re.DOTALL | re.MULTILINE)
+MARK = r"<!-- (?:not run: (?P<why>.*?)|run by (?P<test>.*?)) -->\n"
+FENCE = re.compile(rf"^(?:{MARK})?```(?P<language>.*)\n(?P<text>(?s:.*?))^```$", re.MULTILINE)
 
 
-@pytest.mark.parametrize("page", ["evaluate-your-model.md", "check-before-you-run.md"])
-def test_every_command_of_a_page_runs(tmp_path: Path, page: str) -> None:
+def blocks(page: str) -> list[Block]:
+    found = FENCE.finditer(PAGES[page].read_text())
+    return [Block(f["language"], f["text"], f["why"] or "", f["test"] or "") for f in found]
+
+
+@dataclass
+class Reader:
+    """Somebody who follows a page to the letter, in a folder of their own."""
+
+    folder: Path
+    url: str
+    printed: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        (self.folder / "examples").symlink_to(ROOT / "examples")
+        self.put("roboeval", SHIM.format(python=sys.executable, name="roboeval"))
+        self.put("codebotler", SHIM.format(python=sys.executable, name="codebotler"))
+        self.put("pip", PIP.format(python=sys.executable, site=str(self.folder / "site")))
+
+    def put(self, name: str, script: str) -> None:
+        path = self.folder / ".venv" / "bin" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(script)
+        path.chmod(path.stat().st_mode | stat.S_IXUSR)
+
+    def follow(self, page: str) -> None:
+        for block in blocks(page):
+            if block.language not in CODE or block.not_run or block.run_by or ">>> " in block.text:
+                continue
+            text = block.text.replace(MODEL, self.url)
+            for told, less in LESS.get(page, []):
+                text = text.replace(told, less)
+            shell = ["bash", "-e", "-o", "pipefail", "-c"]
+            self.run([*shell, text] if block.language == "sh" else [sys.executable, "-c", text])
+
+    def run(self, command: list[str]) -> str:
+        path = os.pathsep.join([str(self.folder / "site"), os.environ.get("PYTHONPATH", "")])
+        about = {"COLUMNS": "160", "CODEBOTLER_HOME": str(self.folder / "state"), "PYTHONPATH": path}
+        ended = subprocess.run(
+            command,
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
+            check=False,
+            env={**os.environ, **about},
+            timeout=300,
+        )
+        assert ended.returncode == 0, (command[-1], ended.stdout, ended.stderr)
+        self.printed.append(ended.stdout)
+        return ended.stdout
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Reader]]:
+    """Follows a page, once for all tests, with a model that answers quickly."""
+    readers: dict[str, Reader] = {}
     with Server(answer=lambda _: 'def task_program():\n    go_to("kitchen")\n    say("hello")\n') as server:
-        printed = [run(commands, tmp_path, server.url) for commands in blocks(page, "sh")]
-        assert server.requests
-    assert all(printed[:1])
-    for code in blocks(page, "python"):
-        subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True)
+
+        def follow(page: str) -> Reader:
+            if page not in readers:
+                readers[page] = Reader(tmp_path_factory.mktemp("reader"), server.url)
+                readers[page].follow(page)
+            return readers[page]
+
+        yield follow
 
 
-def test_every_command_about_robots_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("CODEBOTLER_HOME", str(tmp_path / "state"))
-    (tmp_path / "examples").symlink_to(DOCS.parent / "examples")
-    kinds, tea, _, shown = [run(commands, tmp_path, "") for commands in blocks("robots.md", "sh")]
+def is_printed(told: str, printed: str) -> bool:
+    """Whether a page tells what was printed, but for where lines break; `...` leaves something out."""
+    told, printed = (" ".join(text.split()) for text in (told, printed))
+    return re.search(re.escape(told).replace(r"\.\.\.", ".*?"), printed) is not None
+
+
+@pytest.mark.parametrize("page", [page for page in FOLLOWED if any(b.language in CODE for b in blocks(page))])
+def test_every_block_of_a_page_runs(followed: Callable[[str], Reader], page: str) -> None:
+    followed(page)
+
+
+def test_what_is_not_run_is_marked_and_listed() -> None:
+    marked = {page: [block.not_run for block in blocks(page) if block.not_run] for page in PAGES}
+    assert {page: reasons for page, reasons in marked.items() if reasons} == NOT_RUN
+    assert all(page in (ROOT / test).read_text() for page, test in RUN_BY.items())
+    for page, path in PAGES.items():
+        assert path.read_text().count("\n```") == 2 * len(blocks(page)), page
+        for block in blocks(page):
+            assert block.language in CODE | DATA, (page, block)
+            assert block.language == "sh" or not COMMAND.search(block.text), (page, block)
+            assert not block.run_by or page in (ROOT / block.run_by).read_text(), (page, block)
+
+
+def test_examples_in_sessions_of_python_run() -> None:
+    for page, path in PAGES.items():
+        if any(block.text.startswith(">>> ") for block in blocks(page)):
+            results = doctest.testfile(str(path), module_relative=False, encoding="utf-8")
+            assert (results.failed, results.attempted > 20) == (0, True), page
+
+
+def test_data_can_be_read() -> None:
+    read: dict[str, Callable[[str], object]] = {"yaml": yaml.safe_load, "json": json.loads}
+    for page in PAGES:
+        for block in blocks(page):
+            if block.language in read:
+                assert read[block.language](block.text), (page, block)
+
+
+SHOWN_ELSEWHERE = {  # texts that no command of their page prints, and the tests that compare them
+    "index.md": ["abc argparse", "runs/hasty/"],
+    "roboeval-plus.md": ["task   "],
+    "ros.md": ["string location"],
+}
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in FOLLOWED if any(b.language == "text" for b in blocks(page))]
+)
+def test_what_a_page_says_is_printed_is_printed(followed: Callable[[str], Reader], page: str) -> None:
+    elsewhere = tuple(SHOWN_ELSEWHERE.get(page, []))
+    told = [block.text for block in blocks(page) if block.language == "text"]
+    assert sum(text.startswith(elsewhere) for text in told) >= len(elsewhere)
+    for text in told:
+        if not (elsewhere and text.startswith(elsewhere)):
+            assert any(is_printed(text, printed) for printed in followed(page).printed), text
+
+
+def test_every_command_about_robots_does_what_it_should(followed: Callable[[str], Reader]) -> None:
+    reader = followed("robots.md")
+    kinds, tea, *_, shown, code = reader.printed
     assert re.search(r"^sim +works", kinds, re.MULTILINE)
     assert 'looks for "ann"\n            → found' in tea
     assert "has no stapler" in shown
-    assert (tmp_path / "tea.mcap").exists()
-    (code,) = blocks("robots.md", "python")
-    ended = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True
-    )
-    assert ended.stdout.splitlines()[-1] == "done"
+    assert (reader.folder / "tea.mcap").exists()
+    assert code.splitlines()[-1] == "done"
+
+
+def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reader]) -> None:
+    folder = followed("index.md").folder / "runs" / "hasty"
+    (listed,) = (b.text for b in blocks("index.md") if b.text.startswith("runs/hasty/"))
+    names = set(re.findall(r"^  (\S+)", listed, re.MULTILINE))
+    made = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    assert made <= names
+    assert {"completions.jsonl", "evaluations/paper.jsonl"} <= made
+
+
+def test_a_task_that_is_written_by_the_guide_is_a_package_in_the_end(
+    followed: Callable[[str], Reader],
+) -> None:
+    reader = followed("write-a-task.md")
+    assert "an umbrella is in the lobby" in reader.printed[-1]
+    assert not (reader.folder / "office").exists()
+    judged = next(printed for printed in reader.printed if "FetchUmbrella/1/0" in printed)
+    assert "there is only a chair in the lobby" in judged
 
 
 def test_states_and_events_of_missions_are_documented() -> None:
@@ -80,50 +279,26 @@ def test_states_and_events_of_missions_are_documented() -> None:
     assert set(re.findall(r"`(\w+)`", rows["event"])) == set(WORDS)
 
 
-def test_every_command_about_reports_runs_and_every_number_is_explained(tmp_path: Path) -> None:
-    printed = [run(commands, tmp_path, "") for commands in blocks("report.md", "sh")]
-    told = [block for block in blocks("report.md", "text") if "drawn at random" in block]
-    assert told
-    assert all(any(block.strip() in out for out in printed) for block in told)
+def test_every_number_of_a_report_is_explained(followed: Callable[[str], Reader]) -> None:
+    report = followed("report.md").folder / "report"
     page = (DOCS / "report.md").read_text()
-    made = {path.stem for path in (tmp_path / "report").glob("*/*")}
+    made = {path.stem for path in report.glob("*/*")}
     assert len(made) > 10
     assert set(re.findall(r"^\| `([\w-]+)` \|", page, re.MULTILINE)) >= made
-    for path in (tmp_path / "report" / "tables").iterdir():
+    for path in (report / "tables").iterdir():
         with path.open(newline="") as file:
             heads = next(csv.reader(file))
         assert all(f"*{head}*" in page or "recorded:" in head for head in heads), (path.name, heads)
 
 
-def test_the_table_of_resampling_is_what_comes_out(tmp_path: Path) -> None:
-    table = next(block for block in blocks("evaluate-your-model.md", "text") if "retries" in block)
-    first, *_, last = [
-        block for block in blocks("evaluate-your-model.md", "sh") if "recorded" in block and "run" in block
-    ]
-    run(first.strip() + " --no-report", tmp_path, "")
-    assert table in run(last, tmp_path, "")
-
-
-@pytest.mark.parametrize(
-    "page",
-    [
-        "evaluate-your-model.md",
-        "report.md",
-        "check-before-you-run.md",
-        "robots.md",
-        "serve.md",
-        "ros.md",
-        "perception.md",
-        "library.md",
-    ],
-)
+@pytest.mark.parametrize("page", [page for page in PAGES if page not in {"README.md", "index.md"}])
 def test_pages_are_linked(page: str) -> None:
     assert f"]({page})" in (DOCS / "index.md").read_text()
-    assert f"](docs/{page})" in (DOCS.parent / "README.md").read_text()
+    assert f"](docs/{page})" in (ROOT / "README.md").read_text()
 
 
 def test_pictures_come_from_tests_and_are_quickly_loaded() -> None:
-    chosen = runpy.run_path(str(DOCS.parent / "tests" / "browser" / "pictures.py"))["CHOSEN"]
+    chosen = runpy.run_path(str(ROOT / "tests" / "browser" / "pictures.py"))["CHOSEN"]
     pictures = {path.stem: path for path in (DOCS / "pictures").iterdir()}
     assert sorted(pictures) == sorted(chosen)
     page = (DOCS / "serve.md").read_text()
@@ -133,6 +308,6 @@ def test_pictures_come_from_tests_and_are_quickly_loaded() -> None:
 
 
 def test_links_lead_somewhere() -> None:
-    for page in DOCS.glob("*.md"):
-        for target in re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text()):
-            assert (page.parent / target).exists(), (page.name, target)
+    for page, path in PAGES.items():
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", path.read_text()):
+            assert (path.parent / target).exists(), (page, target)

@@ -27,6 +27,10 @@ VERBS: Mapping[str, str] = {
     "pick": "picks up",
     "place": "puts down",
 }
+LOOKS: Mapping[str, str] = {
+    "get_all_rooms": "looks up which rooms there are",
+    "get_current_location": "looks up where it is",
+}
 STYLES: Mapping[State, str] = {
     State.DONE: "bold green",
     State.FAILED: "bold red",
@@ -92,6 +96,8 @@ def told(line: Line) -> Text | None:
 def _skill(line: Line) -> Text:
     name, arguments = line["skill"], line["arguments"]
     recording = SKILLS[name].recording if name in SKILLS else None
+    if name in LOOKS and name in SKILLS:
+        return Text(LOOKS[name])
     if recording is None or recording.kind not in VERBS:
         return Text(shortened(in_words(name, list(arguments.values()))))
     words = f'{VERBS[recording.kind]} "{shortened(str(arguments[recording.text]))}"'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -84,6 +85,11 @@ def visible(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def visible_lines(text: str) -> str:
+    """A text made visible, but for the ends of its lines, where programs and people end them, and tabs."""
+    return "\n".join(visible(line.expandtabs(4)) for line in re.split("\r\n?|\n", text))
 
 
 def shortened(text: str, most: int = 500) -> str:

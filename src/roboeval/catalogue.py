@@ -15,8 +15,9 @@ from rich.text import Text
 
 from codebotler.badinput import BadInput
 from codebotler.world import Answer, Person, World
+from roboeval.installed import installed_suites
 from roboeval.run import write_whole
-from roboeval.suite import Scenario, Suite, Task
+from roboeval.suite import ABLATED, Scenario, Suite, Task, load_suite, shipped_suites
 
 
 def suite_view(suite: Suite) -> RenderableType:
@@ -151,14 +152,15 @@ def new_task(folder: Path, name: str) -> Path:
         BadInput: the name cannot be one, the task is there already, or the folder cannot be written.
     """
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
-        raise BadInput(f'"{name}" is no name for a task; write words together, such as WaterPlants')
+        raise BadInput(
+            f'"{name}" is no name for a task; write words together, each with a capital, such as WaterPlants'
+        )
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
-        raise BadInput("is there already", file=path)
+        raise BadInput("is there already; choose another name, or edit it", file=path)
     try:
         if not (folder / "suite.yaml").exists():
-            suite = re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower()).lstrip("-0123456789") or "mine"
-            write_whole(folder / "suite.yaml", f"name: {suite}\nversion: 1\nabout: my tasks\n".encode())
+            write_whole(folder / "suite.yaml", SUITE.replace("NAME", _suite_name(folder)).encode())
         if not [*folder.glob(f"recorded/*/{name}.yaml")]:
             write_whole(folder / "recorded" / "mine" / f"{name}.yaml", PROGRAMS.encode())
         write_whole(path, TEMPLATE.replace("NAME", name).encode())
@@ -166,6 +168,61 @@ def new_task(folder: Path, name: str) -> Path:
         raise BadInput(f"cannot be written ({error.strerror})", file=error.filename) from None
     return path
 
+
+def _suite_name(folder: Path) -> str:
+    """A name for the suite in a folder: the folder's, as far as it can be one."""
+    name = (
+        re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower()).lstrip("-0123456789").removesuffix(ABLATED)
+    )
+    return f"my-{name}" if name in shipped_suites() else name or "mine"
+
+
+def expect_own(suite: str) -> None:
+    """Refuse to start a task in a suite that is somebody else's.
+
+    Args:
+        suite: its name, or the folder of one that is one's own.
+
+    Raises:
+        BadInput: it ships with RoboEval, or a package brings it.
+    """
+    brought = [one.package for one in installed_suites() if one.name == suite]
+    if suite in shipped_suites() or brought:
+        whose = f"belongs to the package {brought[0]}" if brought else "ships with RoboEval"
+        raise BadInput(
+            f'the suite "{suite}" {whose} and stays as it is; name a folder of your own with --suite'
+        )
+
+
+def other_suites(name: str) -> Iterator[str]:
+    """What else --suite takes, in a sentence, and one for each suite of a package that cannot be had.
+
+    Args:
+        name: of the suite that is known already.
+    """
+    shipped = shipped_suites()
+    others = [one for one in shipped if one != name]
+    for suite in installed_suites():
+        try:
+            if suite.name in shipped:
+                raise BadInput(  # noqa: TRY301 - told like all else
+                    f'the package {suite.package} names a suite "{suite.name}", as one is named that ships '
+                    "with RoboEval, so that nobody can ask for it; rename it there"
+                )
+            load_suite(suite.name)
+        except BadInput as error:
+            yield str(error)
+        else:
+            others += [f"{suite.name} ({suite.package})"] * (suite.name != name)
+    if others:
+        yield f"other suites, by --suite: {', '.join(others)}; or the folder of your own"
+
+
+SUITE = """\
+name: NAME                # by this name evaluations are kept; small letters, digits and dashes
+version: 1                # count it up when a verdict may change
+about: my tasks
+"""
 
 TEMPLATE = """\
 name: NAME

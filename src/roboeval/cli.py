@@ -19,7 +19,6 @@ from roboeval.commands.serving import serve
 
 app = typer.Typer(
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 

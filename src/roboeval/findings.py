@@ -12,6 +12,7 @@ Kind = Literal[
     "implied",
     "undecided",
     "unused",
+    "misjudged",
     "untripped",
     "dead-regex",
     "absent",

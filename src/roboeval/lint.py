@@ -21,7 +21,8 @@ from roboeval.names import absent_names
 from roboeval.representatives import elements
 from roboeval.satisfiability import Reasoner, Undecided
 from roboeval.suite import Check, Requirement, Scenario, Task
-from roboeval.trials import Verdicts
+from roboeval.taxonomy import failure
+from roboeval.trials import Verdicts, recorded_replies
 from roboeval.witnesses import can_match, representative_texts, samples
 
 
@@ -33,7 +34,7 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
         verdicts: on programs that are meant to be right or wrong.
     """
     places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
-    found = [*_unused(task), *_untripped(task, verdicts)]
+    found = [*_unused(task), *_misjudged(task, verdicts), *_untripped(task, verdicts)]
     if task.drawn:
         found += _of_drawn(places)
     else:
@@ -95,6 +96,23 @@ def _unused(task: Task) -> Iterator[Finding]:
         if check.name not in used:
             message = f'no world requires the check "{check.name}"; require it or remove it'
             yield Finding("unused", check.name, message, task.path, check.line)
+
+
+def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
+    """Recorded programs that end otherwise than whoever recorded them says."""
+    if task.borrows:  # programs that were recorded for other requirements
+        return
+    for reply, judged in zip(recorded_replies(task), verdicts, strict=False):  # an ablation's come afterwards
+        failed = failure(judged)
+        if (None if failed is None else failed.kind) == reply.fails:
+            continue
+        said = "pass" if reply.fails is None else f"fail by {reply.fails}"
+        where = "" if failed is None else f' by {failed.kind} in the world "{judged[failed.world].world}"'
+        message = (
+            f'the recorded program "{reply.about}" is said to {said}, but it '
+            f"{'passes' if failed is None else 'fails'}{where}; mend it, what it is said to do, or a check"
+        )
+        yield Finding("misjudged", reply.about, message, task.path, 1)
 
 
 def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:

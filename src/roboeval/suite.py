@@ -14,6 +14,7 @@ from typing import TypeAlias
 from codebotler.badinput import BadInput, YamlFile
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS, SkillTable
+from roboeval.installed import installed_folder, installed_suites
 from roboeval.suitefile import SuiteFile
 from roboeval.task import Accepted, Check, Fact, Requirement, Scenario, Task
 from roboeval.taskfile import Lot, read_task
@@ -30,10 +31,12 @@ __all__ = [
     "Task",
     "load_suite",
     "read_task",
+    "shipped_suites",
 ]
 
 ABLATED = "-ablation"  # at the end of the name of an evaluation's files, and so of no suite's
 SUITES = Path(__file__).with_name("suites")
+SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
 Further: TypeAlias = Callable[[Task, int, int], tuple[Scenario, ...]]
@@ -99,22 +102,37 @@ class Suite:
         return self.tasks[name]
 
 
+def shipped_suites() -> tuple[str, ...]:
+    """The names of the suites that ship with RoboEval."""
+    return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
+
+
 def load_suite(name: str = "paper", *, skills: SkillTable = SKILLS) -> Suite:
     """Read a suite.
 
     Args:
-        name: of a suite that ships with the package, or a folder.
+        name: of a suite that ships with RoboEval, or that an installed package brings, or a folder.
         skills: what can stand in formulas.
 
     Raises:
         BadInput: there is no such suite, or one of its files is wrong.
     """
-    folder = SUITES / name
-    if not re.fullmatch(r"[a-z][a-z0-9-]*", name) or not folder.is_dir():
-        folder = Path(name)
+    if name in shipped_suites():
+        return _read_suite(SUITES / name, skills)
+    if SUITE_NAME.fullmatch(name) and (brought := installed_folder(name)) is not None:
+        suite = _read_suite(brought.resolve(), skills)
+        if suite.name != name:
+            sentence = (
+                f'the suite is named "{suite.name}", but its package calls it "{name}"; name both alike'
+            )
+            raise YamlFile.read(brought / "suite.yaml").wrong(sentence, "name")
+        return suite
+    folder = Path(name)
     if not (folder / "suite.yaml").is_file():
-        shipped = ", ".join(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
-        raise BadInput(f'there is no suite "{name}": neither one of {shipped} nor a folder with a suite.yaml')
+        known = dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())])
+        raise BadInput(
+            f'there is no suite "{name}": neither one of {", ".join(known)} nor a folder with a suite.yaml'
+        )
     return _read_suite(folder.resolve(), skills)
 
 

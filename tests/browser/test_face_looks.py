@@ -51,14 +51,20 @@ def expect_in_sight(page: Page) -> None:
 
 
 def expect_names_beside_stop(page: Page) -> None:
-    """The names of all pages can be read, however many there are and however small the screen."""
-    stop = page.locator("#stop").bounding_box()
+    """The names of all pages and parts can be read, each in one line, however small the screen."""
+    stop, size = page.locator("#stop").bounding_box(), page.viewport_size
     assert stop is not None
-    for link in page.locator("nav a").all():
+    assert size is not None
+    for link in page.locator("nav a:visible").all():
         box = link.bounding_box()
         assert box is not None
-        assert box["x"] + box["width"] <= stop["x"]
-        assert box["y"] + box["height"] <= 60
+        is_above = box["y"] < 60
+        assert box["x"] + box["width"] <= (stop["x"] if is_above else size["width"])
+        assert box["y"] + box["height"] <= (60 if is_above else size["height"])
+        assert link.evaluate(
+            "e => { const r = document.createRange(); r.selectNodeContents(e); "
+            "return r.getClientRects().length === 1 && e.scrollWidth <= e.clientWidth; }"
+        )
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])

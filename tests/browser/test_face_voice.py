@@ -65,6 +65,8 @@ def test_a_browser_that_waits_for_a_touch_says_so(server: PageServer, opened: Op
     """With the browser's own speech synthesis, which nobody hears here."""
     face = face_of(server, opened, script="")
     expect(face.locator("#hint")).to_have_text("Touch the screen once, so that the robot can be heard.")
+    size = face.locator("#hint").evaluate("e => parseFloat(getComputedStyle(e).fontSize)")
+    assert size >= 30, "it is read from some steps away"
     face.locator("h1").click(force=True)
     expect(face.locator("#hint")).to_be_hidden()
 

@@ -19,6 +19,20 @@ LONGEST = 9_000
 """A program may say no more at once."""
 
 
+HIDDEN = r"""() => {
+    const odd = /[\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/u;
+    const found = [...document.querySelectorAll("textarea")].map((each) => each.value);
+    const nodes = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    while (nodes.nextNode()) {
+        // the editor shows what is really there, kept apart from the rest, with its name before it
+        const { data, parentNode } = nodes.currentNode;
+        if (!parentNode.closest(".escaped, script, style")) found.push(data);
+    }
+    return found.filter((text) => odd.test(text.replace(/[\n\t]/g, "")));
+}"""
+"""Texts with characters that nobody sees."""
+
+
 def world_of(text: str) -> str:
     """A house in which everything has an evil name, as far as a world file can hold it."""
     name = json.dumps("".join(c for c in text if c.isprintable())[:300], ensure_ascii=False)
@@ -54,6 +68,11 @@ def expect_unharmed(page: Page, before: int) -> None:
     assert page.evaluate("document.documentElement.scrollWidth") <= page.viewport_size["width"]  # type: ignore[index]  # it has one
 
 
+def expect_written_out(page: Page) -> None:
+    """Nothing on the page is hidden in its texts, or turns them round."""
+    assert page.evaluate(HIDDEN) == []
+
+
 @pytest.fixture(params=range(len(EVIL)), ids=NAMES)
 def evil(request: pytest.FixtureRequest) -> str:
     number: int = request.param
@@ -82,6 +101,8 @@ def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model:
         page.locator("textarea").fill(evil.encode(errors="replace").decode())
         page.get_by_role("button", name="Write the program").click()
         expect(page.locator(".verdict")).to_be_visible()
+        if not evil.isprintable():
+            expect(page.locator(".cm-content .escape").first).to_be_visible()
         expect_unharmed(page, before)
         page.get_by_text("Run it despite the problems").click()
         page.get_by_role("button", name="Run it on the robot").click()
@@ -93,11 +114,16 @@ def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model:
         expect(page.locator(".headline")).to_have_text("Failed")
         page.wait_for_selector(".pick")
         expect_unharmed(page, before)
+        expect_written_out(page)
+        page.locator(".pick").last.click()
+        expect_written_out(page)
         phone = opened(server, "missions", size=PHONE)
         expect(phone.locator(".rows li")).to_have_count(1)
         expect_unharmed(phone, count(phone))
+        expect_written_out(phone)
         phone.locator(".rows a").first.click()
         expect(phone.locator(".timeline")).to_be_visible()
+        expect_written_out(phone)
         assert phone.evaluate("window.owned") is None
         assert server.call("GET", "/api/robot").data["state"] == "failed"
         for each in (page, phone):

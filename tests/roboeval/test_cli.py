@@ -178,8 +178,7 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        (["--engine", "ray"], "--engine ray is not there yet; leave it out"),
-        (["--engine", "steam"], 'there is no engine "steam"; there is local, and ray is not there yet'),
+        (["--engine", "steam"], 'there is no engine "steam"; there are local and ray'),
         (["--workers", "0"], "invalid value for '--workers': "),
         (["--workers", "many"], "invalid value for '--workers': "),
         (["--frobnicate"], "no such option: --frobnicate"),

@@ -40,7 +40,7 @@ WORLD = """
 RECORDED = """
 - instruction: Say hello in the kitchen.
   replies:
-    - {about: does nothing, fails: Location, program: "def task_program(): pass"}
+    - {about: does nothing, fails: SayAtLocation, program: "def task_program(): pass"}
     - {about: is right, program: "def task_program():\\n  go_to('kitchen'); say('hello')"}
 """
 
@@ -404,6 +404,35 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert render([], accepted=True) == render([]) == "nothing was found"
     monkeypatch.chdir(tmp_path / "suite0" / "recorded")
     assert render(findings).startswith(f"{path}:6: ")
+
+
+# --- recorded programs that end otherwise than they are said to
+
+
+@pytest.mark.parametrize(
+    ("reply", "sentence"),
+    [
+        (
+            "{about: is lazy, program: 'def task_program(): 0'}",
+            "is said to pass, but it fails by SayAtLocation in the world",
+        ),
+        (
+            "{about: is lazy, fails: Location, program: 'def task_program(): 0'}",
+            "is said to fail by Location, but it fails by SayAtLocation in the world",
+        ),
+        (
+            "{about: greets, fails: Location, program: 'def task_program(): go_to(`kitchen`); say(`hello`)'}",
+            "is said to fail by Location, but it passes; mend it",
+        ),
+    ],
+)
+def test_a_recorded_program_that_ends_otherwise_than_it_is_said_to(
+    linted: Lint, reply: str, sentence: str
+) -> None:
+    recorded = RECORDED + f"    - {reply}\n".replace("`", '"')
+    found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded, untripped=True)
+    (finding,) = (one for one in found if one.kind == "misjudged")
+    assert sentence in finding.message
 
 
 # --- a new task

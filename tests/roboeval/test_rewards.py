@@ -154,6 +154,7 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
 
 
 def told_by_child(programs: list[str], queue: "multiprocessing.SimpleQueue[object]") -> None:
+    signal.alarm(60)
     queue.put((reward("SayGoodDay", 0, programs), children_of(os.getpid())))
 
 
@@ -181,13 +182,13 @@ def test_a_forked_process_has_an_engine_of_its_own() -> None:
     try:
         for child in children:
             child.start()
-        found = [queue.get() for _ in children]
         for child in children:
-            child.join(60)
+            child.join()
     finally:
         stop.set()
         busy.join()
     assert [child.exitcode for child in children] == [0, 0]
+    found = [queue.get() for _ in children]
     assert [rewards for rewards, _ in found] == [[1.0] * 25] * 2
     theirs = set().union(*(pids for _, pids in found))
     assert theirs
@@ -215,6 +216,28 @@ def test_nobody_forks_in_the_middle_of_a_start() -> None:
     assert os.waitpid(child, 0)[1] == 0
     assert ONE_AT_A_TIME.acquire(timeout=5)
     ONE_AT_A_TIME.release()
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
+def test_a_forked_process_does_not_wait_for_threads_of_the_one_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lanes, gate, patience = warm(), threading.Event(), 60
+    here = lanes.here
+    monkeypatch.setattr(lanes, "here", lambda: gate.wait(patience) and here())
+    (program,) = distinct(1, "under way")
+    with ThreadPoolExecutor(1) as beside:
+        other = beside.submit(reward, "SayGoodDay", 0, [program])
+        while not REWARDS._running:
+            time.sleep(0.01)
+        child = os.fork()
+        if child == 0:
+            signal.alarm(patience // 2)
+            os._exit(0 if reward("SayGoodDay", 0, [program]) == [1.0] else 1)
+        status = os.waitpid(child, 0)[1]
+        gate.set()
+        assert other.result() == [1.0]
+    assert status == 0
 
 
 SCRIPT = """

@@ -182,10 +182,28 @@ def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) 
     suite = load_suite(str(folder))
     required = [[r.text for r in scenario.require] for scenario in suite.task("MakeTea").scenarios]
     assert required == [["announces_tea"], ['visits("kitchen")', "not announces_tea"]]
+    (folder / "tasks" / "MakeTea.yaml").write_text("mine")
     with pytest.raises(BadInput, match="is there already"):
         new_task(folder, "MakeTea")
-    with pytest.raises(BadInput, match="is no name for a task"):
-        new_task(folder, "../x")
+    assert (folder / "tasks" / "MakeTea.yaml").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["../x", "", "makeTea", "Make Tea", "Make-Tea", "Tee\n", "T\u00e4ufer"])
+def test_a_bad_name_for_a_task(tmp_path: Path, name: str) -> None:
+    with pytest.raises(BadInput, match="is no name for a task; write words together"):
+        new_task(tmp_path, name)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"),
+    [("My Suite", "my-suite"), ("plus", "my-plus"), ("3", "mine"), ("tea-ablation", "tea"), ("茶", "mine")],
+)
+def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
+    tmp_path: Path, folder: str, name: str
+) -> None:
+    new_task(tmp_path / folder, "MakeTea")
+    assert load_suite(str(tmp_path / folder)).name == name
 
 
 def test_the_rules_of_the_paper() -> None:

@@ -80,16 +80,48 @@ class Plan:
 
 
 @dataclass(frozen=True)
+class Whereabouts:
+    """Whether somebody or something is in a room.
+
+    Args:
+        name: who or what, as `meant` names it.
+        room: the room.
+        is_there: whether it is there.
+    """
+
+    name: str
+    room: str
+    is_there: bool
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What somebody answers.
+
+    Args:
+        room: where the robot asks.
+        question: which it asks.
+        answer: which it is given.
+    """
+
+    room: str
+    question: str
+    answer: str
+
+
+@dataclass(frozen=True)
 class Fact:
     """Something that was settled about an imagined world.
 
     Args:
         sentence: it, in words.
         by_lot: whether it was drawn; else the program took it for granted, and so it was.
+        about: what it says, for whoever says it in other words.
     """
 
     sentence: str
     by_lot: bool
+    about: Whereabouts | Reply
 
 
 @dataclass
@@ -219,7 +251,8 @@ class ImaginedRobot(SimulatedRobot):
             told = f"{SOMEBODY} is" if here else "nobody is"
         else:
             told = f'"{brief(name)}" is' if here else f'"{brief(name)}" is not'
-        self.facts.append(Fact(f'{told} in "{brief(self.room)}"', by_lot))
+        about = Whereabouts(name, self.room, here)
+        self.facts.append(Fact(f'{told} in "{brief(self.room)}"', by_lot, about))
         if not here:
             self.scene.missed.add(name)
 
@@ -278,7 +311,8 @@ def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option,
         drawn = robot.answered(texts, *asked)
         robot.told[asked] = drawn
         where = f'in "{brief(robot.room)}" to "{brief(question)}"'
-        robot.facts.append(Fact(f'the answer {where} is "{brief(drawn)}"', by_lot=True))
+        about = Reply(robot.room, question, drawn)
+        robot.facts.append(Fact(f'the answer {where} is "{brief(drawn)}"', by_lot=True, about=about))
     chosen = texts.index(robot.told[asked])
     robot.amend(texts[chosen])
     return chosen

@@ -20,6 +20,7 @@ from codebotler.badinput import BadInput
 from codebotler.mission import MissionError
 from codebotler.missionlog import EVENTS, Line, Summary, events_of
 from codebotler.missionmcap import write_mcap
+from codebotler.terminal import shortened
 from codebotler.web.desk import MOST_PROGRAM, Desk
 from codebotler.web.turn import Turn
 from codebotler.web.view import Order, View
@@ -258,14 +259,24 @@ def view_data(view: View) -> dict[str, Any]:
 
 def _at_hand(desk: Desk, mission: str) -> Turn:
     turn = desk.turn
-    if turn is None or not turn.view.id or mission not in {HERE, turn.view.id}:
-        raise HTTPException(409, "that is not the mission at hand")
-    return turn
+    if turn is not None and mission in {HERE, turn.view.id}:
+        return turn
+    summary, _ = _past(desk, mission)
+    raise HTTPException(409, f"mission {summary.id} is not the one at hand; only what it left can be read")
 
 
 def _past(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:
+    name = desk.view.id if mission == HERE else mission
+    if not name:
+        none = "there is no mission yet; POST /api/missions begins one"
+        raise HTTPException(404, none if desk.turn is None else "the mission at hand has not begun")
     try:
-        folder = find(desk.home, desk.view.id if mission == HERE else mission)
+        folder = find(desk.home, name)
+    except BadInput:
+        raise HTTPException(
+            404, f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
+        ) from None
+    try:
         return summary_of(folder), events_of(folder)
     except BadInput as error:
         raise HTTPException(404, error.sentence) from None

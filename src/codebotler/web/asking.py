@@ -6,7 +6,7 @@ from nicegui import ui
 
 from codebotler.robots.face import AnswerError, Face, Question
 from codebotler.terminal import shortened
-from codebotler.web.words import Press, Words
+from codebotler.web.words import Press, Words, warn
 
 MOST_OPTIONS, MOST_TEXT = 50, 200
 
@@ -56,4 +56,4 @@ class Asking:
         try:
             self._face.answer(question.number, position)
         except AnswerError as error:
-            ui.notify(error.sentence, type="warning", position="top")
+            warn(error.sentence)

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.mission import UNCONFIRMED
 from codebotler.robots.face import AnswerError, Ended, Face, Question
-from codebotler.terminal import visible
+from codebotler.terminal import visible_lines
 from codebotler.web.desk import Desk
 
 PAGE = Path(__file__).with_name("static") / "face.html"
@@ -141,7 +141,7 @@ def question_data(question: Question) -> dict[str, Any]:
 def words(text: str, most: int = MOST_TEXT) -> str:
     """A text as people read it: with its lines, but without what hides or turns its letters."""
     left = len(text) - most
-    shown = "\n".join(map(visible, text[:most].splitlines()))
+    shown = visible_lines(text[:most])
     return shown if left <= 0 else f"{shown}... {left:,} more characters"
 
 

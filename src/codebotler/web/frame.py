@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from nicegui import html, ui
@@ -12,6 +13,8 @@ BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assert
 <script src="/static/stop.js"></script>"""
 ROBOT = (("Robot", "/"), ("Missions", "/missions"))
 FACE = ("Face", "/face")
+PATIENCE = 60.0
+"""Seconds that a page may take to be put together: a run is read when it is first looked at."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,13 @@ class Frame:
     brand: str = "CodeBotler"
     has_robot: bool = True
 
-    def __call__(self, title: str, here: str) -> None:
+    def __call__(self, title: str, here: str, parts: Sequence[tuple[str, str]] = ()) -> None:
         """Begin a page.
 
         Args:
             title: of the page.
             here: the address of the page that is marked in the bar.
+            parts: names and addresses of its parts, for screens on which they stand below each other.
         """
         ui.page_title(f"{title} · {self.brand}")
         ui.add_head_html(HEAD)
@@ -41,7 +45,11 @@ class Frame:
             ui.add_body_html(BAR)
         with ui.element("header").classes("bar" if self.has_robot else "bar no-stop"):
             html.a(self.brand, href="/").classes("brand")
-            with ui.element("nav").props('aria-label="Pages"'):
+            if parts:
+                with ui.element("nav").classes("parts").props('aria-label="Parts of this page"'):
+                    for name, address in parts:
+                        html.a(name, href=address)
+            with ui.element("nav").classes("pages").props('aria-label="Pages"'):
                 for name, address in self.links:
                     link = html.a(name, href=address)
                     if address == here:

@@ -110,7 +110,8 @@ class Guard:
             return
         scope.setdefault("state", {})["role"] = role
         if scope["type"] == "http":
-            await self._app(scope, _bounded(receive), _with_headers(send))
+            body = _Body(receive)
+            await self._app(scope, body.receive, body.unless_too_large(_with_headers(send)))
         else:
             await self._app(scope, receive, send)
 
@@ -227,25 +228,49 @@ def _expect_allowed(role: Role | None, path: str) -> None:
         raise RefusedError(HTTPStatus.FORBIDDEN, "this link is for the robot's face; it opens nothing else")
 
 
+TOO_LARGE = f"at most {MOST_BYTES:,} bytes are taken"
+
+
 def _expect_small(headers: Headers) -> None:
     told = headers.get("content-length", "0")
     if not told.isascii() or not told.isdigit() or int(told) > MOST_BYTES:
-        raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {MOST_BYTES:,} bytes are taken")
+        raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, TOO_LARGE)
 
 
-def _bounded(receive: Receive) -> Receive:
-    """A request's body, up to what is taken; who does not tell its length is cut off there."""
-    taken = 0
+class _Body:
+    """A request's body, up to what is taken; who does not tell its length is cut off there, and told why."""
 
-    async def bounded() -> Message:
-        nonlocal taken
-        message = await receive()
-        taken += len(message.get("body", b""))
-        if taken > MOST_BYTES:
-            return {"type": "http.disconnect"}
-        return message
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
+        self._taken = 0
 
-    return bounded
+    async def receive(self) -> Message:
+        """The next piece."""
+        message = await self._receive()
+        self._taken += len(message.get("body", b""))
+        return {"type": "http.disconnect"} if self._taken > MOST_BYTES else message
+
+    def unless_too_large(self, send: Send) -> Send:
+        """Send what is answered; but that it was too much, where what is behind knows only that it ended."""
+        is_told = False
+
+        async def instead(message: Message) -> None:
+            nonlocal is_told
+            if is_told:
+                return
+            if self._taken > MOST_BYTES and message["type"] == "http.response.start":
+                is_told = True
+                body = json.dumps({"detail": TOO_LARGE}).encode()
+                kind = {
+                    "content-type": "application/json",
+                    "cache-control": "no-store",
+                    "connection": "close",
+                }
+                await _answer(send, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, kind, body)
+                return
+            await send(message)
+
+        return instead
 
 
 def _with_headers(send: Send) -> Send:

@@ -15,12 +15,12 @@ from codebotler.models.recorded import recorded_model
 from codebotler.program import called_skills
 from codebotler.running import unknown_rooms
 from codebotler.simulator.imagined import Plan
-from codebotler.terminal import shortened
+from codebotler.terminal import shortened, visible, visible_lines
 from codebotler.web.desk import Desk
 from codebotler.web.view import Order, View
-from codebotler.web.words import Press, Words
+from codebotler.web.words import Press, Words, scroll_up, warn
 
-MOST_EXAMPLES, MOST_BEFORE = 4, 6
+MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 RECORDED = "recorded"
 ABOUT_RECORDED = (
     "A recorded model is no model: people wrote these programs for known instructions, so that all can be "
@@ -46,7 +46,11 @@ class Instruct:
                 .props('outlined autogrow input-class="words" maxlength=200000 dir=auto')
                 .on("keydown.ctrl.enter", self._ask)
             )
-            self._model = ui.select(list(desk.models), value=desk.models[0], label="Who writes the program")
+            self._model = ui.select(
+                {name: visible(name) for name in desk.models},
+                value=desk.models[0],
+                label="Who writes the program",
+            )
             self._model.props("outlined dense").on_value_change(self._about_model)
             self._about = Words("p", ABOUT_RECORDED, "quiet")
             self._write = Press("Write the program", self._ask, "primary")
@@ -74,8 +78,8 @@ class Instruct:
         if view.number != self._number:
             self._number = view.number
             if (self._text.value or "").strip() in {"", self._asked}:  # nobody is writing another one here
-                self._text.value = view.order.instruction
-            self._asked = view.order.instruction
+                self._text.value = visible_lines(view.order.instruction)
+            self._asked = visible_lines(view.order.instruction)
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
         self._trouble.say(view.trouble)
@@ -84,7 +88,9 @@ class Instruct:
         try:
             self._desk.begin(Order(self._text.value or "", self._model.value or ""))
         except MissionError as error:
-            ui.notify(error.sentence, type="warning", position="top")
+            warn(error.sentence)
+        else:
+            scroll_up()
 
     def _about_model(self) -> None:
         self._about.set_visibility(str(self._model.value).startswith(RECORDED))
@@ -95,12 +101,13 @@ class Instruct:
             Words("h3", title)
             for text, state in texts:
                 with html.button(type="button").classes("pick").on("click", lambda t=text: self._take(t)):
-                    Words("span", shortened(text, 200))
+                    Words("span", shortened(text, MOST_TEXT))
                     if state:
                         Words("small", state, f"state state-{state}")
 
     def _take(self, text: str) -> None:
-        self._text.value = text
+        self._text.value = visible_lines(text)
+        scroll_up()
 
 
 def _examples(desk: Desk) -> list[str]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from nicegui import ui
 
 from codebotler.web.desk import Desk
-from codebotler.web.frame import Frame
+from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.instruct import Instruct
 from codebotler.web.past import add as add_past
 from codebotler.web.programpane import ProgramPane
 from codebotler.web.status import Status
+from codebotler.web.view import View
 from codebotler.web.words import Words
 
+PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h-status"))
 EVERY = 0.1
 """Seconds after which a page looks whether something has changed."""
 
@@ -24,11 +26,11 @@ def add(desk: Desk, frame: Frame) -> None:
         frame: what all pages have.
     """
 
-    @ui.page("/", response_timeout=10.0)
+    @ui.page("/", response_timeout=PATIENCE)
     async def operate() -> None:
-        frame("Robot", "/")
+        frame("Robot", "/", PARTS)
         Words("h1", "Operate the robot", "unseen")
-        with ui.element("div").classes("operate"):
+        with ui.element("div") as panes:
             instruct = Instruct(desk)
             program = ProgramPane(desk)
             status = Status(desk)
@@ -40,6 +42,7 @@ def add(desk: Desk, frame: Frame) -> None:
             if version != seen:
                 seen = version
                 view = desk.view
+                panes.classes(replace=f"operate to-{_next(view)}")
                 for pane in (instruct, program, status):
                     pane.show(view)
 
@@ -49,3 +52,12 @@ def add(desk: Desk, frame: Frame) -> None:
         await instruct.load()
 
     add_past(desk, frame)
+
+
+def _next(view: View) -> str:
+    """What there is to do for an operator now, by which a small screen puts its panes in order."""
+    if view.is_running:
+        return "watch"
+    if not view.is_over:
+        return "decide"
+    return "ask" if view.state is None or view.trouble else "see"

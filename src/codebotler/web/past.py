@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Mapping
 from datetime import datetime
 
 from nicegui import html, ui
 
 from codebotler.archive import find, missions, summary_of
 from codebotler.badinput import BadInput
+from codebotler.mission import State
 from codebotler.missionlog import Line, Summary, events_of
 from codebotler.missionview import told
-from codebotler.terminal import shortened
+from codebotler.terminal import shortened, visible
 from codebotler.web.desk import Desk
 from codebotler.web.frame import Frame
 from codebotler.web.words import Words
 
 MOST, MOST_EVENTS = 200, 1_000
+STEPS: Mapping[str, str] = {
+    State.DRAFTING: "A program is there",
+    State.CHECKED: "The program is checked",
+    State.APPROVED: "Somebody lets the robot run it",
+    State.RUNNING: "The robot begins",
+    State.DONE: "The robot is done",
+    State.FAILED: "The program broke off",
+    State.STOPPING: "The robot is being stopped",
+    State.STOPPED: "The mission is stopped",
+    State.INTERRUPTED: "The mission was interrupted",
+}
+"""What it means that a mission comes to a state."""
 
 
 def add(desk: Desk, frame: Frame) -> None:
@@ -55,6 +69,22 @@ def add(desk: Desk, frame: Frame) -> None:
             _show(summary, events)
 
 
+def in_words(line: Line, *, is_first: bool) -> str:
+    """What happened, as one tells it to a person; empty where there is nothing to tell.
+
+    Args:
+        line: the event.
+        is_first: whether the mission begins with it.
+    """
+    event = line["event"]
+    if event == "state":
+        state, reason = line["state"], shortened(line.get("reason", ""))
+        step = "The mission begins" if is_first else STEPS.get(state, visible(state))
+        return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
+    words = None if event == "feedback" else told(line)
+    return "" if words is None else words.plain[:1].upper() + words.plain[1:]
+
+
 def _read(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:
     folder = find(desk.home, mission)
     return summary_of(folder), events_of(folder)
@@ -72,8 +102,8 @@ def _show(summary: Summary, events: list[Line]) -> None:
     Words("h1", shortened(summary.instruction, 300) or "A program written by hand")
     with ui.element("p").classes("facts"):
         Words("small", summary.state, f"state state-{summary.state}")
-        by = f", written by {summary.model}" if summary.model else ""
-        Words("span", f"{began:%d %b %Y, %H:%M:%S}, on the robot {summary.robot}{shortened(by)}")
+        by = f" · written by {summary.model}" if summary.model else ""
+        Words("span", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}")
     if summary.reason:
         Words("p", shortened(summary.reason), "reason")
     with ui.element("p").classes("downloads"):
@@ -83,14 +113,14 @@ def _show(summary: Summary, events: list[Line]) -> None:
         Words("p", shortened(problem), "trouble")
     Words("h2", "What happened")
     with ui.element("ol").classes("timeline"):
-        for line in events[:MOST_EVENTS]:
-            words = None if line["event"] == "feedback" else told(line)
-            if words is not None:
+        for number, line in enumerate(events[:MOST_EVENTS]):
+            words = in_words(line, is_first=number == 0)
+            if words:
                 with ui.element("li").classes(f"event event-{line['event']}"):
                     Words("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
-                    Words("small", f"{line['clock']:.1f} s")
-                    Words("span", words.plain, "text")
+                    Words("small", f"{line['clock']:.1f} s" if line["clock"] else "")
+                    Words("span", words, "text")
     if len(events) > MOST_EVENTS:
         Words("p", f"{len(events) - MOST_EVENTS:,} more; all of them are in the files.", "quiet")
     Words("h2", "Program")
-    Words("pre", summary.program.encode(errors="replace").decode(), "source").props("tabindex=0")
+    Words("pre", summary.program, "source").props("tabindex=0")

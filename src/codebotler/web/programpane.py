@@ -6,6 +6,7 @@ import asyncio
 import json
 import re
 from collections.abc import Callable
+from itertools import islice
 from typing import Any
 
 from nicegui import ui
@@ -14,15 +15,15 @@ from nicegui.events import GenericEventArguments
 from codebotler.mission import MissionError, State
 from codebotler.problems import Check
 from codebotler.skills import SKILLS
-from codebotler.terminal import shortened
+from codebotler.terminal import shortened, visible
 from codebotler.web.desk import MOST_PROGRAM, Desk
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import Strip, strips
 from codebotler.web.view import View
-from codebotler.web.words import Press, Words
+from codebotler.web.words import Press, Words, scroll_up, warn
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
-MOST_MARKS = 400
+MOST_MARKS, MOST_ESCAPES = 400, 2_000
 MOST_PROBLEMS = 20
 SCRIPT = '<script src="/static/editor.js"></script>'
 
@@ -82,7 +83,7 @@ class ProgramPane:
         """Have the browser show a program and its marks; it does not where something newer is typed there."""
         told: dict[str, object] = {
             "program": shown,
-            "marks": [*_skills(shown), *_marks(view.found, shown)],
+            "marks": [*_skills(shown), *_escapes(shown), *_marks(view.found, shown)],
             "editable": view.may_be_edited,
             "heard": self._heard,
             "anyway": anyway,
@@ -107,7 +108,7 @@ class ProgramPane:
         """Have the browser show what the desk has, and say why."""
         view = self._desk.view
         self._tell(view, _for_editor(view.program), anyway=True)
-        ui.notify(why, type="warning", position="top", timeout=10_000)
+        warn(why, 10.0)
 
     # --- somebody's word
 
@@ -155,7 +156,9 @@ class ProgramPane:
                 despite = bool(self._despite.value)
                 await asyncio.to_thread(turn.approve, view.digest, despite_problems=despite)
             except MissionError as error:
-                ui.notify(error.sentence, type="warning", position="top")
+                warn(error.sentence)
+            else:
+                scroll_up()
 
     async def _is_seen(self, view: View) -> bool:
         """Whether this browser shows that very program; two people may type at the same time."""
@@ -177,7 +180,7 @@ class ProgramPane:
         try:
             do()
         except MissionError as error:
-            ui.notify(error.sentence, type="warning", position="top")
+            warn(error.sentence)
 
     # --- what was found
 
@@ -203,6 +206,16 @@ def _skills(program: str) -> list[dict[str, Any]]:
     return [{"kind": "mark", "from": m.start(), "to": m.end(), "class": "skill"} for m in found]
 
 
+def _escapes(program: str) -> list[dict[str, Any]]:
+    """What nobody sees, or what turns letters round: written out before it, and kept apart from the rest."""
+    odd = ((at, one) for at, one in enumerate(program) if not (one.isprintable() or one in "\t\n"))
+    marks: list[dict[str, Any]] = []
+    for at, one in islice(odd, MOST_ESCAPES):
+        marks.append({"kind": "widget", "position": at, "text": visible(one), "class": "escape"})
+        marks.append({"kind": "mark", "from": at, "to": at + 1, "class": "escaped"})
+    return marks
+
+
 def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
     """Problems at their lines: the line is coloured, and the words stand after it."""
     if found is None:
@@ -224,7 +237,7 @@ def _draw_strips(shown: list[Strip]) -> None:
     for strip in shown:
         with ui.element("article").classes("strip"):
             if strip.world:
-                Words("p", f"Where {strip.world}", "world")
+                Words("p", f"{strip.world}:", "world")
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for scene in strip.scenes:
                     draw_scene(scene)

@@ -19,9 +19,11 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
+from starlette.routing import Match, Mount
 from starlette.types import ASGIApp
 
 from codebotler import __version__
+from codebotler.program import listed
 from codebotler.terminal import note
 from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
@@ -35,6 +37,7 @@ from codebotler.web.presence import Presence
 STATIC = Path(__file__).with_name("static")
 LEAVING = "the leaving of the last operator"
 RUNS = Path("runs")
+METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 LINGER = 3
 """Seconds that streams have to end when the tool does."""
 
@@ -93,6 +96,8 @@ def _tell_links(place: Place, port: int, access: Access, desk: Desk | None) -> N
     ends = "ends the page and stops the robot" if desk else "ends the page"
     note(f"open this link in a browser; Ctrl-C {ends}:\n")
     note(f"    {address}{query(access.operator or '')}\n")
+    if not place.is_loopback:
+        note("other machines get in as well, by this link only; what they send and see is not encrypted\n")
     if desk and desk.face is not None:
         where = "here; --host lets other machines in" if place.is_loopback else "on the robot's tablet"
         note(f"the robot's face, which can run nothing, to be opened {where}:\n")
@@ -130,7 +135,7 @@ def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> 
     app.mount("/static", StaticFiles(directory=STATIC))
     core.sio.eio.cors_allowed_origins = []  # NiceGUI invites all pages; the guard lets in ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]
-    nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, _not_found)
+    nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app))
     ui.run_with(
         app,
         title="CodeBotler",
@@ -145,12 +150,29 @@ def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> 
     return app
 
 
-def _not_found(request: Request, _error: Exception) -> Response:
-    """In a sentence, as a person or a program wants it."""
-    sentence = "there is no such page"
+def _not_found(app: FastAPI, request: Request, _error: Exception) -> Response:
+    """In a sentence, as a person or a program wants it.
+
+    NiceGUI takes every address that the API does not, and so also each that the API has for another method.
+    """
+    status, sentence, headers = HTTPStatus.NOT_FOUND, "there is no such page", {}
+    if allowed := _methods(app, request):
+        status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address takes {listed(allowed)} only"
+        headers = {"allow": ", ".join(allowed)}
     if "text/html" in request.headers.get("accept", ""):
-        return HTMLResponse(REFUSAL.format(sentence=sentence), HTTPStatus.NOT_FOUND)
-    return JSONResponse({"detail": sentence}, HTTPStatus.NOT_FOUND)
+        return HTMLResponse(REFUSAL.format(sentence=sentence), status, headers)
+    return JSONResponse({"detail": sentence}, status, headers)
+
+
+def _methods(app: FastAPI, request: Request) -> list[str]:
+    """The methods that the API takes at an address; none where it has no such address."""
+    scope = {**request.scope, "root_path": "", "app_root_path": ""}
+    routes = [route for route in app.routes if not isinstance(route, Mount)]
+
+    def is_taken(method: str) -> bool:
+        return any(route.matches({**scope, "method": method})[0] is Match.FULL for route in routes)
+
+    return list(filter(is_taken, METHODS))
 
 
 class _Server(uvicorn.Server):

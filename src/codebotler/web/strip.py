@@ -9,8 +9,9 @@ from typing import Any
 from codebotler.problems import Check, Sample
 from codebotler.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, steps_of
 from codebotler.terminal import shortened
+from codebotler.web.supposing import supposed
 
-MOST_TEXT = 300
+MOST_TEXT, MOST_WORLD = 300, 800
 MOST_STRIPS = 6
 WORDS = {"pick": "picks up", "place": "puts down"}
 
@@ -52,7 +53,7 @@ class Strip:
     """One world.
 
     Args:
-        world: what is special about it, in words; empty where the program does the same in all.
+        world: what it is like, as the first half of a sentence; empty where nothing was settled about it.
         scenes: in order.
         ending: how it ends, in a sentence.
         ends_well: whether that is as one would wish.
@@ -82,12 +83,11 @@ def _strip(sample: Sample, found: Check) -> Strip:
     if sample.in_vain:
         ending = "It waits or searches in vain here, which is not held against the program."
     elif error is not None:
-        ending = f"{error.kind}: {shortened(error.message, MOST_TEXT)}"
+        ending = f"Here it breaks off: {shortened(error.message, MOST_TEXT)} ({shortened(error.kind)})"
     else:
         ending = "The program comes to its end."
-    return Strip(
-        shortened(sample.world, MOST_TEXT), _scenes(sample, found), ending, error is None or sample.in_vain
-    )
+    world = shortened(supposed(sample.facts), MOST_WORLD)
+    return Strip(world, _scenes(sample, found), ending, error is None or sample.in_vain)
 
 
 def _scenes(sample: Sample, found: Check) -> tuple[Scene, ...]:
@@ -133,5 +133,6 @@ def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
         heard = "no answer" if answer is None else shortened(str(answer), MOST_TEXT)
         return (Deed("ask", text, number), Deed("answer", heard))
     if kind == "check":
-        return (Deed("check", f"looks for {text}: {'found' if step.get('found') else 'not found'}", number),)
+        seen = "and finds it" if step.get("found") else "but does not find it"
+        return (Deed("check", f"looks for {text}, {seen}", number),)
     return (Deed(kind, text if kind == "say" else f"{WORDS.get(kind, shortened(kind))} {text}", number),)

@@ -1,11 +1,17 @@
-"""Text and buttons on a page, as plain elements; what they are given is shown as text, never as markup."""
+"""Text and buttons on a page, as plain elements; what they are given is shown as text, never as markup.
+
+Characters that nobody sees, or that turn others round, are written out as escapes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
+
+from codebotler.terminal import visible_lines
 
 
 class Words(TextElement):
@@ -18,15 +24,31 @@ class Words(TextElement):
     """
 
     def __init__(self, tag: str, text: str = "", kind: str = "") -> None:
-        super().__init__(tag=tag, text=text)
+        super().__init__(tag=tag, text=visible_lines(text))
         self.classes(kind)
         self.props("dir=auto")
 
     def say(self, text: str) -> None:
         """Hold another text; without one, it is not to be seen."""
-        if text != self.text:
-            self.text = text
+        shown = visible_lines(text)
+        if shown != self.text:
+            self.text = shown
         self.set_visibility(bool(text))
+
+
+def scroll_up() -> None:
+    """Where the panes stand below each other, show the first one; that is the one that matters now."""
+    ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
+
+
+def warn(sentence: str, seconds: float = 5.0) -> None:
+    """Say beside all else that something cannot be done.
+
+    Args:
+        sentence: why.
+        seconds: for which it stands there.
+    """
+    ui.notify(visible_lines(sentence), type="warning", position="top", timeout=1000 * seconds)
 
 
 class Press(Words):

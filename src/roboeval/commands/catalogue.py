@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.commands.options import JsonOption, SuiteOption, cores, load
+from roboeval.commands.options import JsonOption, SuiteOption, command, cores, load
 from roboeval.terminal import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
@@ -22,17 +22,18 @@ def tasks(
         bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
     ] = False,
     new: Annotated[
-        str | None, typer.Option(help="Start a task of this name in the folder of --suite.")
+        str | None,
+        typer.Option(help="Start a task of this name in the folder of --suite, which is made if need be."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
     """List a suite's tasks, show one, lint them, start a new one."""
-    from roboeval.catalogue import new_task, suite_data, suite_view, task_view
+    from roboeval.catalogue import other_suites, suite_data, suite_view, task_view
 
     if new is not None:
-        if suite == "paper":
-            fail("name the folder of your own suite with --suite; the suite of the paper stays as it is")
-        note(f"fill in {new_task(Path(suite), new)}; `roboeval tasks {new} --suite {suite}` shows it")
+        if task is not None or lint or accepted or json:
+            fail("--new only starts a task; leave the rest out")
+        start(new, suite)
         return
     if accepted and not lint:
         fail("--accepted is about what --lint finds; add --lint")
@@ -47,6 +48,18 @@ def tasks(
         print_rich(task_view(known.task(task)))
     else:
         print_rich(suite_view(known))
+        for sentence in other_suites(known.name):
+            note(sentence)
+
+
+def start(task: str, suite: str) -> None:
+    """Start a task in a folder, and say how to go on."""
+    from roboeval.catalogue import expect_own, new_task
+
+    expect_own(suite)
+    path = new_task(Path(suite), task)
+    lint = command("tasks", "--lint", suite=suite)
+    note(f"{path} is a whole task; make it yours, and let `{lint}` look at it")
 
 
 def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:

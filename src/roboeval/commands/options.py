@@ -27,7 +27,9 @@ def named(what: str) -> Callable[[str], Path]:
 
 
 RunArgument = Annotated[Path, typer.Argument(help="A run.", parser=named("a run"))]
-SuiteOption = Annotated[str, typer.Option(help="A suite that ships with the package, or a folder.")]
+SuiteOption = Annotated[
+    str, typer.Option(help="A suite that ships with RoboEval or is installed, by its name; or a folder.")
+]
 TasksOption = Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common sense only.")]
 EngineOption = Annotated[

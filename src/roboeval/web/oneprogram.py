@@ -12,7 +12,7 @@ from nicegui import events, html, ui
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
 from codebotler.web.floorplan import floorplan
-from codebotler.web.frame import Frame
+from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import scenes
 from codebotler.web.words import Words
@@ -41,7 +41,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
         frame: what all pages have.
     """
 
-    @ui.page("/runs/{run}/{which:path}", response_timeout=10.0)
+    @ui.page("/runs/{run}/{which:path}", response_timeout=PATIENCE)
     async def one_program(
         run: str,
         which: str,

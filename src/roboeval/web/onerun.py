@@ -13,7 +13,7 @@ from nicegui import html, ui
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
-from codebotler.web.frame import Frame
+from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Press, Words
 from roboeval.suite import Suite
 from roboeval.web.api import Choice, Evaluation
@@ -37,7 +37,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
         frame: what all pages have.
     """
 
-    @ui.page("/runs/{run}", response_timeout=10.0)
+    @ui.page("/runs/{run}", response_timeout=PATIENCE)
     async def one_run(run: str, choice: Annotated[Choice, Depends()], evaluation: Evaluation = None) -> None:
         begin(frame, shortened(run, MOST_NAME))
         with ui.element("div").classes("benchmark"):

@@ -11,7 +11,7 @@ from nicegui import html, ui
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
-from codebotler.web.frame import Frame
+from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Press, Words
 from roboeval.web.parts import begin
 from roboeval.web.shades import NONE, address
@@ -44,7 +44,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
         frame: what all pages have.
     """
 
-    @ui.page("/runs", response_timeout=10.0)
+    @ui.page("/runs", response_timeout=PATIENCE)
     async def list_runs() -> None:
         begin(frame, "Runs")
         with ui.element("div").classes("benchmark"):

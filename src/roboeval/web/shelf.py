@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
 from codebotler.badinput import BadInput
 from codebotler.simulator.rules import Rules
-from codebotler.terminal import shortened
+from codebotler.terminal import note, shortened
+from roboeval.installed import installed_suites
 from roboeval.run import Run
-from roboeval.suite import ABLATED, SUITES, Suite, load_suite
+from roboeval.suite import ABLATED, Suite, load_suite, shipped_suites
 from roboeval.web.followed import FollowedRun, GoneError
 from roboeval.web.seen import Seen
 
@@ -25,7 +26,7 @@ class Shelf:
 
     Args:
         folder: in which they lie, or one that is a run itself; it need not be there yet.
-        suites: by which runs may have been judged, besides those that ship with the package.
+        suites: by which runs may have been judged, besides those that ship or are installed.
     """
 
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
@@ -89,8 +90,7 @@ class Shelf:
     @cached_property
     def suites(self) -> Mapping[str, Suite]:
         """All that are at hand, by name."""
-        shipped = sorted(path.parent.name for path in SUITES.glob("*/suite.yaml"))
-        return {name: load_suite(name) for name in shipped} | self._own
+        return dict(_at_hand()) | self._own
 
     @property
     def _within(self) -> Path:
@@ -104,6 +104,18 @@ class Shelf:
         if not path.resolve().is_relative_to(self._within):
             raise BadInput(f'"{shortened(name)}" leads out of the folder of runs, where nothing is read')
         return Run(path)
+
+
+def _at_hand() -> Iterator[tuple[str, Suite]]:
+    """What ships and what packages bring; one of theirs that cannot be read is said, and left out."""
+    shipped = shipped_suites()
+    yield from ((name, load_suite(name)) for name in shipped)
+    for name in dict.fromkeys(brought.name for brought in installed_suites()):
+        try:
+            if name not in shipped:
+                yield name, load_suite(name)
+        except BadInput as error:
+            note(f"a suite is left out: {error}")
 
 
 def _entries(folder: Path) -> list[str]:

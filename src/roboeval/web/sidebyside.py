@@ -11,7 +11,7 @@ from nicegui import html, ui
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
-from codebotler.web.frame import Frame
+from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Words
 from roboeval.suite import Suite
 from roboeval.web.overview import EVERY, count_of, score_of
@@ -37,7 +37,7 @@ def add(shelf: Shelf, frame: Frame) -> None:
         frame: what all pages have.
     """
 
-    @ui.page("/side-by-side", response_timeout=10.0)
+    @ui.page("/side-by-side", response_timeout=PATIENCE)
     async def side_by_side(run: Names = None) -> None:
         begin(frame, "Side by side")
         names = list(dict.fromkeys(run or ()))

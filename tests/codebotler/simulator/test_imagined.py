@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.simulator.imagined import Fact, ImaginedRobot, Plan, meant
+from codebotler.simulator.imagined import Fact, ImaginedRobot, Plan, Whereabouts, meant
 from codebotler.simulator.lots import Lot
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.trace import Option
@@ -169,7 +169,8 @@ def test_what_it_never_looked_for_is_as_the_program_takes_it() -> None:
         robot.perform("pick", ["stapler"])
         assert robot.perform("ask", ["alice", "Tea?", YES_NO]) in {0, 1}
         assert look(robot, "person") is True
-        assert Fact('"alice" is in "kitchen"', by_lot=False) in robot.facts
+        there = Whereabouts("alice", "kitchen", is_there=True)
+        assert Fact('"alice" is in "kitchen"', by_lot=False, about=there) in robot.facts
 
 
 def test_it_may_take_another_one_where_it_never_looked() -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import http.client
 import json
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +100,6 @@ def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None
         Server(answer=lambda asked: HELLO if "cellar" in json.dumps(asked.body) else BAD) as model,
         PageServer(tmp_path, "--model", "completions:m", "--base-url", model.url) as server,
     ):
-        assert server.call("POST", "/api/missions/current/again", {}).status == 409
         server.call("POST", "/api/missions", {"instruction": "say hello"})
         for repair, problems in ((True, 1), (False, 0), (False, 1)):
             now = until(server, lambda now: now["check"] is not None and not now["busy"])
@@ -108,6 +109,31 @@ def test_a_model_is_asked_again_and_told_of_the_problems(tmp_path: Path) -> None
     with PageServer(tmp_path) as server:
         begun(server, HELLO)
         assert server.call("POST", "/api/missions/current/again", {}).status == 409, "nobody wrote it"
+
+
+def test_who_does_not_read_holds_nothing_up(tmp_path: Path) -> None:
+    """Twenty clients follow a mission that tells more than a connection holds, and read none of it."""
+    many = "def task_program():\n    for n in range(115):\n        say(str(n) + 'x' * 8000)\n"
+    with PageServer(tmp_path, "--speed", "0") as server, ExitStack() as opened:
+        view = begun(server, many)
+        request = (
+            f"GET /api/missions/{view['id']}/events HTTP/1.1\r\nHost: localhost\r\n"
+            f"Authorization: Bearer {server.token}\r\n\r\n"
+        )
+        for _ in range(20):
+            lazy = opened.enter_context(socket.socket())
+            lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            lazy.connect(("127.0.0.1", server.port))
+            lazy.sendall(request.encode())
+        approval = {"program": view["digest"]}
+        assert server.call("POST", "/api/missions/current/approve", approval).status == 200
+        events = stream(server, view["id"])
+        assert sum(len(json.dumps(event)) for _, event in events) > 900_000
+        assert events[-1][1]["state"] == "done"
+        assert begun(server, HELLO)["state"] == "checked"
+        began = time.monotonic()
+        server.end()
+        assert time.monotonic() - began < 8
 
 
 def test_a_stop_ends_the_mission_at_hand(server: PageServer) -> None:
@@ -150,7 +176,9 @@ def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
         ("GET", "/api/nothing", None, 404),
         ("GET", "/api/missions/20200101-000000", None, 404),
         ("GET", "/api/missions/..%2f..%2fetc/events.jsonl", None, 404),
-        ("POST", "/api/missions/20200101-000000/stop", None, 409),
+        ("POST", "/api/missions/20200101-000000/stop", None, 404),
+        ("GET", "/api/missions/nosuch/events", None, 404),
+        ("GET", "/api/missions/nosuch/events.jsonl", None, 404),
         ("POST", "/api/missions", {}, 409),
         ("POST", "/api/missions", {"program": HELLO, "more": 1}, 422),
         ("POST", "/api/missions", b"{", 422),
@@ -164,6 +192,51 @@ def test_what_is_asked_wrongly_is_said(
     assert answer.status == status, answer.text
     if status == 201:
         assert "no recorded model" in until(server, lambda now: now["is_over"])["trouble"]
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "allowed"),
+    [
+        ("DELETE", "/api/missions", "GET, POST"),
+        ("DELETE", "/api/missions/current", "GET"),
+        ("POST", "/api/missions/current/program", "PUT"),
+        ("GET", "/api/check", "POST"),
+        ("PATCH", "/api", "GET"),
+    ],
+)
+def test_another_method_is_told_which_are_taken(
+    server: PageServer, method: str, path: str, allowed: str
+) -> None:
+    answer = server.call(method, path)
+    assert (answer.status, answer.headers.get("allow")) == (405, allowed)
+    assert answer.data["detail"] == f"this address takes {allowed.replace(', ', ' and ')} only"
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/events"),
+        ("GET", "/events.jsonl"),
+        ("GET", "/events.mcap"),
+        ("POST", "/stop"),
+        ("POST", "/again"),
+    ],
+)
+def test_before_there_is_a_mission_that_is_said(tmp_path: Path, method: str, path: str) -> None:
+    with PageServer(tmp_path) as server:
+        answer = server.call(method, f"/api/missions/current{path}", {} if path == "/again" else None)
+        none = "there is no mission yet; POST /api/missions begins one"
+        assert (answer.status, answer.data["detail"]) == (404, none)
+
+
+def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServer) -> None:
+    before = begun(server, HELLO)["id"]
+    begun(server, HELLO)
+    for method, what in (("GET", "events"), ("POST", "stop")):
+        answer = server.call(method, f"/api/missions/{before}/{what}")
+        told = f"mission {before} is not the one at hand; only what it left can be read"
+        assert (answer.status, answer.data["detail"]) == (409, told)
+    assert server.call("GET", f"/api/missions/{before}/events.jsonl").status == 200
 
 
 def test_the_api_is_described(server: PageServer) -> None:

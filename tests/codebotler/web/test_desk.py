@@ -177,6 +177,29 @@ def test_a_program_can_be_edited_while_the_robot_is_connected(
         assert summary_of(desk.home / "missions" / view.id).program == HELLO
 
 
+def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    go_on, connect = threading.Event(), Simulated.connect
+
+    def slow(robot: Simulated) -> None:
+        go_on.wait(20)
+        connect(robot)
+
+    monkeypatch.setattr(Simulated, "connect", slow)
+    with desk_of(tmp_path) as desk:
+        turn = desk.begin(Order(program=HELLO))
+        until(desk, lambda view: view.busy == "connecting the robot")
+        began = time.monotonic()
+        assert desk.stop("a test")
+        assert time.monotonic() - began < 1
+        assert not desk.view.is_over, "it has not stopped yet"
+        go_on.set()
+        turn.join(10)
+        assert (desk.view.state, desk.view.is_over, desk.view.found) == (State.STOPPED, True, None)
+        assert not desk.view.progress.moments
+
+
 def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path) -> None:
     author = Author(BAD, HELLO)
     with desk_of(tmp_path, author=author) as desk:

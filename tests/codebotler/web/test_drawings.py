@@ -8,9 +8,11 @@ from typing import Any
 import pytest
 
 from codebotler.checker import check
+from codebotler.simulator.imagined import Fact, Reply, Whereabouts
 from codebotler.web.floorplan import MOST_ROOMS, floorplan
 from codebotler.web.progress import MOST, Moment, Progress, line_of
 from codebotler.web.strip import MOST_STRIPS, Deed, strips
+from codebotler.web.supposing import supposed
 from codebotler.world import Room, World
 
 PROGRAM = """def task_program():
@@ -117,10 +119,57 @@ def test_strips_show_each_kind_of_world_once() -> None:
     assert all(strip.ends_well for strip in shown)
 
 
+def there(name: str, room: str, *, found: bool = True) -> Fact:
+    return Fact("", by_lot=True, about=Whereabouts(name, room, found))
+
+
+@pytest.mark.parametrize(
+    ("facts", "told"),
+    [
+        ([], ""),
+        (
+            [there("mug", "hall", found=False), there("mug", "kitchen"), there("mug", "room 3")],
+            "If the robot finds “mug” in kitchen and room 3, but not in hall",
+        ),
+        ([there("mug", "a"), there("mug", "a")], "If the robot finds “mug” in a"),
+        (
+            [there("mug", "a", found=False), there("ann", "b")],
+            "If the robot does not find “mug” in a and it finds “ann” in b",
+        ),
+        (
+            [there("somebody", "a", found=False), there("somebody", "b")],
+            "If the robot finds somebody in b, but nobody in a",
+        ),
+        ([there("somebody", "a", found=False)], "If the robot finds nobody in a"),
+        (
+            [Fact("", by_lot=True, about=Reply("hall", "Tea?", "Yes")), there("cup", "ann's")],
+            "If the robot is told “Yes” when it asks “Tea?” in hall and it finds “cup” in ann's",
+        ),
+        ([there("mug", "a, but not in b")], "If the robot finds “mug” in “a, but not in b”"),
+    ],
+)
+def test_a_world_is_told_in_a_sentence(facts: list[Fact], told: str) -> None:
+    assert supposed(facts) == told
+
+
+def test_strips_say_what_their_worlds_are_like() -> None:
+    program = """def task_program():
+    go_to("kitchen")
+    if is_in_room("mug"):
+        say(ask("somebody", "Whose mug is it?", ["mine", "his"]))
+"""
+    worlds = {strip.world for strip in strips(check(program, rooms=["hall", "kitchen"]))}
+    told = "it is told “his” when it asks “Whose mug is it?” in kitchen"
+    assert worlds == {
+        "If the robot does not find “mug” in kitchen",
+        f"If the robot finds “mug” in kitchen, it finds somebody in kitchen and {told}",
+    }
+
+
 def test_a_drive_to_nowhere_and_a_long_run_are_shown() -> None:
     (nowhere,) = strips(check("def task_program():\n    go_to('cellar')\n", rooms=["hall"]))
     assert (nowhere.scenes[-1].is_found, nowhere.ends_well) == (False, False)
-    assert nowhere.ending.startswith("GoToInvalidLocation")
+    assert nowhere.ending == 'Here it breaks off: there is no room "cellar" (GoToInvalidLocation)'
     many = "def task_program():\n    for n in range(200):\n        say(str(n))\n"
     (long,) = strips(check(many, rooms=["hall"]))
     assert "182 more steps" in [deed.text for scene in long.scenes for deed in scene.deeds]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import http.client
+import json
 import re
 import subprocess
 import sys
@@ -145,6 +146,10 @@ def test_a_token_is_made_for_each_start() -> None:
     ("arguments", "told"),
     [
         (["--no-token", "--host", "0.0.0.0"], "only for this machine"),
+        (["--no-token", "--host", "::"], "only for this machine"),
+        (["--no-token", "--host", "0"], "only for this machine"),
+        (["--no-token", "--host", "127.example"], "only for this machine"),
+        (["--no-token", "--host", ""], "only for this machine"),
         (["--no-token", "--token", "x" * 20], "only for this machine"),
         (["--token", "short"], "can be guessed"),
         (["--host", "999.1.1.1"], "nobody can listen"),
@@ -156,6 +161,19 @@ def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
     assert ended.returncode == 2
     assert told in ended.stderr
+
+
+def test_other_machines_need_the_token_and_that_is_said(tmp_path: Path) -> None:
+    with PageServer(tmp_path, "--host", "0.0.0.0") as server:
+        assert server.token
+        assert "other machines get in as well, by this link only" in server.said
+        for path in ("/", "/api/robot", "/static/page.css"):
+            assert server.ask("GET", path).status == 401
+            assert server.ask("GET", path, host=f"192.0.2.7:{server.port}").status == 401
+            assert server.ask("GET", path, host="evil.example").status == 421
+        assert server.call("GET", "/api/robot").status == 200
+    with PageServer(tmp_path) as server:
+        assert "other machines" not in server.said
 
 
 def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) -> None:
@@ -286,12 +304,43 @@ def test_what_is_sent_has_a_limit(server: PageServer) -> None:
     assert server.call("POST", "/api/check", {"program": "x" * 300_000}).status == 422
 
 
+def test_what_is_told_to_be_too_large_is_not_waited_for(server: PageServer) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
+    connection.putrequest("POST", "/api/check")
+    connection.putheader("Authorization", f"Bearer {server.token}")
+    connection.putheader("Content-Length", str(MOST_BYTES + 1))
+    connection.endheaders()
+    assert connection.getresponse().status == 413
+    connection.close()
+
+
+def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
+    passed: list[Message] = []
+
+    async def behind(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001 - as ASGI has it
+        while len(passed) < 9 and (not passed or passed[-1]["type"] == "http.request"):
+            passed.append(await receive())
+
+    async def receive() -> Message:
+        return {"type": "http.request", "body": b"x" * (MOST_BYTES // 2), "more_body": True}
+
+    async def send(message: Message) -> None:
+        raise AssertionError(message)
+
+    headers = [(b"host", b"localhost"), (b"authorization", b"Bearer an operator's")]
+    scope = {"type": "http", "method": "POST", "path": "/api/check", "scheme": "http", "headers": headers}
+    asyncio.run(Guard(behind, Rules(Access("an operator's", "a face's")))(scope, receive, send))
+    assert [message["type"] for message in passed] == ["http.request", "http.request", "http.disconnect"]
+
+
 def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) -> None:
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=20)
     pieces = (b'{"program": "' if n == 0 else b"x" * 100_000 for n in range(MOST_BYTES // 100_000 + 3))
     headers = {"Authorization": f"Bearer {server.token}", "Content-Type": "application/json"}
     connection.request("POST", "/api/check", pieces, headers, encode_chunked=True)
-    assert connection.getresponse().status in {400, 413}
+    answer = connection.getresponse()
+    told = json.loads(answer.read())["detail"]
+    assert (answer.status, told) == (413, "at most 2,000,000 bytes are taken")
     connection.close()
 
 

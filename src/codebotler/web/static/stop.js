@@ -8,6 +8,7 @@
     stopped: "The robot has stopped.",
     done: "The mission had ended by itself.",
     interrupted: "The mission was interrupted.",
+    null: "It was stopped before it began.",
   };
   let pressed = 0;
 

@@ -1,0 +1,200 @@
+"""What is given to others: archives with everything inside, and files that put the tool on a robot."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tarfile
+import xml.etree.ElementTree as ET
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGING = ROOT / "packaging"
+ON_TOP = {
+    *(
+        "CHANGELOG.md",
+        "LICENSE",
+        "Makefile",
+        "PKG-INFO",
+        "README.md",
+        ".gitignore",
+        "mkdocs.yml",
+        "pyproject.toml",
+    ),
+    *(path.name for path in ROOT.glob("constraints*.txt")),
+    *("bench", "docs", "examples", "packaging", "src", "tests", "website"),
+}
+"""Of what a source archive is made."""
+
+
+def built(kind: str, source: Path, out: Path) -> Path:
+    command = [sys.executable, "-m", "hatchling", "build", "--target", kind, "--directory", str(out)]
+    subprocess.run(command, cwd=source, check=True, capture_output=True)
+    (path,) = out.iterdir()
+    return path
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The source archive, unpacked."""
+    folder = tmp_path_factory.mktemp("source")
+    with tarfile.open(built("sdist", ROOT, folder / "dist")) as archive:
+        archive.extractall(folder, filter="data")
+    (unpacked,) = (path for path in folder.iterdir() if path.name != "dist")
+    return unpacked
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built("wheel", ROOT, tmp_path_factory.mktemp("tree") / "dist")
+
+
+def files(wheel: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(wheel) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_the_wheel_from_the_archive_is_the_wheel_from_the_tree(source: Path, wheel: Path) -> None:
+    assert files(built("wheel", source, source.parent / "wheel")) == files(wheel)
+    assert {path.name for path in source.iterdir()} == ON_TOP
+
+
+def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
+    packed = files(wheel)
+    made = {"__pycache__"}
+    ours = [path for path in (ROOT / "src").rglob("*") if path.is_file() and not made & set(path.parts)]
+    assert {str(path.relative_to(ROOT / "src")) for path in ours} == {
+        n for n in packed if ".dist-info/" not in n
+    }
+    for known in (  # one of each kind that is no Python of ours
+        "roboeval/suites/paper/tasks/LunchTime.yaml",
+        "roboeval/suites/plus/still-right/GetDrink.yaml",
+        "roboeval/mutation/right/LunchTime/01-hours.py",
+        "codebotler/models/recorded/careful/LunchTime.yaml",
+        "codebotler/robots/ros1_worker.py",
+        "codebotler/py.typed",
+    ):
+        assert known in packed
+    (entries,) = (text.decode() for name, text in packed.items() if name.endswith("entry_points.txt"))
+    assert "codebotler = codebotler.cli:main" in entries
+    assert "roboeval = roboeval.cli:main" in entries
+
+
+def test_the_wheel_judges_where_it_is_installed(wheel: Path, tmp_path: Path) -> None:
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--no-compile",
+        "--no-index",
+        "--no-deps",
+        "--target",
+    ]
+    subprocess.run([*pip, str(tmp_path / "site"), str(wheel)], check=True, capture_output=True)
+    code = "import roboeval, roboeval.cli as c; print(roboeval.__file__); c.main()"
+    ended = subprocess.run(
+        [sys.executable, "-c", code, "evaluate", "recorded:careful", "--tasks", "LunchTime"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(tmp_path / "site")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    where, *tables = ended.stdout.splitlines()
+    assert Path(where).is_relative_to(tmp_path)
+    assert any(line.startswith("pass@1 over all prompts: 0.900 ") for line in tables), ended.stdout
+
+
+# --- completion in the shell
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "completed"),
+    [
+        ("roboeval", "roboeval mu", ["mutate"]),
+        ("roboeval", "roboeval tasks --li", ["--lint"]),
+        ("codebotler", "codebotler virt", ["virtual-robot"]),
+    ],
+)
+def test_a_shell_completes_commands_and_options(name: str, words: str, completed: list[str]) -> None:
+    about = {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    ended = subprocess.run(
+        [sys.executable, "-m", f"{name}.cli"],
+        env={**os.environ, **about, f"_{name.upper()}_COMPLETE": "complete_bash"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ended.stdout.split() == completed
+
+
+@pytest.mark.parametrize("name", ["codebotler", "roboeval"])
+def test_what_completes_is_a_script_of_the_shell(name: str) -> None:
+    command = f"{shlex.quote(sys.executable)} -m {name}.cli --show-completion bash; true"
+    shown = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True).stdout
+    assert f"_{name}_completion {name}" in shown
+    subprocess.run(["bash", "-n"], input=shown, text=True, check=True)
+
+
+# --- on a robot
+
+
+def options(words: str) -> set[str]:
+    return set(re.findall(r"--[a-z-]+", words))
+
+
+def test_files_for_robots_use_options_that_there_are() -> None:
+    said = subprocess.run(
+        [sys.executable, "-m", "codebotler.cli", "serve", "--help"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    image = (PACKAGING / "Containerfile").read_text()
+    service = (PACKAGING / "codebotler.service").read_text()
+    nodes = [
+        node.get("args") or "" for node in ET.parse(PACKAGING / "codebotler.launch").getroot().iter("node")
+    ]
+    (started,) = re.findall(r"^CMD \[(.*)\]$", image, re.MULTILINE)
+    (run,) = re.findall(r"^ExecStart=\S+ (.*)$", service, re.MULTILINE)
+    assert len(nodes) == 2
+    for words in (started.replace('"', "").replace(",", ""), run, *nodes):
+        assert " serve " in f" {words} "
+        assert options(words)
+        assert options(words) <= options(said.stdout)
+    for untested in (image, (PACKAGING / "codebotler.launch").read_text()):
+        assert "UNTESTED" in untested
+
+
+def test_what_roslaunch_adds_does_not_reach_the_command() -> None:
+    given = ["serve", "a  b", "__name:=page", "", "__log:=/x/y.log", "c"]
+    ended = subprocess.run(
+        [str(PACKAGING / "codebotler-node"), "-c", "import sys; print(sys.argv[1:])", *given],
+        env={**os.environ, "CODEBOTLER": sys.executable},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ended.stdout == "['serve', 'a  b', '', 'c']\n"
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd-analyze is not at hand")
+def test_systemd_takes_the_service(tmp_path: Path) -> None:
+    text = (PACKAGING / "codebotler.service").read_text()
+    path = tmp_path / "codebotler.service"
+    path.write_text(
+        text.replace("/opt/codebotler/bin/codebotler", "/bin/true")
+    )  # must be there to be verified
+    ended = subprocess.run(
+        ["systemd-analyze", "verify", str(path)], capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")

@@ -1,0 +1,81 @@
+"""The documentation as a site: every page is in it, and no page loads anything from elsewhere."""
+
+import runpy
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import pytest
+import yaml
+
+from codebotler.cli import app as codebotler
+from roboeval.cli import app as roboeval
+
+ROOT = Path(__file__).parent.parent
+MADE = {
+    "changes.md",
+    "codebotler.md",
+    "examples.md",
+    "python-codebotler.md",
+    "python-roboeval.md",
+    "roboeval.md",
+}
+
+
+@pytest.fixture(scope="module")
+def build() -> dict[str, Any]:
+    return runpy.run_path(str(ROOT / "website" / "build.py"))
+
+
+Nav: TypeAlias = "str | list[Nav] | dict[str, Nav]"
+
+
+def pages(nav: Nav) -> list[str]:
+    if isinstance(nav, str):
+        return [nav]
+    return [page for entry in (nav.values() if isinstance(nav, dict) else nav) for page in pages(entry)]
+
+
+def test_every_page_is_in_the_navigation_once() -> None:
+    nav = pages(yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"])
+    assert sorted(nav) == sorted([*MADE, *(path.name for path in (ROOT / "docs").glob("*.md"))])
+
+
+def test_every_command_tells_its_help(build: dict[str, Any]) -> None:
+    for name, app in (("codebotler", codebotler), ("roboeval", roboeval)):
+        page = build["_commands"](name, app)
+        for command in app.registered_commands:
+            verb = command.name or getattr(command.callback, "__name__", "").replace("_", "-")
+            assert f"\n## {name} {verb}\n\n```text\nUsage: {name} {verb} [OPTIONS]" in page
+
+
+def test_links_to_examples_stay_within_the_site(build: dict[str, Any]) -> None:
+    assert build["_within"]("[x](../examples/rtl.py)") == "[x](examples.md#rtl-py)"
+    assert "## rtl.py {#rtl-py}" in build["_examples"]()
+
+
+@pytest.mark.parametrize(
+    ("page", "load"),
+    [
+        ('<script src="https://a.b/c.js"></script>', "script https://a.b/c.js"),
+        ('<link rel="stylesheet" href=//a.b/c.css>', "link //a.b/c.css"),
+        ('<p><img alt="" src="http://a.b/c.png"/>', "img http://a.b/c.png"),
+        ("<link rel=preconnect href='https://a.b' crossorigin>", "link https://a.b"),
+    ],
+)
+def test_what_would_be_loaded_from_elsewhere_is_found(
+    build: dict[str, Any], tmp_path: Path, page: str, load: str
+) -> None:
+    (tmp_path / "good.html").write_text(
+        '<a href="https://a.b">x</a><img src="c.png"><link rel=canonical href="https://a.b/good.html">'
+    )
+    assert [*build["outside_loads"](tmp_path)] == []
+    (tmp_path / "bad.html").write_text(page)
+    assert [*build["outside_loads"](tmp_path)] == [f"bad.html: {load}"]
+
+
+@pytest.mark.parametrize("sheet", ["@import 'https://a.b/c.css';", "a { background: url(//a.b/c.png) }"])
+def test_what_a_style_sheet_would_load_is_found(build: dict[str, Any], tmp_path: Path, sheet: str) -> None:
+    (tmp_path / "good.css").write_text("a { background: url(data:image/png;base64,AA) }")
+    assert [*build["outside_loads"](tmp_path)] == []
+    (tmp_path / "bad.css").write_text(sheet)
+    assert len([*build["outside_loads"](tmp_path)]) == 1

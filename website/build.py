@@ -1,0 +1,139 @@
+"""Builds the documentation as a site in build/site: `make docs`.
+
+Pages come from docs/, the changelog, the examples, the docstrings and `--help`. A warning is an error, and
+so is a page that would load anything from elsewhere.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import typer
+
+import codebotler.cli
+import roboeval.cli
+
+ROOT = Path(__file__).parent.parent
+PAGES, SITE = ROOT / "build" / "pages", ROOT / "build" / "site"
+
+WIDTH = 82  # letters in a line of the site
+
+MODULES = {
+    "codebotler": (
+        *("codebotler", "codebotler.simulator", "codebotler.program", "codebotler.world", "codebotler.trace"),
+        *("codebotler.skills", "codebotler.rtl", "codebotler.mission", "codebotler.robots.base"),
+        *("codebotler.models.base", "codebotler.models.open", "codebotler.perception"),
+    ),
+    "roboeval": ("roboeval", "roboeval.suite", "roboeval.records", "roboeval.metrics"),
+}
+"""What somebody calls from a program of their own."""
+
+
+def main() -> None:
+    """Put the pages together, build the site, and look for what it would load."""
+    shutil.rmtree(ROOT / "build" / "pages", ignore_errors=True)
+    shutil.rmtree(SITE, ignore_errors=True)
+    shutil.copytree(ROOT / "docs", PAGES)
+    shutil.copy(ROOT / "website" / "site.css", PAGES)
+    for path in PAGES.glob("*.md"):
+        path.write_text(_within(path.read_text()))
+    (PAGES / "changes.md").write_text((ROOT / "CHANGELOG.md").read_text())
+    (PAGES / "examples.md").write_text(_examples())
+    for name, app in (("codebotler", codebotler.cli.app), ("roboeval", roboeval.cli.app)):
+        (PAGES / f"{name}.md").write_text(_commands(name, app))
+        (PAGES / f"python-{name}.md").write_text(_python(name))
+    command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]
+    ended = subprocess.run(
+        command, cwd=ROOT, check=False, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    if ended.returncode != 0 or re.search(r"warning|^griffe:", ended.stdout, re.IGNORECASE | re.MULTILINE):
+        sys.exit(f"{ended.stdout}\nthe site was not built, or with warnings, which are errors")
+    if loads := [*outside_loads(SITE)]:
+        sys.exit("\n".join(["the site would load from elsewhere:", *loads]))
+    print(f"{sum(1 for _ in SITE.rglob('*.html'))} pages are in {SITE}")
+
+
+# --- pages
+
+
+def _within(text: str) -> str:
+    """A page with links that stay within the site."""
+    text = re.sub(r"\]\(\.\./examples/([\w.]+)\)", lambda m: f"](examples.md#{_anchor(m[1])})", text)
+    return text.replace("](../CHANGELOG.md)", "](changes.md)")
+
+
+def _anchor(name: str) -> str:
+    return re.sub(r"\W", "-", name)
+
+
+def _examples() -> str:
+    parts = ["# Examples", "Small, complete, and run by the tests of the project."]
+    for path in sorted((ROOT / "examples").iterdir()):
+        if path.is_file():
+            language = {".py": "python", ".yaml": "yaml"}.get(path.suffix, "text")
+            parts += [f"## {path.name} {{#{_anchor(path.name)}}}", f"````{language}\n{path.read_text()}````"]
+    return "\n\n".join(parts) + "\n"
+
+
+def _python(package: str) -> str:
+    about = "What programs of your own may call; [examples](examples.md) show it at work."
+    head = f"# {package} from Python\n\n{about}"
+    return "\n\n".join([head, *(f"::: {module}" for module in MODULES[package])]) + "\n"
+
+
+def _commands(name: str, app: typer.Typer) -> str:
+    group: Any = typer.main.get_command(app)  # of click, or of typer's own copy of it, by the version
+    parts = [f"# {name}", f"```text\n{_help(group, name)}\n```"]
+    for verb, command in sorted(group.commands.items()):
+        parts += [f"## {name} {verb}", f"```text\n{_help(command, f'{name} {verb}')}\n```"]
+    return "\n\n".join(parts) + "\n"
+
+
+def _help(command: Any, name: str) -> str:
+    context = typer.Context(command, info_name=name, terminal_width=WIDTH, max_content_width=WIDTH)
+    return str(command.get_help(context))
+
+
+# --- what a browser would load
+
+
+LOADS = {"link": "href", "script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src"}
+NO_LOAD = {"canonical", "next", "prev", "license"}  # a link that is only told
+
+
+class _Loads(HTMLParser):
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        address = given.get(LOADS.get(tag, "")) or ""
+        if re.match(r"(?:https?:)?//", address) and given.get("rel") not in NO_LOAD:
+            self.found.append(f"{tag} {address}")
+
+
+def outside_loads(site: Path) -> Iterator[str]:
+    """What pages and style sheets of a site would load from elsewhere.
+
+    Args:
+        site: its folder.
+    """
+    for path in sorted(site.rglob("*.html")):
+        parser = _Loads()
+        parser.feed(path.read_text())
+        yield from (f"{path.relative_to(site)}: {found}" for found in parser.found)
+    for path in sorted(site.rglob("*.css")):
+        found = re.findall(r"(?:@import\s+|url\()[\"']?((?:https?:)?//[^\"')\s]+)", path.read_text())
+        yield from (f"{path.relative_to(site)}: {address}" for address in found)
+
+
+if __name__ == "__main__":
+    main()
