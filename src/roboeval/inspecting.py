@@ -59,8 +59,7 @@ def roboeval(
 
 
 def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
-    suite = load_suite(name)
-    return suite if worlds is None and seed is None else suite.with_worlds(worlds, seed)
+    return load_suite(name) if worlds is seed is None else load_suite(name).with_worlds(worlds, seed)
 
 
 def _samples(suite: Suite, task: str) -> list[Sample]:
