@@ -3,8 +3,8 @@
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
 # `make test-transformers` tests models and detectors that run on this machine, with a Python for which there is a
 # torch (3.11); it makes an environment of its own, since nothing else needs so much. `make test-pyrobosim` tests the
-# robot in pyrobosim, and `make test-inspect` the benchmark in Inspect, in environments of their own, too. `make test-faults` asks a server that fails
-# one request in ten for 4,000 completions. `make test-ros1` tests robots on ROS 1, for which
+# robot in pyrobosim in one, too; `make test-inspect` and `make test-ray` test the benchmark in Inspect and on a Ray
+# cluster, and share one. `make test-faults` asks a server that fails one request in ten. `make test-ros1` tests robots on ROS 1, for which
 # the system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
 # Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make pictures` makes those of the
 # guide anew. `make docs` makes the documentation as a site, in build/site.
@@ -13,7 +13,7 @@ PACKAGE ?= .
 VENV ?= .venv
 TORCH_VENV ?= .venv-transformers
 PYROBOSIM_VENV ?= .venv-pyrobosim
-INSPECT_VENV ?= .venv-inspect
+EXTRAS_VENV ?= .venv-extras
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
@@ -24,7 +24,7 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo serve docs test test-ros1 test-browser pictures test-transformers test-pyrobosim test-inspect \
+.PHONY: demo serve docs test test-ros1 test-browser pictures test-transformers test-pyrobosim test-inspect test-ray \
 	test-faults fuzz lint bench clean
 
 demo: $(VENV)/installed
@@ -48,7 +48,7 @@ test: $(VENV)/tested
 		--ignore tests/codebotler/models/test_local.py \
 		--ignore tests/codebotler/perception/test_zeroshot.py \
 		--ignore tests/codebotler/robots/test_pyrobosim.py \
-		--ignore tests/roboeval/test_inspecting.py $(TESTS)
+		--ignore tests/roboeval/test_inspecting.py --ignore tests/roboeval/test_rayengine.py $(TESTS)
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
@@ -68,8 +68,11 @@ test-transformers: $(TORCH_VENV)/tested
 test-pyrobosim: $(PYROBOSIM_VENV)/tested
 	$(PYROBOSIM_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py
 
-test-inspect: $(INSPECT_VENV)/tested
-	$(INSPECT_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/test_inspecting.py
+test-inspect: $(EXTRAS_VENV)/tested
+	$(EXTRAS_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/test_inspecting.py
+
+test-ray: $(EXTRAS_VENV)/tested
+	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/roboeval/test_rayengine.py
 
 test-faults: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m
@@ -134,12 +137,12 @@ $(PYROBOSIM_VENV)/tested: $(SOURCES) constraints-pyrobosim.txt
 		--constraint constraints-pyrobosim.txt "$(PACKAGE)[pyrobosim]" --group test | { $(DOTS); }
 	@touch $@
 
-$(INSPECT_VENV)/tested: $(SOURCES) constraints-inspect.txt
-	@echo "making an environment with Inspect in $(INSPECT_VENV), which takes a minute"
-	@$(PYTHON) -m venv --clear $(INSPECT_VENV)
-	@$(INSPECT_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(INSPECT_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
-		--constraint constraints-inspect.txt "$(PACKAGE)[inspect]" --group test | { $(DOTS); }
+$(EXTRAS_VENV)/tested: $(SOURCES) constraints-extras.txt
+	@echo "making an environment with Inspect and Ray in $(EXTRAS_VENV), which takes a minute"
+	@$(PYTHON) -m venv --clear $(EXTRAS_VENV)
+	@$(EXTRAS_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
+	@$(EXTRAS_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
+		--constraint constraints-extras.txt "$(PACKAGE)[inspect,ray]" --group test | { $(DOTS); }
 	@touch $@
 
 $(VENV)/linted: $(VENV)/tested
@@ -153,5 +156,5 @@ $(VENV)/documented: $(VENV)/installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) $(INSPECT_VENV) build dist .hypothesis .mypy_cache \
+	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) $(EXTRAS_VENV) build dist .hypothesis .mypy_cache \
 		.pytest_cache .ruff_cache .import_linter_cache

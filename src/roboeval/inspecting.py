@@ -59,7 +59,7 @@ def roboeval(
 
 
 def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
-    return load_suite(name) if worlds is seed is None else load_suite(name).with_worlds(worlds, seed)
+    return load_suite(name) if (worlds, seed) == (None, None) else load_suite(name).with_worlds(worlds, seed)
 
 
 def _samples(suite: Suite, task: str) -> list[Sample]:

@@ -1,0 +1,89 @@
+"""What does a Ray cluster cost on one machine, and how much can one process feed to it?
+
+The recorded programs are judged by the local engine and on a cluster of this machine, in turns, with the same
+number of cores; printed is the ratio of the medians. Then calls that do nothing but give back a row of usual
+length are counted: so many programs a second one process can hand out and take back, whatever judges them.
+The last lines say what that means for a million completions.
+"""
+
+import json
+import os
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from codebotler.simulator.lane import Lane
+from roboeval.engines import Engine, Local
+from roboeval.rayengine import Cluster
+from roboeval.records import Completion, recorded_completions
+from roboeval.suite import Suite, load_suite
+from roboeval.verdicts import evaluate
+
+ROUNDS = 3
+EMPTY = 20_000
+MILLION = 1_000_000
+
+
+@contextmanager
+def opened(engine: Engine) -> Iterator[Engine]:
+    """An engine that is open already, and stays so."""
+    yield engine
+
+
+def seconds(engine: Engine, completions: list[Completion], suite: Suite) -> tuple[float, list[str]]:
+    """How long it takes to judge completions, and the rows."""
+    start = time.perf_counter()
+    rows = [json.dumps(row) for row in evaluate(completions, suite, engine=opened(engine))]
+    return time.perf_counter() - start, rows
+
+
+def fed(cluster: Engine, row: str) -> float:
+    """How many calls a second one process hands out and takes back."""
+
+    def give(_lane: Lane, key: int) -> str:
+        return row[: -1 - key % 2]
+
+    start = time.perf_counter()
+    count = sum(1 for _ in cluster.map_distinct(give, range(EMPTY), name=lambda key: b"%d" % key))
+    return count / (time.perf_counter() - start)
+
+
+def main() -> int:
+    """Print the figures; 1 where the rows differ."""
+    beside = Path(__file__).resolve().parent  # where `import ray` would find this file
+    sys.path[:] = [path for path in sys.path if Path(path).resolve() != beside]
+    suite = load_suite(sys.argv[1] if len(sys.argv) > 1 else "paper")
+    models = ("recorded:careful", "recorded:hasty")
+    completions = [c for model in models for c in recorded_completions(model, suite)]
+    cores = os.cpu_count() or 1
+    took: dict[str, list[float]] = {"local": [], "ray": []}
+    rows: dict[str, list[str]] = {}
+    with Local(cores) as local, Cluster() as cluster:
+        for engine in (local, cluster):
+            seconds(engine, completions[:40], suite)  # processes start
+        for number in range(ROUNDS):
+            for name, engine in (("local", local), ("ray", cluster)):
+                spent, rows[name] = seconds(engine, completions, suite)
+                took[name].append(spent)
+            print(f"round {number + 1} of {ROUNDS}", file=sys.stderr)
+        a_second = fed(cluster, sorted(rows["ray"], key=len)[len(completions) // 2])
+    here, there = (statistics.median(times) for times in took.values())
+    each = cores * here / len(completions)
+    print(
+        f"{len(completions)} programs, suite {suite.name}, {cores} cores: {here:.1f} s, by Ray {there:.1f} s"
+    )
+    print(f"Ray takes {there / here:.2f} times as long")
+    print(f"one process hands out and takes back {a_second:,.0f} programs a second")
+    hours, least = MILLION * each * there / here / 3600, MILLION / a_second / 60
+    print(
+        f"a million different programs take {hours:,.1f} hours of a core, and at least {least:,.0f} minutes,"
+    )
+    print(f"which {a_second * each:,.0f} cores reach; more would wait for the process that hands out")
+    return rows["local"] != rows["ray"]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
