@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -11,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 from pageserver import PageServer
-from viewing import DESK, OpenPage
+from viewing import DESK, OpenPage, chromium
 
 QUIETLY = [
     "--no-sandbox",
@@ -23,11 +22,23 @@ QUIETLY = [
 SECONDS = 60.0  # a busy machine is no fault of the page
 
 
+NOT_ALWAYS = {"desk-dark", "tablet-light", "phone-dark"}
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without --shots, look at each size and at each colour scheme, but not at all pairs of them."""
+    if config.getoption("--shots"):
+        return
+    left = [item for item in items if item.name.partition("[")[2].rstrip("]") in NOT_ALWAYS]
+    config.hook.pytest_deselected(items=left)
+    items[:] = [item for item in items if item not in left]
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    path = chromium()
     if path is None:
-        pytest.skip("there is no Chromium here: apt-get install chromium")
+        pytest.skip("there is no Chromium here: apt-get install chromium-headless-shell")
     expect.set_options(timeout=SECONDS * 1000)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=QUIETLY)

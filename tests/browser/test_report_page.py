@@ -6,7 +6,6 @@ Without a Chromium these tests are skipped and say so.
 import base64
 import hashlib
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from roboeval.report.contents import Wishes, sections
 from roboeval.report.page import SCRIPT
 from roboeval.report.reading import Written
 from roboeval.report.writing import write_report
+from viewing import chromium
 
 CLICKS = """
 addEventListener("load", () => {
@@ -60,9 +60,9 @@ addEventListener("load", () => {
 """
 
 
-@pytest.fixture(scope="module")
-def chromium() -> str:
-    found = shutil.which("chromium") or shutil.which("google-chrome")
+@pytest.fixture(scope="module", name="chromium")
+def found_chromium() -> str:
+    found = chromium()
     if found is None:
         pytest.skip("there is no Chromium here")
     return found

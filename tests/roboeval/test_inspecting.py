@@ -4,7 +4,6 @@ Inspect is an extra; `make test-inspect` runs this file.
 """
 
 import asyncio
-import shutil
 import socket
 import subprocess
 import sys
@@ -34,6 +33,7 @@ from roboeval import inspecting
 from roboeval.records import Completion, recorded_completions
 from roboeval.suite import Suite
 from roboeval.verdicts import evaluate
+from viewing import chromium
 
 TASK = "codebotler/roboeval"
 
@@ -214,14 +214,16 @@ def viewer(logs: Path, tmp_path: Path) -> Iterator[str]:
 
 
 def test_the_viewer_opens_the_log(judged: EvalLog, viewer: str, pytestconfig: pytest.Config) -> None:
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is None:
-        pytest.skip("there is no Chromium here: apt-get install chromium")
+    browser_path = chromium()
+    if browser_path is None:
+        pytest.skip("there is no Chromium here: apt-get install chromium-headless-shell")
     sample = next(one for one in judged.samples or [] if one.scores["verdict"].metadata["failure"])
     failed = next(w for w in sample.scores["verdict"].metadata["worlds"] if not w["satisfied"])
     shots = pytestconfig.getoption("--shots")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
+        browser = playwright.chromium.launch(
+            executable_path=browser_path, args=["--no-sandbox", "--disable-gpu"]
+        )
         page = browser.new_page(viewport={"width": 1400, "height": 1000})
         page.set_default_timeout(40_000)
         expect.set_options(timeout=40_000)

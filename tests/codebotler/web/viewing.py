@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -20,6 +21,12 @@ SCREENS: list[Screen] = [
     for name, size in (("desk", DESK), ("tablet", TABLET), ("phone", PHONE))
     for dark in (False, True)
 ]
+
+
+def chromium() -> str | None:
+    """The browser of this system; by preference the small one, which draws no window of its own."""
+    names = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
+    return next(filter(None, map(shutil.which, names)), None)
 
 
 def expect_no_grave_fault(page: Page) -> None:
