@@ -249,7 +249,7 @@ def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> N
 
 def test_a_run_that_is_deleted_while_it_is_looked_at(runs: Path, opened: OpenPage) -> None:
     with serving(runs) as server:
-        page = opened(server, "runs/hasty")
+        page = opened(server, "runs/hasty", expecting="404")
         expect(page.locator("#count")).to_have_text("240 completions")
         shutil.rmtree(runs / "hasty")
         expect(page.get_by_role("alert")).to_have_text(

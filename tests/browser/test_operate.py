@@ -14,7 +14,7 @@ from playwright.sync_api import Page, Route, expect
 
 from pageserver import PageServer
 from server import Fault, Server
-from viewing import DESK, PHONE, TABLET, OpenPage
+from viewing import DESK, PHONE, TABLET, OpenPage, until
 
 TEA = """def task_program():
     get_all_rooms()
@@ -30,7 +30,8 @@ NUMBERS = itertools.count(1)
 
 
 def write(page: Page, program: str) -> None:
-    """Type a program in the place of what is there."""
+    """Type a program in the place of what is there, once that is there."""
+    expect(page.locator("[data-started] .cm-content")).to_be_visible()
     page.locator(".cm-content").click()
     page.keyboard.press("Control+a")
     page.keyboard.insert_text(program)
@@ -40,12 +41,13 @@ def checked(page: Page, program: str) -> None:
     """Type a program that no test before has typed."""
     mark = f"# {next(NUMBERS)}"
     write(page, f"{program}{mark}\n")
-    page.wait_for_function(
+    until(
+        page,
         """async (mark) => {
             const now = await (await fetch("/api/missions/current")).json();
             return now.program.includes(mark) && now.state === "checked" && !now.busy;
         }""",
-        arg=mark,
+        mark,
     )
     expect(page.locator(".cm-content")).to_contain_text(mark)
     expect(page.get_by_text("The check found no problem.")).to_be_visible()
@@ -236,8 +238,9 @@ def test_what_was_typed_just_before_a_click_is_checked_and_kept(server: PageServ
     page.keyboard.insert_text("# one more")
     button.evaluate("button => button.click()")
     expect(page.get_by_text("What was just typed is checked first.")).to_be_visible()
-    page.wait_for_function(
-        "fetch('/api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))"
+    until(
+        page,
+        "fetch('/api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))",
     )
     expect(page.locator(".headline")).to_have_text("Waits for your word")
     expect(page.locator(".cm-content")).to_contain_text("# one more")

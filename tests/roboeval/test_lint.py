@@ -181,8 +181,8 @@ def test_a_check_that_no_wrong_program_trips(linted: Lint) -> None:
 
 def test_a_task_without_wrong_programs(linted: Lint) -> None:
     for recorded in ("[]", RECORDED.replace("pass", "say('hello')")):
-        (finding,) = linted({"speaks": SPEAKS}, ["speaks"], recorded=recorded, untripped=True)
-        assert finding.name == "untripped: Hello"
+        findings = linted({"speaks": SPEAKS}, ["speaks"], recorded=recorded, untripped=True)
+        assert [one.name for one in findings if one.kind != "misjudged"] == ["untripped: Hello"]
 
 
 @pytest.mark.parametrize("text", ['"a^b"', '"$x"', r'words(r"\bno\b", without("no"))', 'words("a", "(?!)")'])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Callable
 from typing import TypeAlias
 
@@ -27,6 +28,17 @@ def chromium() -> str | None:
     """The browser of this system; by preference the small one, which draws no window of its own."""
     names = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
     return next(filter(None, map(shutil.which, names)), None)
+
+
+def until(page: Page, promise: str, arg: object = None) -> None:
+    """Wait for what a page is promised to be true; `wait_for_function` takes the promise itself for that."""
+    end = time.monotonic() + PATIENCE
+    while not page.evaluate(promise, arg):
+        assert time.monotonic() < end, promise
+        page.wait_for_timeout(50)
+
+
+PATIENCE = 60.0  # seconds
 
 
 def expect_no_grave_fault(page: Page) -> None:

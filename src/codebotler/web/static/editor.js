@@ -62,7 +62,7 @@ globalThis.programEditor = (() => {
   };
 
   const start = async (id) => {
-    while (!getElement(id)?.editor) await new Promise((later) => setTimeout(later, 20));
+    while (!getElement(id)?.editor || !latest) await new Promise((later) => setTimeout(later, 20));
     editor = getElement(id);
     const dark = matchMedia("(prefers-color-scheme: dark)");
     const colour = () => editor.setTheme(dark.matches ? "vscodeDark" : "vscodeLight");
@@ -72,6 +72,7 @@ globalThis.programEditor = (() => {
     editor.$el.querySelector(".cm-content").setAttribute("aria-label", "Program");
     editor.$el.querySelector(".cm-scroller").setAttribute("tabindex", "0");
     if (latest) apply();
+    editor.$el.setAttribute("data-started", "");
   };
 
   return { settle, show, start, text, typed };
