@@ -13,7 +13,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from codebotler.simulator.lane import Lane
 from roboeval.engines import Engine, Local
@@ -53,8 +52,6 @@ def fed(cluster: Engine, row: str) -> float:
 
 def main() -> int:
     """Print the figures; 1 where the rows differ."""
-    beside = Path(__file__).resolve().parent  # where `import ray` would find this file
-    sys.path[:] = [path for path in sys.path if Path(path).resolve() != beside]
     suite = load_suite(sys.argv[1] if len(sys.argv) > 1 else "paper")
     models = ("recorded:careful", "recorded:hasty")
     completions = [c for model in models for c in recorded_completions(model, suite)]
