@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from codebotler.program import listed
+from codebotler.english import listed
 from codebotler.simulator.child import PROCESSOR_TIME
 from codebotler.simulator.imagined import Fact, Plan, brief
 from codebotler.simulator.lots import Draw, Lot

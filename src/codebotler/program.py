@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from codebotler.english import listed
 from codebotler.skills import SKILLS, Parameter, Skill, SkillTable
 
 TASK = "task_program"
@@ -319,8 +320,3 @@ def names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
             case ast.alias(name, asname):
                 names.add(asname or name.split(".", 1)[0])
     return names
-
-
-def listed(names: Sequence[str]) -> str:
-    """Names as one says them: `a, b and c`."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))

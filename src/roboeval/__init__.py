@@ -18,24 +18,18 @@ if TYPE_CHECKING:
     from roboeval.rewards import reward
     from roboeval.suite import Suite, load_suite
     from roboeval.verdicts import evaluate
-else:  # a name is imported when it is first used, as in `codebotler`
-    HOMES = {
-        "Completion": "records",
-        "Suite": "suite",
-        "evaluate": "verdicts",
-        "load_suite": "suite",
-        "read_completions": "records",
-        "recorded_completions": "records",
-        "reward": "rewards",
-    }
+else:  # each name is imported when it is first used
+    from codebotler.facade import facade
 
-    def __getattr__(name: str) -> object:
-        if name not in HOMES:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name)
-        from importlib import import_module  # noqa: PLC0415 - only where something is used
-
-        globals()[name] = value = getattr(import_module(f"{__name__}.{HOMES[name]}"), name)
-        return value
-
-    def __dir__() -> list[str]:
-        return sorted({*globals(), *__all__})
+    __getattr__, __dir__ = facade(
+        __name__,
+        {
+            "Completion": "records",
+            "Suite": "suite",
+            "evaluate": "verdicts",
+            "load_suite": "suite",
+            "read_completions": "records",
+            "recorded_completions": "records",
+            "reward": "rewards",
+        },
+    )

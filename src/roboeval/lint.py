@@ -13,8 +13,8 @@ from functools import cached_property
 from itertools import combinations
 
 from codebotler.badinput import YamlFile
+from codebotler.english import listed
 from codebotler.rtl import Element, Formula, Regex, Text
-from codebotler.rtl.wording import listed
 from codebotler.simulator.robot import resolve_room
 from roboeval.findings import Finding, Kind
 from roboeval.names import absent_names

@@ -243,7 +243,7 @@ def _is_anywhere() -> bool:
     return "RAY_ADDRESS" in os.environ or here.exists()
 
 
-def _connect(ray: Any) -> None:  # noqa: ANN401
+def _connect(ray: Any) -> None:  # noqa: ANN401 - a module without types
     quiet = {"logging_level": logging.ERROR, "log_to_driver": False}
     address = os.environ.get("RAY_ADDRESS")
     try:
@@ -255,7 +255,7 @@ def _connect(ray: Any) -> None:  # noqa: ANN401
         ray.init(address="local", include_dashboard=False, **quiet)
 
 
-def _fetched(ray: Any, reference: Any) -> Told:  # noqa: ANN401
+def _fetched(ray: Any, reference: Any) -> Told:  # noqa: ANN401 - a module without types
     try:
         told: Told = ray.get(reference)
     except ray.exceptions.RayTaskError as error:

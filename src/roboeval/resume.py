@@ -24,7 +24,7 @@ def evaluate_run(
     ablated: bool,
     tasks: frozenset[str] | None,
     redo: bool,
-    workers: int,
+    workers: int = 1,
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
 ) -> Iterator[dict[str, Any]]:
@@ -38,7 +38,7 @@ def evaluate_run(
         redo: whether to start over.
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing.
-        engine: where programs are run instead of on this machine.
+        engine: where programs are run; by default in so many lanes of this machine.
 
     Raises:
         BadInput: the run is being written, or was judged otherwise or holds other completions than it did.

@@ -164,7 +164,7 @@ def test_a_cluster_without_a_core_ends_with_a_sentence(nodes: Nodes, monkeypatch
 def test_shards_are_small_at_first() -> None:
     given: list[list[int]] = []
 
-    def give(keys: Any) -> int:  # noqa: ANN401
+    def give(keys: Any) -> int:  # noqa: ANN401 - keys of a shard
         given.append(list(keys))
         return len(given)
 

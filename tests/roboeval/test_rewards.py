@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 
@@ -122,9 +123,9 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
     waited_for = distinct(8, "interrupted")
     asked = threading.Event()
 
-    def submit(*args: object) -> object:
+    def submit(function: Callable[..., object], *args: object) -> object:
         asked.set()
-        return plain_submit(*args)  # type: ignore[arg-type]
+        return plain_submit(function, *args)
 
     monkeypatch.setattr(lanes, "submit", submit)
     with ThreadPoolExecutor(1) as beside:

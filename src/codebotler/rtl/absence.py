@@ -5,21 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, assert_never
 
+from codebotler.english import listed, times
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, AtLeast, Count, Exists, Stay
+from codebotler.rtl.phrases import is_any, missing, room, room_name
 from codebotler.rtl.semantics import CannotJudge, at_place, first, first_stay, matches
 from codebotler.rtl.window import Window
-from codebotler.rtl.wording import (
-    did,
-    happened,
-    is_any,
-    lacking,
-    listed,
-    missing,
-    pastimes,
-    room,
-    room_name,
-    times,
-)
+from codebotler.rtl.wording import did, happened, lacking, pastimes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

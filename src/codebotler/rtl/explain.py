@@ -6,19 +6,13 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
+from codebotler.english import listed, times
 from codebotler.rtl.absence import Absence, Reason, seen, steps_of
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or
+from codebotler.rtl.phrases import is_any, shortened
 from codebotler.rtl.semantics import CannotJudge, at_place, cut, first, holds, matches
 from codebotler.rtl.window import Window
-from codebotler.rtl.wording import (
-    did,
-    happened,
-    is_any,
-    listed,
-    offered,
-    shortened,
-    times,
-)
+from codebotler.rtl.wording import did, happened, offered
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

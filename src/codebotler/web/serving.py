@@ -23,7 +23,7 @@ from starlette.routing import Match, Mount
 from starlette.types import ASGIApp
 
 from codebotler import __version__
-from codebotler.program import listed
+from codebotler.english import listed
 from codebotler.terminal import note
 from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
@@ -82,11 +82,11 @@ def serve(
         )
         for summary in desk.interrupted if desk else ():
             note(f"mission {summary.id} was interrupted: {summary.reason}")
-        _tell_links(place, port, access, desk)
+        note(_links(place, port, access, desk))  # at once, for those who read it through a pipe
         _Server(settings, desk).run([bound])
 
 
-def _tell_links(place: Place, port: int, access: Access, desk: Desk | None) -> None:
+def _links(place: Place, port: int, access: Access, desk: Desk | None) -> str:
     shown = "localhost" if place.is_loopback else socket.gethostname()
     address = f"http://{shown}:{port}/"
 
@@ -94,14 +94,19 @@ def _tell_links(place: Place, port: int, access: Access, desk: Desk | None) -> N
         return "" if access.operator is None else f"?{urlencode({'token': token})}"
 
     ends = "ends the page and stops the robot" if desk else "ends the page"
-    note(f"open this link in a browser; Ctrl-C {ends}:\n")
-    note(f"    {address}{query(access.operator or '')}\n")
+    told = [
+        f"open this link in a browser; Ctrl-C {ends}:\n",
+        f"    {address}{query(access.operator or '')}\n",
+    ]
     if not place.is_loopback:
-        note("other machines get in as well, by this link only; what they send and see is not encrypted\n")
+        told.append(
+            "other machines get in as well, by this link only; what they send and see is not encrypted\n"
+        )
     if desk and desk.face is not None:
         where = "here; --host lets other machines in" if place.is_loopback else "on the robot's tablet"
-        note(f"the robot's face, which can run nothing, to be opened {where}:\n")
-        note(f"    {address}face{query(access.face)}\n")
+        told.append(f"the robot's face, which can run nothing, to be opened {where}:\n")
+        told.append(f"    {address}face{query(access.face)}\n")
+    return "\n".join(told)
 
 
 def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> FastAPI:

@@ -21,7 +21,15 @@ from codebotler.options import (
     TopPOption,
 )
 from roboeval.commands.judging import evaluate
-from roboeval.commands.options import JsonOption, SuiteOption, TasksOption, command, load, named
+from roboeval.commands.options import (
+    JsonOption,
+    SuiteOption,
+    TasksOption,
+    WorkersOption,
+    command,
+    load,
+    named,
+)
 from roboeval.commands.reporting import report
 from roboeval.terminal import metered, note
 
@@ -90,9 +98,7 @@ def run(
     token_budget: BudgetOption = None,
     timeout: TimeoutOption = 60.0,
     base_url: BaseUrlOption = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
-    ] = None,
+    workers: WorkersOption = None,
     require_isolation: Annotated[
         bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
     ] = False,

@@ -16,9 +16,9 @@ from roboeval.commands.options import (
     RunArgument,
     SuiteOption,
     TasksOption,
+    WorkersOption,
     as_judged,
     command,
-    cores,
     engine_named,
     load,
     named,
@@ -45,9 +45,7 @@ def evaluate(
     tasks: TasksOption = None,
     ablation: AblationOption = False,
     redo: Annotated[bool, typer.Option("--redo", help="Start over.")] = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
-    ] = None,
+    workers: WorkersOption = None,
     worlds: Annotated[
         int | None, typer.Option(min=1, help="Draw so many worlds a task, where the suite draws them.")
     ] = None,
@@ -83,12 +81,7 @@ def evaluate(
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
             run.keep(opened)
-        how = How(
-            ablated=ablation,
-            workers=workers or cores(),
-            require_isolation=require_isolation,
-            engine=opened_engine,
-        )
+        how = How(ablated=ablation, engine=opened_engine)
         rows = (
             judge_all(opened.of(wanted), judged_by, **how)
             if run is None
@@ -100,9 +93,7 @@ def evaluate(
         note(f"roboeval: {tally.after_a_stop(is_kept=run is not None, redo=redo)}")
         raise SystemExit(STOPPED) from None
     if run is not None:
-        again = command("show", run.path, *tally.first_failed, suite=suite, ablated=ablation)
-        does = "says why that one fails" if tally.first_failed else "prints these tables again"
-        note(f"verdicts are in {run.path}; `{again}` {does}")
+        tally.say_how_to_look(run.path, suite, ablated=ablation)
 
 
 def show(
@@ -201,8 +192,6 @@ class How(TypedDict):
     """How completions are judged."""
 
     ablated: bool
-    workers: int
-    require_isolation: bool
     engine: OpenEngine
 
 
@@ -228,6 +217,12 @@ class Tally:
         if self.count == 0:
             return "stopped before judging; give the same command again"
         return f"stopped; the same command {'without --redo ' * redo}goes on where it was"
+
+    def say_how_to_look(self, run: Path, suite: str, *, ablated: bool) -> None:
+        """Where the verdicts are, and what shows more of them."""
+        again = command("show", run, *self.first_failed, suite=suite, ablated=ablated)
+        does = "says why that one fails" if self.first_failed else "prints these tables again"
+        note(f"verdicts are in {run}; `{again}` {does}")
 
 
 def print_summary(

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
-from roboeval.commands.options import SuiteOption, cores, load, named
+from roboeval.commands.options import SuiteOption, WorkersOption, cores, load, named
 from roboeval.terminal import note, print_rich, watched
 
 if TYPE_CHECKING:
     from codebotler.simulator.engine import Lanes
     from roboeval.mutation.mutants import Original
     from roboeval.mutation.scores import Job, Score
-    from roboeval.suite import Suite
+    from roboeval.suite import Suite, Task
 
 
 def mutate(
@@ -47,34 +47,17 @@ def mutate(
     at_least: Annotated[
         float | None, typer.Option(min=0, max=1, help="Status 1 if a task scores less than this.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
-    ] = None,
+    workers: WorkersOption = None,
 ) -> None:
     """Make right programs wrong as models do, and say which of them the checks let through."""
     from codebotler.simulator.engine import Lanes
     from roboeval.mutation.keeping import keep
-    from roboeval.mutation.mutants import originals
-    from roboeval.mutation.scores import Job
-    from roboeval.mutation.stillright import reasons
-    from roboeval.mutation.worlds import worlds_of
 
     known = load(suite)
     wanted = [known.task(name) for name in dict.fromkeys(tasks or known.tasks)]
     further = named_programs(also or [], known)
-    jobs = [
-        Job(
-            task=task.name,
-            phrasings=task.prompts,
-            programs=originals(task, further.get(task.name, ())),
-            scenarios=worlds_of(known, task, worlds, seed),
-            rules=known.rules,
-            still_right=reasons(task),
-            most=most,
-            seed=seed,
-        )
-        for task in wanted
-    ]
+    how = How(worlds=worlds, most=most, seed=seed)
+    jobs = [job_of(known, task, further.get(task.name, ()), **how) for task in wanted]
     with Lanes(workers or cores()) as lanes:
         scores = [score_of(job, lanes) for job in jobs]
     show_scores(scores, known.name, brief=brief)
@@ -83,6 +66,35 @@ def mutate(
         note(f"scores, mutants and survivors are in {out}")
     if at_least is not None and any(score.score is None or score.score < at_least for score in scores):
         raise SystemExit(1)
+
+
+class How(TypedDict):
+    """In how many worlds, and how many mutants of a task are tried, drawn from which seed."""
+
+    worlds: int | None
+    most: int
+    seed: int
+
+
+def job_of(
+    suite: Suite, task: Task, further: Sequence[Original], *, worlds: int | None, most: int, seed: int
+) -> Job:
+    """What is to be done for a task."""
+    from roboeval.mutation.mutants import originals
+    from roboeval.mutation.scores import Job
+    from roboeval.mutation.stillright import reasons
+    from roboeval.mutation.worlds import worlds_of
+
+    return Job(
+        task=task.name,
+        phrasings=task.prompts,
+        programs=originals(task, further),
+        scenarios=worlds_of(suite, task, worlds, seed),
+        rules=suite.rules,
+        still_right=reasons(task),
+        most=most,
+        seed=seed,
+    )
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:

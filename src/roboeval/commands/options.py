@@ -35,6 +35,9 @@ AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common
 EngineOption = Annotated[
     str, typer.Option(help="Where programs are run: local, on this machine, or ray, on a Ray cluster.")
 ]
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 

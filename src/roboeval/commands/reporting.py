@@ -12,6 +12,7 @@ from roboeval.commands.options import (
     AblationOption,
     JsonOption,
     SuiteOption,
+    WorkersOption,
     as_judged,
     command,
     cores,
@@ -49,9 +50,7 @@ def report(
     check: Annotated[
         bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
     ] = True,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
-    ] = None,
+    workers: WorkersOption = None,
 ) -> None:
     """Draw the figures of the paper, and one page about how models do, why, and how sure that is."""
     from dataclasses import replace

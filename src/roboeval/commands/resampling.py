@@ -12,6 +12,7 @@ from roboeval.commands.options import (
     JsonOption,
     RunArgument,
     SuiteOption,
+    WorkersOption,
     as_judged,
     engine_named,
     expect_current,
@@ -38,9 +39,7 @@ def resample(
     ] = 5,
     seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
     suite: SuiteOption = "paper",
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
-    ] = None,
+    workers: WorkersOption = None,
     engine: EngineOption = "local",
     json: JsonOption = False,
 ) -> None:
