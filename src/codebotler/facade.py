@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+TYPE_CHECKING = False  # what type checkers take for true; importing `typing` would cost what this saves
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
 
 
 def facade(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
