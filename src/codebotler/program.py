@@ -5,12 +5,12 @@ from __future__ import annotations
 import ast
 import builtins
 import symtable
-import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from codebotler.english import listed
 from codebotler.skills import SKILLS, Parameter, Skill, SkillTable
+from codebotler.syntaxtree import parse, reading
 
 TASK = "task_program"
 GIVEN = ("time", "sys")  # modules that every program finds imported
@@ -79,10 +79,7 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Problem:
         line = source[: source.index("\0")].count("\n") + 1
         return Problem(line, "SyntaxError", "the program holds a null character")
     try:
-        with warnings.catch_warnings(action="ignore"):
-            tree = ast.parse(source)
-            if compiled:
-                compile(tree, "<program>", "exec", dont_inherit=True)
+        return parse(source, compiled=compiled)
     except SyntaxError as error:
         message = f"the program does not parse: {error.msg}"
         return Problem(error.lineno or None, type(error).__name__, message)
@@ -95,7 +92,6 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Problem:
         return _too_deep(error)
     except (ValueError, OverflowError, SystemError) as error:
         return Problem(None, type(error).__name__, f"the program cannot be read: {error}")
-    return tree
 
 
 def _too_deep(error: Exception) -> Problem:
@@ -115,7 +111,7 @@ def bound_names(source: str) -> set[str]:
     """The names that a source defines or imports at module level; none if it does not parse."""
     if isinstance(parsed(source, compiled=True), Problem):
         return set()
-    with warnings.catch_warnings(action="ignore"):
+    with reading():
         table = symtable.symtable(source, "<program>", "exec")
     return {s.get_name() for s in table.get_symbols() if s.is_assigned() or s.is_imported()}
 
@@ -198,7 +194,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
 
     # Names in annotations that are texts are never looked up when a program runs.
     spelled = {(n.lineno, n.col_offset) for n in ast.walk(tree) if isinstance(n, ast.Name)}
-    with warnings.catch_warnings(action="ignore"):
+    with reading():
         found = Checker(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
     return [
         # pyflakes gives the bare name, not a tuple, where a local variable hides something built in

@@ -10,6 +10,8 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any
 
+from codebotler.syntaxtree import parse_expression
+
 Names = Mapping[str, Any]
 """What an expression may name, and what it stands for."""
 
@@ -59,7 +61,7 @@ def parsed(text: str) -> ast.expr:
         ExpressionError: it is none.
     """
     try:
-        return ast.parse(text.strip(), mode="eval").body
+        return parse_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ExpressionError(f'"{text}" cannot be read as an expression') from None
 

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
 from codebotler.rtl import Element
+from codebotler.syntaxtree import parse_expression
 from codebotler.world import Room
 from roboeval.representatives import elements
 from roboeval.suite import Requirement, Scenario, Task
@@ -79,6 +80,6 @@ def _owners(rooms: Iterable[Room]) -> list[str]:
 
 
 def _arguments(requirement: Requirement) -> list[str]:
-    call = ast.parse(requirement.text.strip().removeprefix("not "), mode="eval").body
+    call = parse_expression(requirement.text.strip().removeprefix("not "))
     values = call.args if isinstance(call, ast.Call) else []
     return [str(value.value) for value in values if isinstance(value, ast.Constant)]

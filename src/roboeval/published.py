@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-import warnings
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable, Iterator
@@ -14,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
 from codebotler.badinput import BadInput, read_text, text_of
+from codebotler.syntaxtree import parse
 from roboeval.records import MAX_ROW, Completion, Key, check_length, name_of, unknown
 from roboeval.suite import Suite
 
@@ -129,9 +129,7 @@ class _Members:
 
 def _assigned(text: str, name: str) -> dict[str, str]:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of odd escapes in texts
-            statements = ast.parse(text).body
+        statements = parse(text).body
     except SyntaxError as error:
         raise BadInput(f"is no Python ({error.msg})", file=name, line=error.lineno) from None
     except (ValueError, RecursionError, MemoryError):

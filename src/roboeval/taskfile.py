@@ -11,6 +11,7 @@ from pathlib import Path
 from codebotler.badinput import BadInput, Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
 from codebotler.skills import SKILLS, SkillTable
+from codebotler.syntaxtree import parse_expression
 from roboeval.suitefile import DrawnTaskFile, ScenarioFile, TaskFile
 from roboeval.task import Accepted, Check, Fact, Requirement, Scenario, Task
 from roboeval.worlds import Description
@@ -207,7 +208,7 @@ class _Reader:
         """Whether a requirement is negated, the name of its check, and the arguments as text."""
         bare = text.strip().removeprefix("not ")
         try:
-            node = ast.parse(bare, mode="eval").body
+            node = parse_expression(bare)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             node = ast.Constant(None)
         negated = bare != text.strip()

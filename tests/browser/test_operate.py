@@ -426,6 +426,7 @@ def test_a_tool_that_is_gone_leaves_nothing_that_looks_alive(tmp_path: Path, ope
         pages = [opened(server, size=size, expecting="ERR_CONNECTION_REFUSED") for size in (DESK, PHONE)]
         for page in pages:
             expect(page.locator(".headline")).to_be_visible()
+            page.wait_for_load_state("networkidle")
         server.end(signal.SIGKILL)
         for page in pages:
             page.wait_for_selector("#popup[aria-hidden=false]")

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import cycle
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -133,14 +134,21 @@ def go_to(room):
 """
 
 
+AROUND = [
+    "say('Hello, I am on my way.'); _task()",
+    "_task(); say('That was no problem at all.')",
+    "_task(); say('It took me 5 minutes. Thank you, and have a nice day.')",
+    "say('Off I go, it is not far.'); _task(); say('Any questions? Just ask!')",
+]
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
     task = plus().tasks[name]
     programs = [program for *_, program in recorded(task)[::7]]
     changed = [
-        f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n"
-        '    say("Hello, I am on my way.")\n    _task()\n'
-        for program in programs
+        f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n    {around}\n"
+        for program, around in zip(programs, cycle(AROUND), strict=False)
     ]
     before = verdicts_on_recorded(name)[::7]
     assert [passes(one) for one in verdicts(changed, task)] == [passes(one) for one in before]

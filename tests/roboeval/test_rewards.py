@@ -1,5 +1,6 @@
 """Rewards: 1 exactly for what passes, nothing for nothing, from any thread and any process."""
 
+import gc
 import logging
 import multiprocessing
 import os
@@ -8,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
 
@@ -115,6 +116,16 @@ def test_it_may_be_called_from_many_threads_at_once() -> None:
     assert told == [[1.0] * 10 + [0.0] * len(NOTHING) + [1.0] * 2] * 12
 
 
+@pytest.fixture
+def uncollected() -> Iterator[None]:
+    """No garbage is collected meanwhile: Python loses an interrupt that comes in a `__del__`."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("uncollected")
 def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
     lanes = warm()
     gate, patience = threading.Event(), 60

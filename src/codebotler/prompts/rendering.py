@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import json
 import re
@@ -16,6 +15,7 @@ from typing import Literal, TypeAlias
 
 from codebotler.program import TASK
 from codebotler.skills import SKILLS, Skill, SkillTable
+from codebotler.syntaxtree import parse
 
 Role: TypeAlias = Literal["system", "user", "assistant"]
 
@@ -201,7 +201,7 @@ def _comment(text: str) -> str:
 
 def _parses(source: str) -> bool:
     try:
-        ast.parse(source)
+        parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True

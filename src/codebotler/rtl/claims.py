@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from codebotler.rtl.clauses import clauses, denies_something, sentences
+from codebotler.rtl.clauses import clauses, sentences
 from codebotler.rtl.clock import TimeOfDay, times_in
 from codebotler.rtl.numerals import numerals
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
+from codebotler.rtl.polarity import Polarity, polarity, without_harmless
 
 
 @dataclass(frozen=True)
@@ -41,12 +42,13 @@ class Number:
         first, the one before. A text that does not name the thing gives all numbers that belong to no other.
         """
         kinds = self._kinds
-        parts = [[*_marks(clause, kinds)] for sentence in sentences(text) for clause in clauses(sentence)]
+        told = [sentence for sentence in sentences(without_harmless(text)) if not sentence.endswith("?")]
+        parts = [[*_marks(clause, kinds)] for sentence in told for clause in clauses(sentence)]
         named = any(kind == 0 for part in parts for kind, _ in part)
         if not named:
             return {n for part in parts if not any(kind for kind, _ in part) for _, ns in part for n in ns}
         found = {n for part in parts for n in _paired(part)}
-        return found or {n for sentence in sentences(text) for n in _paired([*_marks(sentence, kinds)])}
+        return found or {n for sentence in told for n in _paired([*_marks(sentence, kinds)])}
 
     @cached_property
     def _kinds(self) -> tuple[re.Pattern[str], ...]:
@@ -149,7 +151,7 @@ def minutes(time: str) -> TimeOfDay:
 
 @dataclass(frozen=True)
 class Claim:
-    """A text in which something is named in a clause that denies nothing, or in one that denies something.
+    """A text in which something is named in a clause that affirms it, or in one that denies something.
 
     Args:
         pattern: a regex for what is named, found as a whole word.
@@ -165,9 +167,10 @@ class Claim:
         return whole_word(self.pattern)
 
     def matches(self, text: str) -> bool:
-        """Whether some clause names it and denies something, or not, as is wanted."""
+        """Whether some clause names it and denies something, or affirms it, as is wanted."""
+        wanted = Polarity.DENIES if self.denied else Polarity.AFFIRMS
         return any(
-            self.compiled.search(clause) is not None and denies_something(clause) == self.denied
+            self.compiled.search(clause) is not None and polarity(clause) is wanted
             for sentence in sentences(text)
             for clause in clauses(sentence, lists=True)
         )

@@ -1,58 +1,116 @@
-"""Sentences and clauses of a text, and whether a clause denies something."""
+"""Sentences and clauses of a text."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 
-_DENIAL = re.compile(
-    r"\b(?:no|not|none|nobody|nothing|noone|never|neither|nor|without|cannot|cant|dont|doesnt|wont|isnt"
-    r"|declin\w*|refus\w*|reject\w*|turned down|unable|unavailable|absent|missing|lack\w*|busy)\b"
-    r"|n['\u2019]t\b",
-    re.IGNORECASE,
-)
+from codebotler.rtl.polarity import denies_something
+
 _HALF_DAY = re.compile(r"\b([ap])\.\s?m\.?", re.IGNORECASE)
-_END = re.compile(r"[!?;\n]+|\.(?!\d)")
-_JOINT = re.compile(r",(?!\d)|(?<!\d),|\b(?:and|but|while|whereas|however|although|though)\b", re.IGNORECASE)
-_ITEM = re.compile(r"\W*(?:\w[\w']*\W+){0,2}(?:\w[\w']*\W*)?")
+_END = re.compile(r"(?<=\?)(?!\?)|[!;\n]+|\.(?!\d)")
+_JOINT = re.compile(
+    r",(?!\d)|(?<!\d),|\b(?:and|(?<!anything )but|while|whereas|however|although|though)\b", re.IGNORECASE
+)
+_FEW = r"(?:\w[\w']*\W+){0,2}(?:\w[\w']*\W*)?"
+_ITEM = re.compile(rf"\W*(?:(?:in|at|(?:as )?for|from)\s+(?:\w[\w']*\W+)?)?{_FEW}", re.IGNORECASE)
+_PLACE = re.compile(r"\W*(?:in|at|(?:as )?for|from)\b", re.IGNORECASE)
 _VERB = re.compile(
-    r"\b(?:is|are|was|were|am|be|has|have|had|will|would|can|could|should|does|do|did|says?|said|wants?|yes"
+    r"\b(?:is|are|was|were|am|be|has|have|had|will|would|can|could|should|might|does|do|did|says?|said|wants?|yes"
     r"|accept\w*|agree\w*|join\w*|com(?:es?|ing)|lik(?:es?|ing)|needs?|buy|gave|gives?|please)\b|\w['\u2019](?:re|ll|ve|m|d)\b",
     re.IGNORECASE,
 )
+_TAG = re.compile(
+    r",\s{0,3}(?:ok|okay|(?:all )?right|alright|yes|please|fine|got it|sounds good)\s{0,3}\?+\s*$",
+    re.IGNORECASE,
+)
+_PROPOSES = re.compile(
+    r"\W*(?:(?:how|what) about|(?:please )?(?:could|can|would|will) (?:you|we) (?:please )?"
+    r"(?:set|turn|change|put|use|bring|buy|get))\b",
+    re.IGNORECASE,
+)
+_ASIDE = re.compile(
+    r",\s{1,3}(?:which|who|(?:I am|I['\u2019]m) (?:afraid|sorry)|unfortunately|sadly|luckily)\b[^,;:]{0,60},",
+    re.IGNORECASE,
+)
+_THERE = re.compile(r"\s*(?:there|it)\b", re.IGNORECASE)
+_HAS = re.compile(r"\b(?:has|have|had|got|with|contains?)\b", re.IGNORECASE)
+_NO_THING = re.compile(r"\W*no\s+\w+\W*", re.IGNORECASE)
+_ASKED = re.compile(r"\basked\b", re.IGNORECASE)
+_WHETHER = re.compile(r"\b(?:if|whether)\b", re.IGNORECASE)
+_INVERTED = re.compile(
+    r"\W*(?:is|are|was|were|am|did|does|do|will|would|can|could|has|have|had|should|shall|may|who|what|which|when"
+    r"|where|why|how)\b",
+    re.IGNORECASE,
+)
+_IN_VAIN = re.compile(r"\bwould\s+(?:like|love|have\s+(?:liked|loved))\s+to(?=\W{1,3}but\b)", re.IGNORECASE)
 _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 
 def sentences(text: str) -> list[str]:
-    """The sentences of a text; `4 p.m.` and `1.5` end none.
+    """The sentences of a text, each question with its question mark; `4 p.m.` and `1.5` end none.
 
     Args:
         text: any text.
     """
-    return [part for part in _END.split(_HALF_DAY.sub(r"\1m", text)) if part.strip()]
+    return [part for part in _END.split(_HALF_DAY.sub(r"\1m", text)) if part.strip(" \t?")]
 
 
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
-    """The clauses of a sentence: what commas and words such as `but` divide.
+    """The clauses of a sentence: what commas and words such as `but` divide; those that ask end with `?`.
 
     Args:
         sentence: a sentence.
         lists: whether a clause of a few words and without a verb belongs to the next one that is more, or
             else to the one before: `Alice and Bob are in` says of both the same.
     """
-    parts = [part for part in _JOINT.split(sentence) if part.strip()]
+    sentence = _ASIDE.sub(" ", _TAG.sub("", sentence))
+    if _PROPOSES.match(sentence):  # "How about 75 degrees?" tells which
+        sentence = sentence.rstrip("? ")
+    parts = _with_subjects([clause for part in _at_colon(sentence) for clause in _divided(part)])
+    if sentence.rstrip().endswith("?"):
+        parts = [f"{part}?" if _INVERTED.match(part) and part[-1] != "?" else part for part in parts]
     return [*_gathered(parts)] if lists else parts
+
+
+def _divided(sentence: str) -> list[str]:
+    # "She would love to, but is busy" says what she would do, and not what she does.
+    told = _IN_VAIN.sub("might", sentence)
+    return [part for part in _JOINT.split(told) if part.strip()]
+
+
+def _at_colon(sentence: str) -> list[str]:
+    """Both sides of a colon where each says something: `You are not alone: Bob comes`; not `Absent: Bob`."""
+    head, colon, tail = sentence.partition(":")
+    if colon and denies_something(head) and _VERB.search(_JOINT.split(tail)[0]):
+        return [head, tail]
+    return [sentence]
+
+
+def _with_subjects(parts: list[str]) -> list[str]:
+    """The parts, `no stapler` with what has none: `room 3 has paper, but no stapler`."""
+    told: list[str] = []
+    for part in parts:
+        lacks = bool(told) and _NO_THING.fullmatch(part) and _HAS.search(told[-1])
+        told.append(f"{_HAS.split(told[-1])[0]}{part}" if lacks else part)
+    return told
 
 
 def _gathered(parts: list[str]) -> Iterator[str]:
     waiting: list[str] = []
     done: list[str] = []
     for part in parts:
+        if _ASKED.search(part) and part is not parts[-1]:  # what was asked is told by what follows
+            waiting.append(_WHETHER.sub(" ", part))
+            continue
         if _is_item(part):
             waiting.append(part)
             continue
-        if done and _SUBJECT.match(part):  # the names before it belong to what was said before
-            done[-1] = " ".join([done[-1], *waiting])
+        if waiting and part.endswith("?") and _INVERTED.match(part):
+            done.append(" ".join(waiting))  # "Good day, how are you?" asks nothing of the day
+            done.append(part)
+        elif done and _SUBJECT.match(part) and not _belong(waiting, part):
+            done[-1] = " ".join([done[-1], *waiting])  # the names before it belong to what was said before
             done.append(part)
         else:
             done.append(" ".join([*waiting, part]))
@@ -62,16 +120,13 @@ def _gathered(parts: list[str]) -> Iterator[str]:
     yield from done or [" ".join(waiting)]
 
 
+def _belong(waiting: list[str], part: str) -> bool:
+    """Whether few words belong to what follows though that has a subject: `in room 3, there is one`."""
+    asked = any(map(_ASKED.search, waiting))
+    return asked or (bool(waiting) and bool(_PLACE.match(waiting[-1])) and bool(_THERE.match(part)))
+
+
 def _is_item(part: str) -> bool:
     """Whether it is a few words that say nothing by themselves, such as a name."""
     says_something = _SUBJECT.match(part) or _VERB.search(part) or denies_something(part)
     return _ITEM.fullmatch(part) is not None and not says_something
-
-
-def denies_something(clause: str) -> bool:
-    """Whether a clause denies something, by `not`, `nobody`, `declined` and the like.
-
-    Args:
-        clause: a clause.
-    """
-    return _DENIAL.search(clause) is not None

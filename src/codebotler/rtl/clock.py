@@ -28,10 +28,15 @@ _CLOCK = re.compile(
     rf"|{_START}(?P<past>half|(?:a )?quarter) (?P<side>past|to) {_hour('1')}\b{_half('1')}?"
     rf"|{_START}{_hour('2')}[ -](?P<word>thirty|fifteen|forty-five)\b{_half('2')}?"
     rf"|{_START}{_hour('3')}(?:{_half('3')}|\s*o['\u2019]?\s?clock\b{_half('4')}?)"
+    rf"|(?:\b(?:at|is|for|around|about)|:)\s+{_hour('4')}(?=\s*(?:[,;!?)]|\.(?!\d)|$))"
     r"|\b(?P<noon>noon|mid-?day)\b|\b(?P<midnight>midnight)\b",
     re.IGNORECASE,
 )
 _ALONE = re.compile(rf"\s*(?:(?:at|around|about)\s+)?{_hour('')}\s*", re.IGNORECASE)
+_BESIDE = re.compile(
+    r"\b(?:before|after|except|(?:any ?(?:thing|time)|all|everything) but|not)\s+(?:at\s+)?$", re.IGNORECASE
+)
+_NEAR = 30  # characters in which such a word stands
 _DAY = 24 * 60
 
 
@@ -39,15 +44,20 @@ def times_in(text: str) -> list[tuple[TimeOfDay, ...]]:
     """The times of day in a text; of each both readings where it may be in the morning or the afternoon.
 
     `12 pm`, `12:00`, `noon`, `twelve o'clock` and `half past twelve` are times, and so is a text that is no
-    more than an hour.
+    more than an hour; `before 12 pm` names none.
 
     Args:
         text: any text.
     """
-    told = ". ".join(sentences(text))
+    told = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
     if alone := _ALONE.fullmatch(told):
         return _readings(alone["hour"], 0, None)
-    return [time for match in _CLOCK.finditer(told) for time in _of(match)]
+    named = [match for match in _CLOCK.finditer(told) if not _is_beside(match)]
+    return [time for match in named for time in _of(match)]
+
+
+def _is_beside(match: re.Match[str]) -> bool:
+    return _BESIDE.search(match.string, max(0, match.start() - _NEAR), match.start()) is not None
 
 
 def _of(match: re.Match[str]) -> list[tuple[TimeOfDay, ...]]:
@@ -55,7 +65,7 @@ def _of(match: re.Match[str]) -> list[tuple[TimeOfDay, ...]]:
         return [(_DAY // 2,)]
     if match["midnight"]:
         return [(0, _DAY)]
-    hour = next(match[name] for name in ("hour", "hour1", "hour2", "hour3") if match[name])
+    hour = next(match[name] for name in ("hour", "hour1", "hour2", "hour3", "hour4") if match[name])
     half = next((match[name] for name in ("half", "half1", "half2", "half3", "half4") if match[name]), None)
     minute = int(match["minute"] or 0)
     if match["past"]:

@@ -31,6 +31,12 @@ _PRONOUN = re.compile(
 )
 _OF = re.compile(r"(?:\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$", re.IGNORECASE)
 _NOT = re.compile(r"(?:\bnot|n['\u2019]t)\s+$", re.IGNORECASE)
+_ROUGHLY = re.compile(
+    r"\b(?:at (?:least|most)|(?:more|less|fewer|other) than|almost|nearly|up to"
+    r"|(?:do not|don['\u2019]t|never) (?:buy|get|need|bring)(?: \w+)?)\s+$",
+    re.IGNORECASE,
+)
+_MORE = re.compile(r"\s*(?:dozen|hundred|thousand|or (?:so|more|less|fewer))\b", re.IGNORECASE)
 _TOGETHER = re.compile(r"\s*(?:or|to|-|\u2013|,|/|maybe|perhaps)?\s*(?:or|maybe|perhaps)?\s*", re.IGNORECASE)
 
 
@@ -38,7 +44,7 @@ def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
     """The numbers in a text, as positions and values; those between which it leaves the choice are together.
 
     `no`, `nobody` and the like are 0. Of `2 of 4` only 2 is told; `one` in `the one` is no number, and what
-    is `not 3` has none.
+    is `not 3` or `at least 3` has none.
 
     Args:
         text: any text.
@@ -63,7 +69,9 @@ def _is_none(match: re.Match[str], text: str) -> bool:
     before = text[max(0, match.start() - _NEAR) : match.start()]
     if match["word"] and match["word"].lower() == "one" and _PRONOUN.search(before):
         return True
-    return not match["nothing"] and (_OF.search(before) or _NOT.search(before)) is not None
+    if _MORE.match(text, match.end()):
+        return True
+    return not match["nothing"] and any(words.search(before) for words in (_OF, _NOT, _ROUGHLY))
 
 
 def _value(match: re.Match[str]) -> float:

@@ -1,10 +1,9 @@
-"""From text to Formula: `ast.parse` reads it, nothing is ever evaluated."""
+"""From text to Formula: Python's own parser reads it, nothing is ever evaluated."""
 
 from __future__ import annotations
 
 import ast
 import re
-import warnings
 from dataclasses import replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, get_args
@@ -29,6 +28,7 @@ from codebotler.rtl.formula import (
     Words,
 )
 from codebotler.skills import SKILLS
+from codebotler.syntaxtree import parse_expression
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -103,10 +103,7 @@ class _Parser:
         if not self.text:
             raise RtlSyntaxError(1, "expected a formula, found nothing")
         try:
-            with warnings.catch_warnings():
-                # "\d" is no escape of Python's and means what it looks like.
-                warnings.simplefilter("ignore")
-                return ast.parse(self.text, mode="eval").body
+            return parse_expression(self.text)
         except SyntaxError as error:
             column = self.indent + max(error.offset or 1, 1)
             raise RtlSyntaxError(column, f"this cannot be read ({error.msg})") from None

@@ -1,0 +1,80 @@
+"""Whether a clause affirms what it names, denies it, or leaves it open."""
+
+from __future__ import annotations
+
+import re
+from enum import Enum
+
+_WORDS = r"(?:[\w'\u2019]+\s+)"
+_NOT = r"(?:not|never|cannot|cant|dont|doesnt|wont|isnt|\w+n['\u2019]t)"
+
+# Nothing is denied by these, whatever their words: they are taken out of a clause before it is read.
+_HARMLESS = re.compile(
+    r"\bno (?:problem|worr(?:y|ies)|doubt|trouble|questions?|objections?|hurry|rush|matter|wonder|need)\b"
+    r"|\b(?:no|not) (?:more|less|fewer|later|earlier|sooner|before|after)\b(?: than\b)?|\bnot (?:only|just)\b"
+    r"|\bnot to (?:interrupt|disturb|bother)\b|\bnever ?mind\b|\bwhy not\b"
+    r"|\bwithout (?:a )?(?:doubt|problems?|delay|hesitation|further ado)\b"
+    rf"|\b{_NOT} (?:even )?(?:worry|mind|forget|hesitate|panic|be (?:late|afraid|shy))\b"
+    r"|\b(?:can(?:no|['\u2019])t|can not) wait\b|\bcould(?:n['\u2019]t| not) be (?:happier|better)\b"
+    rf"|\b{_NOT} miss\b|\b(?:nobody|no ?one|nothing) else\b"
+    # What is denied twice is not denied.
+    rf"|\b(?:no|nothing|nobody|no ?one|none|neither|nowhere|{_NOT})\s+{_WORDS}{{0,4}}"
+    r"(?:lack\w*|miss(?:es|ing)|absent|alone|declin\w*|refus\w*|without)\b"
+    r"|\b(?:lacking|missing|lacks?|without)\W{1,3}(?:nothing|none|no ?one|nobody)\b",
+    re.IGNORECASE,
+)
+_DENIAL = re.compile(
+    r"\b(?:no|not|none|nobody|nothing|noone|never|neither|nor|nowhere|without|cannot|cant|dont|doesnt|wont"
+    r"|isnt|declin\w*|refus\w*|reject\w*|turn(?:s|ed|ing) (?:\w+ ){0,4}down|unable|unavailable|absent|missing"
+    r"|lack\w*|negative|busy|alone|empty|other plans|(?:run|ran|is|are|was|were) out|will pass)\b"
+    r"|n['\u2019]t\b",
+    re.IGNORECASE,
+)
+_OPEN = re.compile(
+    r"\b(?:maybe|perhaps|possibly|probably|presumably|might|whether|if|unless|unclear|unknown|uncertain|unsure"
+    r"|undecided|almost|nearly|(?:guess|wonder)(?:es|s|ing)?|another time|next (?:time|week))\b"
+    r"|\bmay\b(?! (?:i|we|want|need)\b)|\bhop(?:e|es|ing)\b(?!.{0,60}\b(?:you|your|every\w+|all)\b)"
+    rf"|\b{_NOT} (?:yet )?(?:be )?(?:know|knows|sure|certain|clear|decided?|told|tell)\b"
+    r"|\bno (?:idea|answer)\b"
+    # Whom somebody asked has not answered yet.
+    r"|\basked(?:\s+(?!said|declin|refus|accept|agree|is|are|will|has|have|had|does|did|would|want|lack|need)"
+    r"\w+){1,4}\W*$",
+    re.IGNORECASE,
+)
+
+
+class Polarity(Enum):
+    """What a clause does with what it names."""
+
+    AFFIRMS = "affirms"
+    DENIES = "denies"
+    OPEN = "leaves open"
+
+
+def polarity(clause: str) -> Polarity:
+    """What a clause does: deny (`not`, `nobody`, `declined`), leave open (a question, `maybe`), or affirm.
+
+    Args:
+        clause: a clause; the last one of a question ends with `?`.
+    """
+    if clause.rstrip().endswith("?") or _OPEN.search(clause):
+        return Polarity.OPEN
+    return Polarity.DENIES if denies_something(clause) else Polarity.AFFIRMS
+
+
+def denies_something(clause: str) -> bool:
+    """Whether a clause holds a word that denies, and not as part of a phrase such as `no problem`.
+
+    Args:
+        clause: a clause.
+    """
+    return _DENIAL.search(without_harmless(clause)) is not None
+
+
+def without_harmless(text: str) -> str:
+    """A text without such phrases as hold a word that denies, but deny nothing.
+
+    Args:
+        text: any text.
+    """
+    return _HARMLESS.sub(" ", text)
