@@ -144,8 +144,9 @@ class Reader:
             text = block.text.replace(MODEL, self.url)
             for told, less in LESS.get(page, []):
                 text = text.replace(told, less)
-            shell = ["bash", "-e", "-o", "pipefail", "-c"]
-            self.run([*shell, text] if block.language == "sh" else [sys.executable, "-c", text])
+            # ":" lets the shell stay until the last command has ended, which may ask what shell it is.
+            shell = ["bash", "-e", "-o", "pipefail", "-c", f"{text}:"]
+            self.run(shell if block.language == "sh" else [sys.executable, "-c", text])
 
     def run(self, command: list[str]) -> str:
         path = os.pathsep.join([str(self.folder / "site"), os.environ.get("PYTHONPATH", "")])
