@@ -121,11 +121,12 @@ $(VENV)/tested: $(VENV)/installed
 	@$(PIP) install --constraint constraints.txt --group test | { $(DOTS); }
 	@touch $@
 
+# Of what is installed for one test file, most is never imported: --no-compile saves minutes.
 $(TORCH_VENV)/tested: $(SOURCES) constraints-transformers.txt
 	@echo "making an environment with torch in $(TORCH_VENV), which takes some minutes"
 	@$(PYTHON) -m venv --clear $(TORCH_VENV)
 	@$(TORCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(TORCH_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
+	@$(TORCH_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
 		--constraint constraints-transformers.txt "$(PACKAGE)[transformers]" --group test | { $(DOTS); }
 	@touch $@
 
@@ -133,7 +134,7 @@ $(PYROBOSIM_VENV)/tested: $(SOURCES) constraints-pyrobosim.txt
 	@echo "making an environment with pyrobosim in $(PYROBOSIM_VENV), which takes a minute"
 	@$(PYTHON) -m venv --clear $(PYROBOSIM_VENV)
 	@$(PYROBOSIM_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(PYROBOSIM_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
+	@$(PYROBOSIM_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
 		--constraint constraints-pyrobosim.txt "$(PACKAGE)[pyrobosim]" --group test | { $(DOTS); }
 	@touch $@
 
@@ -141,7 +142,7 @@ $(EXTRAS_VENV)/tested: $(SOURCES) constraints-extras.txt
 	@echo "making an environment with Inspect and Ray in $(EXTRAS_VENV), which takes a minute"
 	@$(PYTHON) -m venv --clear $(EXTRAS_VENV)
 	@$(EXTRAS_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(EXTRAS_VENV)/bin/python -m pip --disable-pip-version-check install --constraint constraints.txt \
+	@$(EXTRAS_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
 		--constraint constraints-extras.txt "$(PACKAGE)[inspect,ray]" --group test | { $(DOTS); }
 	@touch $@
 

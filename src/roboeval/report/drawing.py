@@ -112,7 +112,7 @@ def written(figure: Figure, kind: str) -> bytes:
     }
     if figure.get_layout_engine() is not None:  # once, for all formats: each time moves things a little
         figure.draw_without_rendering()
-        figure.set_layout_engine("none")
+        figure.set_layout_engine(None)  # "none" would leave one behind, for which all is drawn twice
     content = io.BytesIO()
     figure.savefig(content, format=kind, dpi=300 if kind == "png" else 72, metadata=nothing[kind])
     return _slim(content.getvalue()) if kind == "svg" else content.getvalue()
