@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import platform
+import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -224,7 +225,9 @@ def own_lane() -> Lane:
 def _imported() -> Any:  # noqa: ANN401 - the extra has no types here
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # else it calls home
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # its warning about accelerators
-    if not _is_anywhere():
+    if _is_here_only():
+        if "ray" in sys.modules and os.environ.get(LOOPBACK_ONLY) != "0":
+            raise BadInput(f"Ray would let other machines in: set {LOOPBACK_ONLY}=0 before it is imported")
         os.environ.setdefault(LOOPBACK_ONLY, "0")
     try:
         import ray  # noqa: PLC0415 - an extra, which starts slowly
@@ -234,13 +237,16 @@ def _imported() -> Any:  # noqa: ANN401 - the extra has no types here
 
 
 LOOPBACK_ONLY = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
-"""Set to 0 before Ray is imported, it has a cluster of one machine listen there only, on any system."""
+"""Set to 0 before Ray is imported, it has a cluster of one machine listen there only, and looks for one
+there. Else Ray takes this machine's address in the network for 127.0.0.1, and waits for ever."""
 
 
-def _is_anywhere() -> bool:
-    """Whether there is a cluster to be part of: one that is named, or one that runs on this machine."""
+def _is_here_only() -> bool:
+    """Whether the cluster is one that only this machine reaches, or one that is yet to be started."""
+    if address := os.environ.get("RAY_ADDRESS"):
+        return address.removeprefix("ray://").startswith(("127.", "localhost:", "[::1]"))
     here = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108 - Ray's own
-    return "RAY_ADDRESS" in os.environ or here.exists()
+    return not here.exists()
 
 
 def _connect(ray: Any) -> None:  # noqa: ANN401 - a module without types
@@ -252,7 +258,10 @@ def _connect(ray: Any) -> None:  # noqa: ANN401 - a module without types
         if address:
             or_locked = "or it wants its token in RAY_AUTH_TOKEN, with RAY_AUTH_MODE=token"
             raise BadInput(f"RAY_ADDRESS: there is no Ray cluster at {address}, {or_locked}") from None
-        ray.init(address="local", include_dashboard=False, **quiet)
+        try:
+            ray.init(address="local", include_dashboard=False, **quiet)
+        except OSError as error:  # such as a folder in RAY_TMPDIR whose name is too long for sockets
+            raise BadInput(f"Ray cannot be started here: {error}") from None
 
 
 def _fetched(ray: Any, reference: Any) -> Told:  # noqa: ANN401 - a module without types
