@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -70,23 +71,30 @@ Mark = tuple[int | None, tuple[float, ...]]
 
 def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
     """The things and numbers in a text, in their order; no number is part of the name of a thing."""
-    things = [
-        (match.start(), match.end(), kind)
-        for kind, regex in enumerate(kinds)
-        for match in regex.finditer(text)
-    ]
-    things = [one for one in things if not any(_covers(other, one) for other in things)]
+    things = [*_things(text, kinds)]
+    starts = [start for start, _, _ in things]
     found: list[tuple[int, Mark]] = [(start, (kind, ())) for start, _, kind in things]
     for start, end, numbers in numerals(text):
-        if not any(begin < end and start < stop for begin, stop, _ in things):
+        before = bisect_left(
+            starts, end
+        )  # things that begin before it ends; the last of them reaches farthest
+        if not before or things[before - 1][1] <= start:
             found.append((start, (None, numbers)))
     yield from (mark for _, mark in sorted(found, key=lambda one: one[0]))
 
 
-def _covers(one: tuple[int, int, int], other: tuple[int, int, int]) -> bool:
-    """Whether the name of one thing holds that of another in it, or is the same and stands first."""
-    holds = one[0] <= other[0] and other[1] <= one[1]
-    return holds and (one[:2] != other[:2] or one[2] < other[2])
+def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int, int, int]]:
+    """Where which thing is named; of names within others, or of equal ones, the longest that stands first."""
+    named = [
+        (match.start(), -match.end(), kind)
+        for kind, regex in enumerate(kinds)
+        for match in regex.finditer(text)
+    ]
+    reached = -1
+    for start, end, kind in sorted(named):
+        if -end > reached:
+            reached = -end
+            yield start, -end, kind
 
 
 def _paired(marks: list[Mark]) -> Iterator[float]:

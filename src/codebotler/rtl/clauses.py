@@ -53,7 +53,7 @@ def sentences(text: str) -> list[str]:
     Args:
         text: any text.
     """
-    return [part for part in _END.split(_HALF_DAY.sub(r"\1m", text)) if part.strip(" \t?")]
+    return [part for part in _END.split(_HALF_DAY.sub(r"\1m", text)) if part.strip().strip("?")]
 
 
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
@@ -99,8 +99,8 @@ def _with_subjects(parts: list[str]) -> list[str]:
 def _gathered(parts: list[str]) -> Iterator[str]:
     waiting: list[str] = []
     done: list[str] = []
-    for part in parts:
-        if _ASKED.search(part) and part is not parts[-1]:  # what was asked is told by what follows
+    for number, part in enumerate(parts, start=1):
+        if _ASKED.search(part) and number < len(parts):  # what was asked is told by what follows
             waiting.append(_WHETHER.sub(" ", part))
             continue
         if _is_item(part):
