@@ -50,6 +50,17 @@ def test_a_number_stands_with_its_thing(text: str, given: set[int]) -> None:
         assert Number(number, "savory", ("sweet", "office"), other=True).matches(text) == is_other
 
 
+def test_of_names_in_names_the_longest_counts() -> None:
+    other = Number(0, "tea", ("iced tea", "tea"))
+    assert other.given("2 iced teas, 3 teas") == {3}
+    assert other.given("room 4 tea") == {4}
+    assert Number(0, "room 4", ("room",)).given("2 in room 4, 3 rooms") == {2}
+
+
+def test_a_long_text_is_read_to_its_end() -> None:
+    assert Number(0, "tea", ("room",)).given("in a room with tea, " * 5_000 + "2 teas") == {2}
+
+
 @pytest.mark.parametrize(
     ("text", "given"),
     [

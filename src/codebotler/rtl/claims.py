@@ -75,9 +75,7 @@ def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
     starts = [start for start, _, _ in things]
     found: list[tuple[int, Mark]] = [(start, (kind, ())) for start, _, kind in things]
     for start, end, numbers in numerals(text):
-        before = bisect_left(
-            starts, end
-        )  # things that begin before it ends; the last of them reaches farthest
+        before = bisect_left(starts, end)  # of those that begin before it ends, the last reaches farthest
         if not before or things[before - 1][1] <= start:
             found.append((start, (None, numbers)))
     yield from (mark for _, mark in sorted(found, key=lambda one: one[0]))
