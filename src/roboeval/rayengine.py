@@ -99,7 +99,7 @@ class Cluster:
         most = self._workers or AHEAD * self._cores()
         while len(shards.running) < most and len(waiting) < MOST_AHEAD:
             read = False
-            for key in islice(remaining, shards.size(most)):
+            for key in islice(remaining, min(shards.size(most), MOST_AHEAD - len(waiting))):
                 read = True
                 named = name(key)
                 waiting.append(named)

@@ -29,8 +29,8 @@ from roboeval.verdicts import evaluate
 
 # Read when Ray is imported.
 os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0123456789abcdef" * 4, LOOPBACK_ONLY: "0"}
-ray = pytest.importorskip("ray")
-cluster_utils = pytest.importorskip("ray.cluster_utils")
+ray = pytest.importorskip("ray", reason="Ray is an extra")
+cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is an extra")
 
 HERE = "127.0.0.1"
 
@@ -198,11 +198,11 @@ def test_keys_are_read_as_they_are_needed_and_equal_ones_are_one_call() -> None:
         )
         first = [next(results) for _ in range(50)]
         assert [key for key, _ in first] == list(range(50))
-        assert len(read) <= 50 + MOST_AHEAD + LARGEST
+        assert len(read) <= 50 + MOST_AHEAD
         more = [next(results) for _ in range(6000)]
         del results
     assert more[2950:3000] == first  # the very same calls
-    assert len(read) <= 6050 + MOST_AHEAD + LARGEST
+    assert len(read) <= 6050 + MOST_AHEAD
 
 
 @pytest.mark.usefixtures("nodes")

@@ -22,6 +22,7 @@ from codebotler.options import (
 )
 from roboeval.commands.judging import evaluate
 from roboeval.commands.options import (
+    IsolationOption,
     JsonOption,
     SuiteOption,
     TasksOption,
@@ -99,9 +100,7 @@ def run(
     timeout: TimeoutOption = 60.0,
     base_url: BaseUrlOption = None,
     workers: WorkersOption = None,
-    require_isolation: Annotated[
-        bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
-    ] = False,
+    require_isolation: IsolationOption = False,
     with_report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write the report, to the folder report of the run.")
     ] = True,

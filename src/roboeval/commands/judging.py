@@ -12,6 +12,7 @@ from codebotler.cli import STOPPED
 from roboeval.commands.options import (
     AblationOption,
     EngineOption,
+    IsolationOption,
     JsonOption,
     RunArgument,
     SuiteOption,
@@ -53,9 +54,7 @@ def evaluate(
         int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
     ] = None,
     engine: EngineOption = "local",
-    require_isolation: Annotated[
-        bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
-    ] = False,
+    require_isolation: IsolationOption = False,
     json: JsonOption = False,
 ) -> None:
     """Say of every completion whether it does what was asked."""

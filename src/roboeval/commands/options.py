@@ -38,6 +38,9 @@ EngineOption = Annotated[
 WorkersOption = Annotated[
     int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
 ]
+IsolationOption = Annotated[
+    bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
