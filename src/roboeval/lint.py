@@ -7,6 +7,7 @@ then with any. Only a text unlike all samples, or an option that is no text, cou
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -50,11 +51,16 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
 _MOST_DRAWN = 6
 """In how many worlds that require different things the logic of drawn ones is looked at."""
 
+_MOST_ALIKE = 4
+"""How many of the requirements that one line of `require` makes by its `for` the logic looks at."""
+
 
 def _of_drawn(places: Sequence[_Place]) -> Iterator[Finding]:
     """Findings in drawn worlds, of which many require the same; what is implied is so in all looked at.
 
     That somebody is absent says nothing there, since the requirements are computed from who is present.
+    Of requirements that differ only in what a `for` names, such as fifteen times of day, a few stand for all:
+    the texts that tell all of them apart are more than could be tried.
     """
     different = [*{frozenset(r.formula for r in p.scenario.require): p for p in reversed(places)}.values()]
     seen: set[str] = set()
@@ -65,7 +71,7 @@ def _of_drawn(places: Sequence[_Place]) -> Iterator[Finding]:
                 yield from place.dead(requirement)
     implied: dict[int | None, list[Finding]] = {}
     needed: set[int | None] = set()
-    for place in different[::-1][:_MOST_DRAWN]:
+    for place in map(_with_few_alike, different[::-1][:_MOST_DRAWN]):
         found = [*place.logic()]
         yield from (one for one in found if one.kind != "implied")
         subjects = {one.subject for one in found if one.kind == "implied"}
@@ -74,6 +80,14 @@ def _of_drawn(places: Sequence[_Place]) -> Iterator[Finding]:
             if one.kind == "implied":
                 implied.setdefault(one.line, []).append(one)
     yield from (several[0] for line, several in implied.items() if line not in needed)
+
+
+def _with_few_alike(place: _Place) -> _Place:
+    alike: defaultdict[int | None, list[Requirement]] = defaultdict(list)
+    for requirement in place.scenario.require:
+        alike[requirement.line].append(requirement)
+    few = tuple(one for several in alike.values() for one in several[:_MOST_ALIKE])
+    return replace(place, scenario=replace(place.scenario, require=few))
 
 
 # --- the task as a whole
