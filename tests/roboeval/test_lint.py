@@ -460,6 +460,44 @@ def test_a_new_task_leaves_programs_that_are_recorded_for_it(tmp_path: Path) -> 
     assert [*tmp_path.glob("recorded/*/*")] == [recorded]
 
 
+# --- drawn worlds
+
+NAMES = [f"{letter}am" for letter in "bcdfghjklmnprtwz"]
+DRAWN = f"""
+name: Hello
+summary: Greet everybody by name.
+prompts: [Say hello to everybody by name.]
+worlds:
+  robot: hall
+  rooms: [lab, hall]
+  people: {{pat: {{in: [lab, nowhere]}}}}
+let:
+  names: "{NAMES}"
+checks:
+  greets(name):
+    category: SayAtLocation
+    rtl: tr.Exists(say("{{name}}"))
+  may_choose(name):
+    category: AskAtLocation
+    rtl: tr.Exists(mention("{{name}}"))
+  speaks:
+    category: SayAtLocation
+    rtl: tr.Exists(say("am"))
+require:
+  - greets(n) for n in names
+  - may_choose(n) for n in names
+  - speaks
+"""
+
+
+def test_of_requirements_that_one_line_makes_a_few_stand_for_all(tmp_path: Path) -> None:
+    (tmp_path / "tasks").mkdir()
+    (tmp_path / "suite.yaml").write_text("name: mine\nversion: 1\nworlds: 2\nseed: 1\n")
+    (tmp_path / "tasks" / "Hello.yaml").write_text(DRAWN)
+    findings = [one for one in lint(load_suite(str(tmp_path)).task("Hello"), []) if one.kind != "untripped"]
+    assert names(findings) == ["implied: speaks"]
+
+
 # --- the paper's suite
 
 
