@@ -1,5 +1,6 @@
 """The suite `plus`: its tasks judge as their instructions ask, and what is beside that changes nothing."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import cycle
@@ -10,12 +11,13 @@ from typing import Any
 import pytest
 import yaml
 
-from codebotler.models.recorded import NAMES, recorded_model
 from codebotler.simulator.engine import run
 from codebotler.world import World
+from roboeval.lint import lint
 from roboeval.mutation.variants import variants
 from roboeval.suite import Suite, Task, load_suite
 from roboeval.taxonomy import Verdict
+from roboeval.trials import Verdicts, recorded_programs, recorded_replies, tried
 from roboeval.verdicts import judge
 
 HERE = Path(__file__).parent
@@ -37,26 +39,14 @@ def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None)
     return [[judge(next(outcomes), scenario) for scenario in scenarios] for _ in programs]
 
 
-def passes(several: list[Verdict]) -> bool:
+def passes(several: Verdicts) -> bool:
     return all(verdict.satisfied for verdict in several)
 
 
-def recorded(task: Task) -> list[tuple[str, bool, str]]:
-    """The recorded programs of a task: what each is, whether it is meant to be right, and its text."""
-    replies = [recorded_model(name).replies for name in NAMES]
-    return [
-        (reply.about, reply.fails is None, reply.program)
-        for one in replies
-        for prompt in task.prompts
-        for reply in one.get(prompt, ())
-    ]
-
-
 @cache
-def verdicts_on_recorded(name: str) -> list[list[Verdict]]:
-    """How the recorded programs of a task do."""
-    task = plus().tasks[name]
-    return verdicts([program for *_, program in recorded(task)], task)
+def verdicts_on_recorded(name: str) -> Sequence[Verdicts]:
+    """How the programs that are recorded for a task do."""
+    return tried(plus().tasks[name], plus(), workers=2)
 
 
 def test_the_suite_of_the_paper_is_what_it_was() -> None:
@@ -102,17 +92,21 @@ OTHERWISE = {
 @pytest.mark.parametrize("name", TASKS)
 def test_recorded_programs_are_judged_as_they_are_meant(name: str) -> None:
     task = plus().tasks[name]
-    programs, judged = recorded(task), verdicts_on_recorded(name)
     wrong = [
         (
-            about,
+            reply.about,
             [(v.world, v.outcome.error, [r.text for r in v.failed]) for v in several if not v.satisfied][:2],
         )
-        for (about, is_right, _), several in zip(programs, judged, strict=True)
-        if passes(several) != (is_right if about not in OTHERWISE else not is_right)
-        or (about in OTHERWISE and passes(several) != OTHERWISE[about])
+        for reply, several in zip(recorded_replies(task), verdicts_on_recorded(name), strict=True)
+        if passes(several) != OTHERWISE.get(reply.about, reply.fails is None)
+        or OTHERWISE.get(reply.about) == (reply.fails is None)
     ]
     assert wrong == []
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_the_linter_finds_nothing(name: str) -> None:
+    assert lint(plus().tasks[name], verdicts_on_recorded(name)) == []
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -145,7 +139,7 @@ AROUND = [
 @pytest.mark.parametrize("name", TASKS)
 def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
     task = plus().tasks[name]
-    programs = [program for *_, program in recorded(task)[::7]]
+    programs = recorded_programs(task)[::7]
     changed = [
         f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n    {around}\n"
         for program, around in zip(programs, cycle(AROUND), strict=False)
@@ -157,8 +151,9 @@ def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: 
 @pytest.mark.parametrize("name", TASKS)
 def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
     task = plus().tasks[name]
-    programs = [program for *_, program in recorded(task)]
-    right = [p for p, one in zip(programs, verdicts_on_recorded(name), strict=True) if passes(one)][::6]
+    right = [
+        p for p, one in zip(recorded_programs(task), verdicts_on_recorded(name), strict=True) if passes(one)
+    ][::6]
     assert right
     random = Random(name)
     worlds = [
@@ -173,8 +168,7 @@ def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
     other = plus().with_worlds(40, 77)
     task = other.tasks[name]
     assert {s.world for s in task.scenarios} != {s.world for s in plus().tasks[name].scenarios}
-    programs = recorded(task)
-    chosen = programs[::9]
-    judged = verdicts([program for *_, program in chosen], task)
-    for (about, is_right, _), several in zip(chosen, judged, strict=True):
-        assert passes(several) == OTHERWISE.get(about, is_right), about
+    chosen = recorded_replies(task)[::9]
+    judged = verdicts([reply.program for reply in chosen], task)
+    for reply, several in zip(chosen, judged, strict=True):
+        assert passes(several) == OTHERWISE.get(reply.about, reply.fails is None), reply.about

@@ -85,9 +85,9 @@ with Cluster() as cluster:
     import psutil  # which comes with it
     print(list(cluster.map_distinct(lambda lane, key: key, [1, 2, 1], name=lambda key: b"%d" % key)))
     print([node["NodeManagerAddress"] for node in ray.nodes()])
-    names = [(p.name(), [c.laddr.ip for c in p.net_connections("tcp") if c.status == "LISTEN"])
-             for p in psutil.Process().children(recursive=True)]
-    print({ip.removeprefix("::ffff:") for _, ips in names for ip in ips})
+    ours = {process.pid for process in psutil.Process().children(recursive=True)}
+    sockets = [one for one in psutil.net_connections("tcp") if one.pid in ours and one.status == "LISTEN"]
+    print({one.laddr.ip.removeprefix("::ffff:") for one in sockets})
 print(ray.is_initialized())
 """
 

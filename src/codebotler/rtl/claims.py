@@ -6,7 +6,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from codebotler.rtl.clauses import clauses, sentences
 from codebotler.rtl.clock import TimeOfDay, times_in
@@ -175,11 +175,14 @@ class Claim:
     def matches(self, text: str) -> bool:
         """Whether some clause names it and denies something, or affirms it, as is wanted."""
         wanted = Polarity.DENIES if self.denied else Polarity.AFFIRMS
-        return any(
-            self.compiled.search(clause) is not None and polarity(clause) is wanted
-            for sentence in sentences(text)
-            for clause in clauses(sentence, lists=True)
-        )
+        return any(said is wanted and self.compiled.search(clause) is not None for clause, said in _told(text))
 
     def __str__(self) -> str:
         return f"{'denies' if self.denied else 'affirms'}({quote(self.pattern)})"
+
+
+@lru_cache(maxsize=64)  # what a robot says is mostly looked at by several checks, one after the other
+def _told(text: str) -> tuple[tuple[str, Polarity], ...]:
+    """The clauses of a text, and what each does with what it names."""
+    parts = (clause for sentence in sentences(text) for clause in clauses(sentence, lists=True))
+    return tuple((clause, polarity(clause)) for clause in parts)
