@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from importlib import import_module
@@ -20,6 +21,7 @@ from codebotler.simulator.robot import found_in
 
 _MOST_SAMPLES = 4
 _MOST_SUBSETS = 400
+_MOST_ALIKE = 2
 _LONGEST = 10_000
 
 
@@ -60,7 +62,10 @@ def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
     words = [*dict.fromkeys([*chain.from_iterable(groups), *claims])]
     whole = [word for word in words if word]
     hidden = [f"x{word}x" for word in whole]
-    pairs = (f"{one} {other}" for one, other in product([*whole, *hidden], repeat=2))
+    paired = _told_apart(whole, texts)
+    pairs = (
+        f"{one} {other}" for one, other in product([*paired, *(f"x{word}x" for word in paired)], repeat=2)
+    )
     sizes = range(3, len(groups) + 1)
     subsets = chain.from_iterable(
         combinations([group[0] for group in groups], size) for size in reversed(sizes)
@@ -75,6 +80,20 @@ def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
     wide = (form for word in words for form in (f" {word}", f"{word} ", f" {word} "))
     every = chain(["", "x"], words, hidden, spaced, pairs, several, joined, wide)
     return tuple(dict.fromkeys(text for text in every if outer or text == text.strip()))
+
+
+def _told_apart(words: Iterable[str], texts: Sequence[Text]) -> list[str]:
+    """Of words that match alike, the texts and all that stands in these, only a few."""
+    regexes = (Regex(pattern) for text in texts for pattern in patterns(text))
+    wanted = [*dict.fromkeys([*chain.from_iterable(map(_parts, texts)), *regexes])]
+    alike: defaultdict[tuple[bool, ...], list[str]] = defaultdict(list)
+    for word in words:
+        alike[tuple([text.matches(word) for text in wanted])].append(word)
+    return [word for several in alike.values() for word in several[:_MOST_ALIKE]]
+
+
+def _parts(text: Text) -> Sequence[Text]:
+    return text.parts if isinstance(text, Words) else (text,)
 
 
 def _joined(parts: Sequence[Text], *, outer: bool) -> Iterator[str]:

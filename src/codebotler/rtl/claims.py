@@ -175,7 +175,9 @@ class Claim:
     def matches(self, text: str) -> bool:
         """Whether some clause names it and denies something, or affirms it, as is wanted."""
         wanted = Polarity.DENIES if self.denied else Polarity.AFFIRMS
-        return any(said is wanted and self.compiled.search(clause) is not None for clause, said in _told(text))
+        return any(
+            said is wanted and self.compiled.search(clause) is not None for clause, said in _told(text)
+        )
 
     def __str__(self) -> str:
         return f"{'denies' if self.denied else 'affirms'}({quote(self.pattern)})"
