@@ -17,7 +17,7 @@ _NEAR = 60  # characters within which words belong together; without an end, lon
 
 _UNITS = "|".join(_ONES[1:10])
 _NUMBER = re.compile(
-    rf"(?P<digits>(?<![\w.,:/-])-?\d+(?:\.\d+)?(?![\w:]|\.\d))"
+    rf"(?:(?<![\w.,:/-])|(?<=\bx))(?P<digits>-?\d+(?:\.\d+)?)(?!(?!x\b)[\w:]|\.\d)"
     rf"|\b(?P<tens>{'|'.join(_TENS)})(?:[ -](?P<units>{_UNITS}))?\b"
     rf"|\b(?P<hundred>(?:(?:a|one) )?hundred)\b"
     rf"|\b(?P<nothing>{_NOTHING})\b"
@@ -29,7 +29,12 @@ _PRONOUN = re.compile(
     r"\b(?:any|some|every|each|which|this|that|the|another|other|sweet|savory|savoury|right|last|first)[ -]$",
     re.IGNORECASE,
 )
-_OF = re.compile(r"(?:\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$", re.IGNORECASE)
+# "2 of 4" tells 2, and "a total of 2" tells it, too; "2 of a total of 4" does not tell 4.
+_OF = re.compile(
+    r"(?:(?:(?<!\btotal )|(?<=\bof a total )|(?<=\bof the total ))"
+    r"\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$",
+    re.IGNORECASE,
+)
 _NOT = re.compile(r"(?:\bnot|n['\u2019]t)\s+$", re.IGNORECASE)
 _ROUGHLY = re.compile(
     r"\b(?:at (?:least|most)|(?:more|less|fewer|other) than|almost|nearly|up to"
@@ -43,8 +48,8 @@ _TOGETHER = re.compile(r"\s*(?:or|to|-|\u2013|,|/|maybe|perhaps)?\s*(?:or|maybe|
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
     """The numbers in a text, as positions and values; those between which it leaves the choice are together.
 
-    `no`, `nobody` and the like are 0. Of `2 of 4` only 2 is told; `one` in `the one` is no number, and what
-    is `not 3` or `at least 3` has none.
+    `no`, `nobody` and the like are 0; `x2` and `2x` are 2. Of `2 of 4` only 2 is told, of `a total of 2`
+    the 2; `one` in `the one` is no number, and what is `not 3` or `at least 3` has none.
 
     Args:
         text: any text.

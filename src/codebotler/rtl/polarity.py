@@ -14,7 +14,7 @@ _HARMLESS = re.compile(
     r"|\b(?:no|not) (?:more|less|fewer|later|earlier|sooner|before|after)\b(?: than\b)?|\bnot (?:only|just)\b"
     r"|\bnot to (?:interrupt|disturb|bother)\b|\bnever ?mind\b|\bwhy not\b"
     r"|\bwithout (?:a )?(?:doubt|problems?|delay|hesitation|further ado)\b"
-    rf"|\b{_NOT} (?:even )?(?:worry|mind|forget|hesitate|panic|be (?:late|afraid|shy))\b"
+    rf"|\b{_NOT} (?:even )?(?:worry|mind|forget|hesitate|panic|get lost|be (?:late|afraid|shy))\b"
     r"|\b(?:can(?:no|['\u2019])t|can not) wait\b|\bcould(?:n['\u2019]t| not) be (?:happier|better)\b"
     rf"|\b{_NOT} miss\b|\b(?:nobody|no ?one|nothing) else\b"
     # What is denied twice is not denied.
