@@ -49,6 +49,13 @@ def verdicts_on_recorded(name: str) -> Sequence[Verdicts]:
     return tried(plus().tasks[name], plus(), workers=2)
 
 
+@cache
+def verdicts_on_variants(name: str) -> Sequence[Verdicts]:
+    """How the programs do that were written from the instruction alone."""
+    task = plus().tasks[name]
+    return verdicts([variant.program for variant in variants(task)], task)
+
+
 def test_the_suite_of_the_paper_is_what_it_was() -> None:
     assert load_suite("paper").digest == "ea395de1c023ae42bcf293f8da46567226ecc850722a2ec3a081fb90c44b5ffb"
     assert sorted(plus().tasks) == TASKS
@@ -112,10 +119,9 @@ def test_the_linter_finds_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", TASKS)
 def test_programs_written_from_the_instruction_alone_pass(name: str) -> None:
-    task = plus().tasks[name]
-    right = variants(task)
+    right = variants(plus().tasks[name])
     assert len(right) >= 10
-    judged = verdicts([variant.program for variant in right], task)
+    judged = verdicts_on_variants(name)
     failed = [variant.name for variant, one in zip(right, judged, strict=True) if not passes(one)]
     assert failed == []
 
@@ -144,8 +150,8 @@ AROUND = [
 def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
     task = plus().tasks[name]
     several = [*zip(recorded_programs(task), verdicts_on_recorded(name), strict=True)][::9]
-    right = [variant.program for variant in variants(task)][: len(AROUND)]
-    several += zip(right, verdicts(right, task), strict=True)
+    right = [variant.program for variant in variants(task)]
+    several += [*zip(right, verdicts_on_variants(name), strict=True)][: len(AROUND)]
     changed = [
         f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n    {around}\n"
         for around, (program, _) in zip(cycle(AROUND), several, strict=False)
