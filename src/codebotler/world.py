@@ -95,6 +95,10 @@ class World:
 
     def to_yaml(self) -> str:
         """This world as the text of a world file."""
+        return yaml.dump(self.to_data(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+
+    def to_data(self) -> dict[str, object]:
+        """What a world file would say of this world."""
         data: dict[str, object] = {
             "about": self.about,
             "robot": self.robot,
@@ -110,7 +114,7 @@ class World:
             }
         if self.may_wait_forever:
             data["may_wait_forever"] = True
-        return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+        return data
 
 
 ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0

@@ -7,6 +7,7 @@ import operator
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -54,6 +55,7 @@ class ThingFact:
     room: str
 
 
+@cache  # the same few for each of many worlds
 def parsed(text: str) -> ast.expr:
     """The expression that a text is.
 

@@ -159,7 +159,7 @@ def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed
     content += [lender.data for lender in lenders if lender is not None]
     drawn = [task for task in tasks if task.drawn]
     content += [
-        [scenario.world.to_yaml(), *(requirement.text for requirement in scenario.require)]
+        [scenario.world.to_data(), *(requirement.text for requirement in scenario.require)]
         for task in drawn
         for scenario in task.scenarios
     ]

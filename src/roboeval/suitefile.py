@@ -168,6 +168,8 @@ class RulesFile(_Form):
     matching: Literal["label-in-request", "whole-words"] = "label-in-request"
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
     words_for_people: list[Name] = []
+    words_for_yes: list[Name] = []
+    words_for_no: list[Name] = []
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0
@@ -181,6 +183,8 @@ class RulesFile(_Form):
             self.matching,
             self.people,
             tuple(self.words_for_people),
+            tuple(self.words_for_yes),
+            tuple(self.words_for_no),
             self.events,
             limits,
             self.clock_starts,

@@ -122,6 +122,10 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
     }
 
 
+WORDS = ("words_for_people", "words_for_yes", "words_for_no")
+"""Rules that are lists of words, and left out where they are empty."""
+
+
 def head(suite: Suite) -> dict[str, Any]:
     """What KEY.json says beside the rows: by what they were judged."""
     rules = suite.rules
@@ -134,7 +138,7 @@ def head(suite: Suite) -> dict[str, Any]:
             "literals": rules.literals,
             "matching": rules.matching,
             "people": rules.people,
-            **({"words_for_people": list(rules.words_for_people)} if rules.words_for_people else {}),
+            **{name: list(words) for name in WORDS if (words := getattr(rules, name))},
             **({"events": rules.events} if rules.events != PAPER.events else {}),
             "limits": {
                 "seconds": rules.limits.seconds,

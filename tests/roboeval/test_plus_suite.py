@@ -49,6 +49,13 @@ def verdicts_on_recorded(name: str) -> Sequence[Verdicts]:
     return tried(plus().tasks[name], plus(), workers=2)
 
 
+@cache
+def verdicts_on_variants(name: str) -> Sequence[Verdicts]:
+    """How the programs do that were written from the instruction alone."""
+    task = plus().tasks[name]
+    return verdicts([variant.program for variant in variants(task)], task)
+
+
 def test_the_suite_of_the_paper_is_what_it_was() -> None:
     assert load_suite("paper").digest == "ea395de1c023ae42bcf293f8da46567226ecc850722a2ec3a081fb90c44b5ffb"
     assert sorted(plus().tasks) == TASKS
@@ -82,6 +89,7 @@ OTHERWISE = {
     "looks the offices up by name and returns early": False,
     "returns to the start between Sally and Mark": True,
     'says "nobody is here today" in an empty lab': True,
+    "her yes fits none of the friendly answers, so it counts as a no": True,
     "makes sure that there are staplers in the supply room before it starts looking": True,
     "one long sentence that names the rooms with and without a stapler together": True,
     "says that staplers are missing, without any of the words asked for": True,
@@ -111,10 +119,9 @@ def test_the_linter_finds_nothing(name: str) -> None:
 
 @pytest.mark.parametrize("name", TASKS)
 def test_programs_written_from_the_instruction_alone_pass(name: str) -> None:
-    task = plus().tasks[name]
-    right = variants(task)
+    right = variants(plus().tasks[name])
     assert len(right) >= 10
-    judged = verdicts([variant.program for variant in right], task)
+    judged = verdicts_on_variants(name)
     failed = [variant.name for variant, one in zip(right, judged, strict=True) if not passes(one)]
     assert failed == []
 
@@ -129,32 +136,40 @@ def go_to(room):
 
 
 AROUND = [
-    "say('Hello, I am on my way.'); _task()",
+    "say('Hello, I am on my way.'); _task(); say('All done!')",
     "_task(); say('That was no problem at all.')",
+    "say('One moment, please.'); _task(); say('That was all.')",
     "_task(); say('It took me 5 minutes. Thank you, and have a nice day.')",
     "say('Off I go, it is not far.'); _task(); say('Any questions? Just ask!')",
+    "_task(); say('Everything went well.')",
+    "say('I will do all of that right away.'); _task(); say('I have done everything that I was asked to.')",
 ]
 
 
 @pytest.mark.parametrize("name", TASKS)
 def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
     task = plus().tasks[name]
-    programs = recorded_programs(task)[::7]
+    several = [*zip(recorded_programs(task), verdicts_on_recorded(name), strict=True)][::9]
+    right = [variant.program for variant in variants(task)]
+    several += [*zip(right, verdicts_on_variants(name), strict=True)][: len(AROUND)]
     changed = [
         f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n    {around}\n"
-        for program, around in zip(programs, cycle(AROUND), strict=False)
+        for around, (program, _) in zip(cycle(AROUND), several, strict=False)
     ]
-    before = verdicts_on_recorded(name)[::7]
-    assert [passes(one) for one in verdicts(changed, task)] == [passes(one) for one in before]
+    otherwise = [
+        (program, v.world, [r.text for r in v.failed])
+        for program, (_, before), after in zip(changed, several, verdicts(changed, task), strict=True)
+        for v, w in zip(after, before, strict=True)
+        if v.satisfied != w.satisfied
+    ]
+    assert otherwise == []
 
 
 @pytest.mark.parametrize("name", TASKS)
 def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
     task = plus().tasks[name]
-    right = [
-        p for p, one in zip(recorded_programs(task), verdicts_on_recorded(name), strict=True) if passes(one)
-    ][::6]
-    assert right
+    meant = [r.program for r in recorded_replies(task) if OTHERWISE.get(r.about, r.fails is None)][::8]
+    right = [*meant, *(variant.program for variant in variants(task)[::4])]
     random = Random(name)
     worlds = [
         replace(s.world, rooms=tuple(random.sample(s.world.rooms, len(s.world.rooms))))

@@ -250,7 +250,7 @@ def ask(robot: SimulatedRobot, person: str, question: str, options: tuple[Option
     if asked is None:
         raise RobotError("AskNoPerson", f'nobody is in "{robot.room}" to be asked "{question}"')
     answer = asked.answer(question, robot.rules)
-    chosen = None if answer is None else choose(answer, question, options, robot.rules.matching)
+    chosen = None if answer is None else choose(answer, question, options, robot.rules)
     if chosen is None:
         offered = ", ".join(option.text for option in options)
         raise RobotError(
@@ -260,24 +260,34 @@ def ask(robot: SimulatedRobot, person: str, question: str, options: tuple[Option
     return chosen
 
 
-def choose(
-    answer: Answer, question: str, options: tuple[Option, ...], matching: Matching = "label-in-request"
-) -> int | None:
+def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Rules = PAPER) -> int | None:
     """The position of the option that an answer means.
 
-    The answer is looked for in the options; failing that it is a yes or a no to the question. One that is a
-    position means the nearest option that there is.
+    The answer is looked for in the options. Failing that, a yes or a no is looked for in other words, if the
+    rules have any; and any other answer is a yes or a no to the question. One that is a position means the
+    nearest option that there is.
     """
-
-    def first(pattern: str) -> int | None:
-        return next((i for i, option in enumerate(options) if finds(option.text, pattern, matching)), None)
-
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
+
+    def says(option: Option, *words: str) -> bool:
+        return any(finds(option.text, word, rules.matching) for word in words)
+
+    def first(*words: str) -> int | None:
+        return next((number for number, option in enumerate(options) if says(option, *words)), None)
+
     direct = first(answer)
     if direct is not None:
         return direct
-    return first("yes" if finds(question, answer, matching) else "no")
+    if answer == "no" and rules.words_for_no:
+        return first(*rules.words_for_no)
+    if answer == "yes" and rules.words_for_no:
+        may_be = [
+            number for number, option in enumerate(options) if not says(option, "no", *rules.words_for_no)
+        ]
+        meant = [number for number in may_be if says(options[number], *rules.words_for_yes)]
+        return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
+    return first("yes" if finds(question, answer, rules.matching) else "no")
 
 
 def pick(robot: SimulatedRobot, obj: str) -> None:

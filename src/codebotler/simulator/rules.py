@@ -41,6 +41,9 @@ class Rules:
         people: who answers to which name: everybody to any (`answer-to-any-name`), or each to their own and
             to a word for people, as well as to no name at all (`own-name-or-word`).
         words_for_people: regexes of the words for people, for `own-name-or-word`.
+        words_for_yes: regexes of what else an option may say that means yes, for people who answer `yes`.
+        words_for_no: the same for `no`. An option in which one of them is found is never a yes; and a single
+            option that says neither is what who answers yes chooses.
         events: whether drives, picks and places are recorded by the words of the request (`as-requested`), or
             by the room that was reached and the thing that was moved (`as-happened`). A drive that reaches no
             room is then no event.
@@ -52,6 +55,8 @@ class Rules:
     matching: Matching = "label-in-request"
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
     words_for_people: tuple[str, ...] = ()
+    words_for_yes: tuple[str, ...] = ()
+    words_for_no: tuple[str, ...] = ()
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)
     clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)

@@ -16,13 +16,13 @@ def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[S
         suite: of the task.
         task: the task.
         count: how many worlds to make; by default 200, or those that are written out where all are.
-        seed: from which they are made.
+        seed: from which they are made; never the one of the suite's own worlds.
 
     Raises:
         BadInput: worlds are to be made, and all of the suite's are written out.
     """
     if suite.further is not None:
-        return suite.further(task, count or COUNT, seed)
+        return suite.further(task, count or COUNT, seed + 1 + (suite.seed or 0))
     if count is not None:
         raise BadInput(
             f'the worlds of the suite "{suite.name}" are written out, and no further ones can be made; '

@@ -6,7 +6,7 @@ import pytest
 
 from codebotler.badinput import BadInput
 from codebotler.simulator.engine import run
-from codebotler.simulator.robot import RobotError, SimulatedRobot, resolve_room
+from codebotler.simulator.robot import RobotError, SimulatedRobot, choose, resolve_room
 from codebotler.simulator.rules import PAPER, Rules
 from codebotler.trace import Option, Status
 from codebotler.world import Person, Room, World
@@ -44,6 +44,42 @@ def test_rooms_are_found_by_whole_words_and_a_visit_is_where_it_leads() -> None:
     loose = robot(rules=PAPER)
     loose.perform("go_to", ["room 123"])
     assert (loose.room, loose.trace[0].text) == ("room 1", "room 123")
+
+
+WORDS = Rules(
+    matching="whole-words",
+    words_for_yes=("sure", "love to", "i am", "i do"),
+    words_for_no=("not", r"\w+n['\u2019]t", "another time", "busy", "decline"),
+)
+
+
+@pytest.mark.parametrize(
+    ("options", "by_yes", "by_no"),
+    [
+        (("Sure", "No thanks"), 0, 1),
+        (("No, sorry", "Of course"), 1, 0),
+        (("I'd love to", "Maybe another time"), 0, 1),
+        (("Yes", "Not today"), 0, 1),
+        (("Accept", "Decline"), 0, 1),
+        (("hot", "not hot"), 0, 1),
+        (("I don\u2019t have mail", "I have mail"), 1, 0),
+        (("I do not", "I do"), 1, 0),
+        (("Maybe", "Sure", "I am busy"), 1, 2),
+        (("Yes, please", "Sure", "No"), 0, 2),
+        (("red", "green"), None, None),
+        (("one", "two", "not at all"), None, 2),
+    ],
+)
+def test_yes_and_no_are_understood_in_other_words(
+    options: tuple[str, ...], by_yes: int | None, by_no: int | None
+) -> None:
+    offered = tuple(map(Option, options))
+    assert [choose(answer, "Tea?", offered, WORDS) for answer in ("yes", "no")] == [by_yes, by_no]
+
+
+def test_without_such_words_only_yes_is_yes() -> None:
+    offered = (Option("Sure"), Option("No thanks"))
+    assert [choose(answer, "Tea?", offered, STRICT) for answer in ("yes", "no")] == [1, 1]
 
 
 @pytest.mark.parametrize(

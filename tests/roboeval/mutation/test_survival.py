@@ -200,13 +200,18 @@ def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
         worlds_of(suite, task, 200, 1)
 
 
-def test_worlds_that_a_suite_makes(suite: Suite, task: Task) -> None:
-    def further(task: Task, count: int, seed: int) -> tuple[Scenario, ...]:
-        return (task.scenarios * count)[seed : seed + count]
+def test_worlds_that_a_suite_makes_for_mutants_are_not_those_it_judges_by(suite: Suite, task: Task) -> None:
+    seeds: list[int] = []
 
-    makes = replace(suite, further=further)
-    assert worlds_of(makes, task, 3, 1) == (*task.scenarios[1:], *task.scenarios)
-    assert len(worlds_of(makes, task, None, 0)) == 200
+    def further(task: Task, count: int, seed: int) -> tuple[Scenario, ...]:
+        seeds.append(seed)
+        return (task.scenarios * count)[:count]
+
+    makes = replace(suite, further=further, seed=3)
+    assert worlds_of(makes, task, 3, 1) == (*task.scenarios, *task.scenarios)[:3]
+    assert [len(worlds_of(makes, task, None, seed)) for seed in range(5)] == [200] * 5
+    assert 3 not in seeds
+    assert len(set(seeds)) == 5
 
 
 def test_a_baseline_keeps_what_its_original_did(suite: Suite, task: Task, lanes: Lanes) -> None:
