@@ -43,6 +43,12 @@ def task_view(task: Task) -> RenderableType:
     parts += _section("Prompts", [Text(f"{n}  {prompt}") for n, prompt in enumerate(task.prompts)])
     parts += _section("Facts", [_fact(fact.fact, commonsense=fact.commonsense) for fact in task.facts])
     parts += _section("Checks", [_check(task, index) for index in range(len(task.checks))])
+    if task.phrases:
+        several = [
+            Text.assemble((f"{{{name}}}", "bold"), f"  {', '.join(regexes)}")
+            for name, regexes in task.phrases
+        ]
+        parts += _section("Phrases in checks", several)
     for number, scenario in enumerate(task.scenarios, 1):
         parts += _section(f"World {number}: {scenario.world.about}", _world_lines(scenario))
     return Group(*parts)

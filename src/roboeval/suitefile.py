@@ -141,6 +141,7 @@ class DrawnTaskFile(_Form):
     checks: dict[str, CheckFile]
     worlds: DrawnWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
+    phrases: dict[Name, Annotated[list[Name], Field(min_length=1)]] = {}
     require: Annotated[list[Text], Field(min_length=1)]
     accepted: list[AcceptedFile] = []
 

@@ -98,6 +98,7 @@ class Task:
         path: the file it was read from.
         borrows: whether its instruction is that of a task that ships with the package.
         drawn: whether its worlds are drawn from a description.
+        phrases: regexes for what can be said in many words, by the name that stands for them in checks.
     """
 
     name: str
@@ -112,6 +113,7 @@ class Task:
     path: Path
     borrows: bool = False
     drawn: bool = False
+    phrases: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
         """The worlds and requirements by which programs are judged; none if there is no ablation."""

@@ -69,10 +69,7 @@ def read_task(
     form = file.validate(DrawnTaskFile, data) if drawn else file.validate(TaskFile, data)
     if form.name != path.stem:
         raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"', "name")
-    names = (
-        [p.name or key for key, p in form.worlds.people.items()] if isinstance(form, DrawnTaskFile) else []
-    )
-    given = {PEOPLE: rf"(?:{'|'.join([*words, *names])})s?"} if isinstance(form, DrawnTaskFile) else {}
+    given = _given(form, file, words) if isinstance(form, DrawnTaskFile) else {}
     checks = {check.name: check for check in _checks(form, file, given)}
     reader = _Reader(file, checks, skills, given)
     if isinstance(form, DrawnTaskFile):
@@ -92,6 +89,9 @@ def read_task(
         path=path,
         borrows=lender is not None,
         drawn=isinstance(form, DrawnTaskFile),
+        phrases=tuple((n, tuple(r)) for n, r in form.phrases.items())
+        if isinstance(form, DrawnTaskFile)
+        else (),
     )
 
 
@@ -108,7 +108,22 @@ _PARAMETER = r" *[^\W\d]\w* *"
 
 
 PEOPLE = "people"
-"""What every check of drawn worlds may put into its text without a parameter: whoever a look may be for."""
+"""What every check of drawn worlds may name without a parameter: whoever a look may be for."""
+
+
+def _given(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[str, str]:
+    """What checks may name without a parameter: people, and the phrases of the task."""
+    names = [person.name or key for key, person in form.worlds.people.items()]
+    given = {PEOPLE: rf"(?:{'|'.join([*words, *names])})s?"}
+    for name, regexes in form.phrases.items():
+        if not name.isidentifier() or name == PEOPLE:
+            raise file.wrong(f'"{name}" cannot name phrases; choose another word', "phrases", name)
+        if not any(f"{{{name}}}" in check.rtl for check in form.checks.values()):
+            raise file.wrong(f'no check uses the phrases "{name}"; write {{{name}}} in one', "phrases", name)
+        if quoted := next((regex for regex in regexes if '"' in regex), None):
+            raise file.wrong(f"{quoted} has a quotation mark; phrases are put between two", "phrases", name)
+        given[name] = f"(?:{'|'.join(regexes)})"
+    return given
 
 
 def _checks(form: TaskFile | DrawnTaskFile, file: YamlFile, given: Mapping[str, str]) -> list[Check]:

@@ -102,6 +102,36 @@ def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:
         load_suite("paper").with_worlds(200)
 
 
+PHRASES = TASK.replace('say(number({cups}, "cup"))', 'say(words(r"{some}", number({cups}, "cup")))').replace(
+    "checks:\n", "phrases:\n  some: [tea, cups? for]\nchecks:\n"
+)
+
+
+def test_checks_name_phrases(tmp_path: Path) -> None:
+    task = load_suite(str(suite(tmp_path, PHRASES))).tasks["Tea"]
+    told = next(r for r in task.scenarios[1].require if r.text == "counts(2)")
+    assert "(?:tea|cups? for)" in str(told.formula)
+    assert task.phrases == (("some", ("tea", "cups? for")),)
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "problem"),
+    [
+        ("some:", "people:", '"people" cannot name phrases; choose another word'),
+        ("some:", "two words:", '"two words" cannot name phrases'),
+        ('{some}"', 'tea"', 'no check uses the phrases "some"; write {some} in one'),
+        ("[tea,", """['"tea"',""", '"tea" has a quotation mark'),
+        ("[tea, cups? for]", "[]", '"some" has too few entries'),
+    ],
+)
+def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, problem: str) -> None:
+    assert good in PHRASES
+    with pytest.raises(BadInput) as caught:
+        load_suite(str(suite(tmp_path, PHRASES.replace(good, bad))))
+    assert problem in str(caught.value)
+    assert "line" in str(caught.value)
+
+
 @pytest.mark.parametrize(
     ("good", "bad", "problem"),
     [
