@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, TypeAlias
+from typing import Annotated, Any, BinaryIO, SupportsIndex, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -220,13 +220,26 @@ def read_judged(rows: Path, programs: Path) -> Iterator[tuple[int, dict[str, Any
 
 
 def unknown(key: Key, suite: Suite) -> str | None:
-    """What is wrong with a completion's task or prompt; None if the suite knows both."""
-    task = suite.tasks.get(key[0])
+    """What is wrong with a completion's task or prompt; None if the suite knows both.
+
+    Args:
+        key: the completion's, as a row or somebody who writes Python gives it.
+        suite: whose tasks and prompts are known.
+    """
+    task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
-    if key[1] >= len(task.prompts):
-        return f"{name_of(key)}: the task has prompts 0 to {len(task.prompts) - 1}"
+    there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
+    if not _is_whole(key[1]):
+        return f"the prompt is {key[1]!r}, not a whole number; {there_are}"
+    if not 0 <= key[1] < len(task.prompts):
+        return f"{name_of(key)}: {there_are}"
     return None
+
+
+def _is_whole(number: object) -> bool:
+    """Whether it is a whole number, of any library's kind."""
+    return isinstance(number, SupportsIndex)
 
 
 def name_of(key: Key) -> str:
