@@ -54,7 +54,8 @@ def reward(
         suite: a suite, or the name or folder of one.
 
     Raises:
-        BadInput: there is no such suite, task or prompt, its worlds are written by hand, or a program is no text.
+        BadInput: there is no such suite, task or prompt, its worlds are written by hand, or a program is
+            no text.
         EngineError: no isolated process could be started.
     """
     expect_texts(programs, "the programs")

@@ -101,7 +101,8 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
     if not isinstance(completion, Completion):
         kind = type(completion).__name__
         raise BadInput(
-            f"a completion is of the type {kind}; make it a Completion(task=..., prompt=..., index=..., program=...)"
+            f"a completion is of the type {kind}; "
+            "make it a Completion(task=..., prompt=..., index=..., program=...)"
         )
     if (problem := unknown(completion.key, suite)) is not None:
         raise BadInput(problem)

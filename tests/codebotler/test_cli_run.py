@@ -387,8 +387,9 @@ def test_command_that_shows_it_again_can_be_pasted(folder: Path, named: str) -> 
 
     def typed(line: str, **more: str) -> str:
         environment = {**without, "COLUMNS": "60", **more}
-        told = {"cwd": folder, "env": environment, "text": True, "capture_output": True, "check": True}
-        return str(subprocess.run(["bash", "-c", line], **told).stdout)
+        return subprocess.run(
+            ["bash", "-c", line], cwd=folder, env=environment, text=True, capture_output=True, check=True
+        ).stdout
 
     run = ".venv/bin/codebotler run good.py --world world.yaml --speed 0 --yes"
     *_, last = typed(run, CODEBOTLER_HOME=named).splitlines()

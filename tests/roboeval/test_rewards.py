@@ -174,9 +174,12 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
         (["LunchTime"], 0, [], "the suite has no task"),
     ],
 )
-def test_arguments_of_another_kind_are_refused(task: Any, prompt: Any, programs: Any, sentence: str) -> None:
+def test_arguments_of_another_kind_are_refused(
+    task: object, prompt: object, programs: object, sentence: str
+) -> None:
+    wrong: Any = (task, prompt, programs)
     with pytest.raises(BadInput, match=f"^{re.escape(sentence)}"):
-        reward(task, prompt, programs)
+        reward(*wrong)
 
 
 # --- processes

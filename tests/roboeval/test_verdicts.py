@@ -194,12 +194,13 @@ OURS = Completion(task="Visit", prompt=0, index=0, program="")
         (OURS.model_dump(), "a completion is of the type dict; make it a Completion"),
     ],
 )
-def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: Any, sentence: str) -> None:
+def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: object, sentence: str) -> None:
     task = next(iter(paper.tasks))
     if isinstance(wrong, Completion) and wrong.task == OURS.task:
         wrong = wrong.model_copy(update={"task": task})
+    completion: Any = wrong
     with pytest.raises(BadInput, match=re.escape(sentence)):
-        list(evaluate([wrong], paper))
+        list(evaluate([completion], paper))
 
 
 def test_evaluating_takes_workers_and_an_ablation(paper: Suite) -> None:
