@@ -9,6 +9,7 @@ import json
 import os
 import re
 import runpy
+import shutil
 import stat
 import subprocess
 import sys
@@ -178,6 +179,22 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str
             return readers[page]
 
         yield follow
+
+
+@pytest.mark.parametrize("page", [page for page in FOLLOWED if any(b.language == "sh" for b in blocks(page))])
+def test_what_a_page_has_written_into_the_root_is_left_alone(
+    followed: Callable[[str], Reader], page: str, tmp_path: Path
+) -> None:
+    """By git, so that it is not packed either, and by the linters."""
+    ours = {".venv", "examples", "site", "state"}
+    for path in followed(page).folder.iterdir():
+        if path.name not in ours:
+            (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / path.name)
+    shutil.copy(ROOT / ".gitignore", tmp_path)
+    git = ["git", "-C", str(tmp_path)]
+    subprocess.run([*git, "init", "--quiet"], check=True)
+    seen = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True)
+    assert seen.stdout == "?? .gitignore\n"
 
 
 def is_printed(told: str, printed: str) -> bool:
