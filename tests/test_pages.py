@@ -30,7 +30,10 @@ PAGES = {path.name: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.m
 
 NOT_RUN = {
     "README.md": ["makes an environment of its own"],
-    "evaluate-your-model.md": [*["needs a key, and costs money"] * 2, "needs a Ray cluster"],
+    "evaluate-your-model.md": [
+        *("needs a key, and costs money", "needs Inspect, and a model behind it"),
+        *("needs a key, and costs money", "needs a Ray cluster"),
+    ],
     "index.md": ["makes an environment of its own"],
     "install.md": ["makes an environment of its own", "makes an environment of its own"],
     "perception.md": ["needs a robot with a camera"],
