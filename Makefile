@@ -17,6 +17,9 @@ EXTRAS_VENV ?= .venv-extras
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check
+# Said before anything is made, since pip says it only after an environment is there to stay.
+CHECK_PYTHON = $(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("%s is Python %d.%d, \
+but 3.11 or later is needed; name another, as in: make PYTHON=python3.12" % ((sys.executable,) + sys.version_info[:2]))'
 DOTS = while read -r; do printf .; done; echo
 SOURCES = $(shell find src -type f -not -name '*.pyc') pyproject.toml constraints.txt
 INSTRUCTION = Look into every printer room for a stapler. To each printer room that has none, bring one stapler \
@@ -106,6 +109,7 @@ bench: $(VENV)/installed
 	$(BIN)/python bench/benchmark_pages.py
 
 $(VENV)/made:
+	@$(CHECK_PYTHON)
 	@echo "making an environment in $(VENV), which takes some seconds"
 	@$(PYTHON) -m venv --clear $(VENV)
 	@$(PIP) install --quiet --upgrade "pip>=25.1"
@@ -123,6 +127,7 @@ $(VENV)/tested: $(VENV)/installed
 
 # Of what is installed for one test file, most is never imported: --no-compile saves minutes.
 $(TORCH_VENV)/tested: $(SOURCES) constraints-transformers.txt
+	@$(CHECK_PYTHON)
 	@echo "making an environment with torch in $(TORCH_VENV), which takes some minutes"
 	@$(PYTHON) -m venv --clear $(TORCH_VENV)
 	@$(TORCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
@@ -131,6 +136,7 @@ $(TORCH_VENV)/tested: $(SOURCES) constraints-transformers.txt
 	@touch $@
 
 $(PYROBOSIM_VENV)/tested: $(SOURCES) constraints-pyrobosim.txt
+	@$(CHECK_PYTHON)
 	@echo "making an environment with pyrobosim in $(PYROBOSIM_VENV), which takes a minute"
 	@$(PYTHON) -m venv --clear $(PYROBOSIM_VENV)
 	@$(PYROBOSIM_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
@@ -139,6 +145,7 @@ $(PYROBOSIM_VENV)/tested: $(SOURCES) constraints-pyrobosim.txt
 	@touch $@
 
 $(EXTRAS_VENV)/tested: $(SOURCES) constraints-extras.txt
+	@$(CHECK_PYTHON)
 	@echo "making an environment with Inspect and Ray in $(EXTRAS_VENV), which takes a minute"
 	@$(PYTHON) -m venv --clear $(EXTRAS_VENV)
 	@$(EXTRAS_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"

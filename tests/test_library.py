@@ -8,6 +8,7 @@ import sys
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -121,6 +122,30 @@ for wrong in ({"retries": -1}, {"model": "nobody"}, {"temperature": -1}):
     except BadInput as error:
         print(error)
 """
+
+
+@pytest.mark.parametrize(
+    ("rooms", "sentence"),
+    [
+        ("kitchen", "the rooms are one text; put it into a list"),
+        ([1, 2], "one of the rooms is 1, not a text"),
+        (5, "the rooms are 5, not a list of texts"),
+    ],
+)
+def test_rooms_that_are_no_names_are_refused(rooms: object, sentence: str) -> None:
+    wrong: Any = rooms
+    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+        codebotler.check("def task_program():\n    go_to('kitchen')\n", rooms=wrong)
+    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+        codebotler.generate("Go to the kitchen.", rooms=wrong)
+
+
+def test_a_program_and_an_instruction_are_texts() -> None:
+    nothing: Any = None
+    with pytest.raises(codebotler.BadInput, match="the program is None, not a text"):
+        codebotler.check(nothing)
+    with pytest.raises(codebotler.BadInput, match="the instruction is None, not a text"):
+        codebotler.generate(nothing)
 
 
 def test_generate_works_in_a_notebook_and_refuses_what_makes_no_sense(paper: Suite) -> None:

@@ -66,6 +66,17 @@ def test_the_wheel_from_the_archive_is_the_wheel_from_the_tree(source: Path, whe
     assert {path.name for path in source.iterdir()} == ON_TOP
 
 
+def test_what_lies_about_is_not_packed(source: Path, tmp_path: Path) -> None:
+    tree = tmp_path / "tree"
+    shutil.copytree(source, tree)
+    for stray in (".env", "program.py", "notes/secret.yaml", "office/secret.yaml", "src/.env"):
+        (tree / stray).parent.mkdir(exist_ok=True)
+        (tree / stray).write_text("key: sk-1")
+    with tarfile.open(built("sdist", tree, tmp_path / "dist")) as archive:
+        packed = {name.partition("/")[2] for name in archive.getnames()}
+    assert packed == {str(path.relative_to(source)) for path in source.rglob("*") if path.is_file()}
+
+
 def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
     packed = files(wheel)
     made = {"__pycache__"}
@@ -143,6 +154,37 @@ def test_what_completes_is_a_script_of_the_shell(name: str) -> None:
     shown = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True).stdout
     assert f"_{name}_completion {name}" in shown
     subprocess.run(["bash", "-n"], input=shown, text=True, check=True)
+
+
+# --- environments of the Makefile
+
+
+@pytest.mark.parametrize("target", ["demo", "test-transformers", "test-pyrobosim", "test-inspect"])
+def test_nothing_is_made_with_a_python_that_is_too_old(tmp_path: Path, target: str) -> None:
+    needed = re.search(
+        r'^requires-python = ">=3\.(\d+)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE
+    )
+    assert needed is not None
+    older = int(needed[1]) - 1
+    python = tmp_path / "old python"
+    claim = f"import sys; sys.version_info = (3, {older}, 9)"
+    python.write_text(f'#!/bin/sh\n[ "$1" = -c ] && exec {sys.executable} -c "{claim}; $2"\nmkdir -p "$4"\n')
+    python.chmod(0o755)
+    names = ("VENV", "TORCH_VENV", "PYROBOSIM_VENV", "EXTRAS_VENV")
+    where = [f"{name}={tmp_path / 'venv' / name}" for name in names]
+    ended = subprocess.run(
+        ["make", "--no-print-directory", target, f"PYTHON='{python}'", *where],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    sentence, *_ = ended.stderr.splitlines()
+    assert ended.returncode == 2
+    assert f"is Python 3.{older}, but 3.{older + 1} or later is needed" in sentence
+    assert "PYTHON=" in sentence
+    assert ended.stdout == ""
+    assert {path.name for path in tmp_path.iterdir()} == {python.name}
 
 
 # --- on a robot

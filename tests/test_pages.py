@@ -9,6 +9,7 @@ import json
 import os
 import re
 import runpy
+import shutil
 import stat
 import subprocess
 import sys
@@ -29,7 +30,10 @@ PAGES = {path.name: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.m
 
 NOT_RUN = {
     "README.md": ["makes an environment of its own"],
-    "evaluate-your-model.md": [*["needs a key, and costs money"] * 2, "needs a Ray cluster"],
+    "evaluate-your-model.md": [
+        *("needs a key, and costs money", "needs Inspect, and a model behind it"),
+        *("needs a key, and costs money", "needs a Ray cluster"),
+    ],
     "index.md": ["makes an environment of its own"],
     "install.md": ["makes an environment of its own", "makes an environment of its own"],
     "perception.md": ["needs a robot with a camera"],
@@ -178,6 +182,22 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str
             return readers[page]
 
         yield follow
+
+
+@pytest.mark.parametrize("page", [page for page in FOLLOWED if any(b.language == "sh" for b in blocks(page))])
+def test_what_a_page_has_written_into_the_root_is_left_alone(
+    followed: Callable[[str], Reader], page: str, tmp_path: Path
+) -> None:
+    """By git, so that it is not packed either, and by the linters."""
+    ours = {".venv", "examples", "site", "state"}
+    for path in followed(page).folder.iterdir():
+        if path.name not in ours:
+            (shutil.copytree if path.is_dir() else shutil.copy)(path, tmp_path / path.name)
+    shutil.copy(ROOT / ".gitignore", tmp_path)
+    git = ["git", "-C", str(tmp_path)]
+    subprocess.run([*git, "init", "--quiet"], check=True)
+    seen = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True)
+    assert seen.stdout == "?? .gitignore\n"
 
 
 def is_printed(told: str, printed: str) -> bool:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from codebotler.badinput import BadInput
+from codebotler.home import pasted
 from codebotler.live import in_words
 from codebotler.mission import STEPS, State
 from codebotler.missionlog import SUMMARY, Line, Log, Summary, doing, events_of
@@ -43,7 +44,8 @@ def find(home: Path, name: str) -> Path:
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
     if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
-        raise BadInput(f'there is no mission "{name}"; `codebotler missions` lists those there are')
+        lists = pasted("codebotler", "missions")
+        raise BadInput(f'there is no mission "{name}"; `{lists}` lists those there are')
     return folder
 
 

@@ -361,9 +361,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     from codebotler.simulator.engine import EngineError
 
     if isinstance(error, USAGE):
-        message = " ".join(error.format_message().split()).rstrip(".")
-        where = "" if error.ctx is None else f"; `{error.ctx.command_path} --help` lists what there is"
-        return 2, message[:1].lower() + message[1:] + where
+        return 2, _usage_sentence(error)
     if isinstance(error, BadInput):
         return 2, str(error)
     if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
@@ -373,6 +371,15 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), _system_sentence(error)
     return None
+
+
+def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' own
+    message = " ".join(error.format_message().split()).rstrip(".")
+    message = message[:1].lower() + message[1:]
+    if error.ctx is None:
+        return message
+    after = " " if message.endswith("?") else "; "
+    return f"{message}{after}`{error.ctx.command_path} --help` lists what there is"
 
 
 def _system_sentence(error: OSError) -> str:

@@ -11,6 +11,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from codebotler.home import pasted
 from codebotler.live import in_words
 from codebotler.mission import State
 from codebotler.missionlog import Line, Summary
@@ -136,13 +137,14 @@ WORDS: Mapping[str, Callable[[Line], Text | None]] = {
 """How each kind of event is told."""
 
 
-def ending(summary: Summary) -> Text:
-    """How a mission ended, and how to see it again."""
+def ending(summary: Summary) -> Group:
+    """How a mission ended, and how to see it again, in a line that is not broken, to be pasted."""
     state = State(summary.state)
     text = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))
     if state is State.STOPPED:
         text.append("\nthe robot has stopped")
-    return text.append(f"\n`codebotler missions {summary.id}` shows it again", "dim")
+    again = f"`{pasted('codebotler', 'missions', summary.id)}` shows it again"
+    return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
 
 
 def _why(summary: Summary) -> str:

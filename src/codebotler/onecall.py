@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from codebotler.badinput import BadInput
+from codebotler.badinput import BadInput, expect_text, expect_texts
 from codebotler.checker import check
 from codebotler.generation import Generation
 from codebotler.generation import generate as ask
@@ -56,6 +56,8 @@ def generate(
         ModelError: no whole reply came.
         EngineError: no isolated process could be started.
     """
+    expect_text(instruction, "the instruction")
+    expect_texts(rooms or (), "the rooms")
     tries = int(repair) if retries is None else retries
     if tries < 0:
         raise BadInput(f"the number of retries is {tries}, but it must be at least 0")

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
+from codebotler.badinput import BadInput
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.lane import Lane
 
@@ -42,9 +43,14 @@ class Local:
     Args:
         lanes: those that run programs, or how many are to be started and ended.
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+
+    Raises:
+        BadInput: there are to be less than 1.
     """
 
     def __init__(self, lanes: Lanes | int, *, require_isolation: bool = False) -> None:
+        if isinstance(lanes, int) and lanes < 1:
+            raise BadInput(f"the number of workers is {lanes}, but it must be at least 1")
         self._given, self._required = lanes, require_isolation
         self._lanes = lanes if isinstance(lanes, Lanes) else None
 

@@ -12,9 +12,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from textwrap import shorten
 
 from codebotler.badinput import YamlFile
 from codebotler.english import listed
+from codebotler.models.recorded import closest_to
 from codebotler.rtl import Element, Formula, Regex, Text
 from codebotler.simulator.robot import resolve_room
 from roboeval.findings import Finding, Kind
@@ -23,7 +25,7 @@ from roboeval.representatives import elements
 from roboeval.satisfiability import Reasoner, Undecided
 from roboeval.suite import Check, Requirement, Scenario, Task
 from roboeval.taxonomy import failure
-from roboeval.trials import Verdicts, recorded_replies
+from roboeval.trials import Verdicts, recorded_replies, unasked
 from roboeval.witnesses import can_match, representative_texts, samples
 
 
@@ -35,7 +37,7 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
         verdicts: on programs that are meant to be right or wrong.
     """
     places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
-    found = [*_unused(task), *_misjudged(task, verdicts), *_untripped(task, verdicts)]
+    found = [*_unused(task), *_unasked(task), *_misjudged(task, verdicts), *_untripped(task, verdicts)]
     if task.drawn:
         found += _of_drawn(places)
     else:
@@ -112,6 +114,21 @@ def _unused(task: Task) -> Iterator[Finding]:
             yield Finding("unused", check.name, message, task.path, check.line)
 
 
+def _unasked(task: Task) -> Iterator[Finding]:
+    """Programs that were recorded for an instruction that is spelt otherwise than all prompts."""
+    for instruction, path, line in unasked(task):
+        closest, *_ = closest_to(instruction, task.prompts)
+        message = (
+            f'programs are recorded for "{instruction}", which no prompt of the task is, so that they are '
+            f'left out; the closest is "{closest}"'
+        )
+        yield Finding("unasked", shorten(instruction, _SUBJECT, placeholder=" ..."), message, path, line)
+
+
+_SUBJECT = 60
+"""How much of an instruction names a finding, in characters."""
+
+
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     """Recorded programs that end otherwise than whoever recorded them says."""
     if task.borrows:  # programs that were recorded for other requirements
@@ -137,12 +154,17 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
         yield Finding("untripped", task.name, message, task.path, 1)
         return
     tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
+    no_program = (
+        "the only wrong program of the task does not trip"
+        if len(wrong) == 1
+        else f"none of the {len(wrong)} wrong programs of the task trips"
+    )
     required = [r for *_, scenario in _scenarios(task) for r in scenario.require]
-    for side, requirement in {_side(r): r for r in reversed(required)}.items():
+    sides = {_side(r): r for r in reversed(required)}
+    for side, requirement in sides.items():
         if side not in tripped:
-            message = (
-                f'none of the {len(wrong)} wrong programs of the task trips "{side}"; record one that does'
-            )
+            meant = ' where it is required without "not"' if f"not {side}" in sides else ""
+            message = f'{no_program} "{side}"{meant}; record one that does'
             yield Finding("untripped", side, message, task.path, lines[requirement.check])
 
 

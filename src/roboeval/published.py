@@ -20,6 +20,7 @@ from roboeval.suite import Suite
 MAX_ZIP = 100_000_000
 MAX_UNPACKED = 1_000_000_000
 NAME = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9})\.py", re.ASCII)
+NAMED = "TASK_PROMPT_INDEX.py, such as LunchTime_0_1.py"
 UNREADABLE = (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError, OSError, ValueError)
 
 Read: TypeAlias = Callable[[], str]
@@ -56,10 +57,30 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
             yield completion
 
 
+def passed_over(path: Path) -> str | None:
+    """What is to be said of the Python files that are not named as completions are; None if all are.
+
+    Args:
+        path: a folder or zip that has been read.
+    """
+    with ExitStack() as open_files:
+        files = _zipped(path, open_files) if path.is_file() else _in_folder(path)
+        names = [name for name, _ in files if name.endswith(".py") and not _match(name)]
+    if not names:
+        return None
+    they = "file was" if len(names) == 1 else "files were"
+    which = names[0] if len(names) == 1 else f"{names[0]} the first"
+    return f"{len(names):,} {they} left aside, {which}; a completion is named {NAMED}"
+
+
+def _match(name: str) -> re.Match[str] | None:
+    return NAME.fullmatch(PurePosixPath(name).name)
+
+
 def _by_key(files: Iterable[tuple[str, Read]], path: Path) -> dict[Key, tuple[str, Read]]:
     found: dict[Key, tuple[str, Read]] = {}
     for name, read in files:
-        match = NAME.fullmatch(PurePosixPath(name).name)
+        match = _match(name)
         if match is None:
             continue
         key = match["task"], int(match["prompt"]), int(match["index"])
@@ -67,7 +88,7 @@ def _by_key(files: Iterable[tuple[str, Read]], path: Path) -> dict[Key, tuple[st
             raise BadInput(f"{name_of(key)} stands here again; {found[key][0]} holds it already", file=name)
         found[key] = name, read
     if not found:
-        raise BadInput("there is no file named TASK_PROMPT_INDEX.py in it", file=path)
+        raise BadInput(f"there is no file named {NAMED}, in it", file=path)
     return found
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, TypeAlias
+from typing import Annotated, Any, BinaryIO, SupportsIndex, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -24,6 +24,7 @@ from roboeval.suite import Suite
 MAX_ROW = 5_000_000
 MAX_EVALUATION = 1_000_000_000  # of our own rows: a trace may be a million characters in each of many worlds
 COMPLETIONS = "completions.jsonl"
+EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
 CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no folder to the disk
 
 Key: TypeAlias = tuple[str, int, int]
@@ -65,7 +66,12 @@ class Completion(BaseModel):
 
 
 def read_rows(
-    path: Path, *, limit: int = MAX_ROW, growing: bool = False, name: Path | str | None = None
+    path: Path,
+    *,
+    limit: int = MAX_ROW,
+    growing: bool = False,
+    name: Path | str | None = None,
+    example: str | None = None,
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Read a file of JSON lines: the line's number, counted from 1, and its object.
 
@@ -75,11 +81,13 @@ def read_rows(
         growing: whether it is one that we write: then a broken last line without an end was torn by a crash,
             and is passed over.
         name: what sentences call the file; its path by default.
+        example: a row, for who does not know what one looks like.
 
     Raises:
         BadInput: the file is missing, or a line is too long or no JSON object.
     """
     name = name or path
+    mend = "" if example is None else f"; a row looks like {example}"
     try:
         file = path.open("rb")
     except FileNotFoundError:
@@ -94,11 +102,11 @@ def read_rows(
             if len(line) > limit:
                 raise BadInput(f"this row is longer than {limit:,} bytes", file=name, line=number)
             if line.strip():
-                row = _parsed(line, name, number)
+                row = _parsed(line, name, number, mend)
                 if row is None and growing and not line.endswith(b"\n"):
                     return
                 if row is None:
-                    raise BadInput("this line is no JSON", file=name, line=number)
+                    raise BadInput(f"this line is no JSON{mend}", file=name, line=number)
                 yield number, row
 
 
@@ -108,13 +116,13 @@ def _count() -> Iterator[int]:
         yield (number := number + 1)
 
 
-def _parsed(line: bytes, name: Path | str, number: int) -> dict[str, Any] | None:
+def _parsed(line: bytes, name: Path | str, number: int, mend: str) -> dict[str, Any] | None:
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
         return None
     if not isinstance(row, dict):
-        raise BadInput("this line is no JSON object", file=name, line=number)
+        raise BadInput(f"this line is no JSON object{mend}", file=name, line=number)
     return row
 
 
@@ -134,7 +142,7 @@ def read_completions(
     """
     name = name or path
     seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
-    for number, row in read_rows(path, growing=growing, name=name):
+    for number, row in read_rows(path, growing=growing, name=name, example=EXAMPLE):
         try:
             completion = Completion.model_validate(row)
         except ValidationError as error:
@@ -220,13 +228,26 @@ def read_judged(rows: Path, programs: Path) -> Iterator[tuple[int, dict[str, Any
 
 
 def unknown(key: Key, suite: Suite) -> str | None:
-    """What is wrong with a completion's task or prompt; None if the suite knows both."""
-    task = suite.tasks.get(key[0])
+    """What is wrong with a completion's task or prompt; None if the suite knows both.
+
+    Args:
+        key: the completion's, as a row or somebody who writes Python gives it.
+        suite: whose tasks and prompts are known.
+    """
+    task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
-    if key[1] >= len(task.prompts):
-        return f"{name_of(key)}: the task has prompts 0 to {len(task.prompts) - 1}"
+    there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
+    if not _is_whole(key[1]):
+        return f"the prompt is {key[1]!r}, not a whole number; {there_are}"
+    if not 0 <= key[1] < len(task.prompts):
+        return f"{name_of(key)}: {there_are}"
     return None
+
+
+def _is_whole(number: object) -> bool:
+    """Whether it is a whole number, of any library's kind."""
+    return isinstance(number, SupportsIndex)
 
 
 def name_of(key: Key) -> str:

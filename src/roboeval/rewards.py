@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 
-from codebotler.badinput import BadInput
+from codebotler.badinput import BadInput, expect_texts
 from codebotler.simulator.engine import digest
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.warm import warm
@@ -54,11 +54,11 @@ def reward(
         suite: a suite, or the name or folder of one.
 
     Raises:
-        BadInput: there is no such suite, task or prompt, or its worlds are written by hand.
+        BadInput: there is no such suite, task or prompt, its worlds are written by hand, or a program is
+            no text.
         EngineError: no isolated process could be started.
     """
-    if isinstance(programs, str):
-        raise BadInput("the programs are one text; put it into a list")
+    expect_texts(programs, "the programs")
     chosen = load_suite(suite) if isinstance(suite, str) else suite
     if worlds is not None or seed is not None:
         chosen = chosen.with_worlds(worlds, seed)

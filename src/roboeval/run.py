@@ -16,9 +16,10 @@ from typing import Any, BinaryIO
 
 from codebotler import __version__
 from codebotler.badinput import BadInput, read_text
-from roboeval.published import published_completions
+from roboeval.published import passed_over, published_completions
 from roboeval.records import (
     COMPLETIONS,
+    EXAMPLE,
     Completion,
     read_completions,
     recorded_completions,
@@ -35,10 +36,12 @@ class Source:
     Args:
         read: reads them from the start, each time it is called; each is one that the suite knows.
         run: the run folder they stand in, if they do.
+        passed_over: what is to be said of what was not read there, once the rest has been.
     """
 
     read: Callable[[], Iterator[Completion]]
     run: Run | None = None
+    passed_over: Callable[[], str | None] = lambda: None
 
     def of(self, tasks: frozenset[str] | None) -> Iterator[Completion]:
         """Read them again, those of some tasks or all.
@@ -72,7 +75,9 @@ def open_source(text: str, suite: Suite) -> Source:
     if (path / COMPLETIONS).is_file():
         return Run(path).source(suite)
     if path.is_dir() or path.suffix == ".zip":
-        return Source(lambda: published_completions(path, suite))
+        return Source(lambda: published_completions(path, suite), passed_over=lambda: passed_over(path))
+    if path.suffix == ".py":
+        raise BadInput(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
     lines = path if path.is_file() else _spooled(path)
     return Source(lambda: read_completions(lines, suite, name=path))
 
@@ -154,6 +159,8 @@ class Run:
         try:
             self.path.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except FileExistsError:
+            raise BadInput("is a file, but a run is a folder; name another", file=self.path) from None
         except OSError as error:
             raise BadInput(f"cannot be written ({error.strerror})", file=self.path) from None
         if not _locked(descriptor):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TypeAlias
 
-from codebotler.models.recorded import NAMES, Reply, read_replies, recorded_model
+from codebotler.models.recorded import NAMES, Reply, lines_of_instructions, read_replies, recorded_model
 from codebotler.simulator.engine import run
 from roboeval.suite import Suite, Task
 from roboeval.taxonomy import Verdict
@@ -61,9 +62,34 @@ def recorded_replies(task: Task) -> list[Reply]:
     Raises:
         BadInput: a file of recorded programs is wrong.
     """
-    folder = task.path.parents[1] / "recorded"
-    written = [read_replies(path) for path in sorted(folder.glob(f"*/{task.path.name}"))]
-    if task.borrows or not folder.is_dir():
+    written = [read_replies(path) for path in _recorded_files(task)]
+    if task.borrows or not _recorded(task).is_dir():
         written += [recorded_model(name).replies for name in NAMES]
     replies = [reply for one in written for prompt in task.prompts for reply in one.get(prompt, ())]
     return [*{reply.program: reply for reply in reversed(replies)}.values()][::-1]
+
+
+def unasked(task: Task) -> Iterator[tuple[str, Path, int | None]]:
+    """Instructions that no prompt of the task is, so that nobody tries what was recorded for them.
+
+    Args:
+        task: the task; of one that takes its instruction from another suite none is told.
+
+    Returns:
+        for each the instruction, the file and the line in which it stands.
+
+    Raises:
+        BadInput: a file of recorded programs is wrong.
+    """
+    for path in [] if task.borrows else _recorded_files(task):
+        for instruction, line in lines_of_instructions(path).items():
+            if instruction not in task.prompts:
+                yield instruction, path, line
+
+
+def _recorded(task: Task) -> Path:
+    return task.path.parents[1] / "recorded"
+
+
+def _recorded_files(task: Task) -> list[Path]:
+    return sorted(_recorded(task).glob(f"*/{task.path.name}"))

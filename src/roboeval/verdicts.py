@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from codebotler import __version__
+from codebotler.badinput import BadInput
 from codebotler.rtl import CannotJudge, holds
 from codebotler.simulator.engine import digest
 from codebotler.simulator.lane import Lane
@@ -17,7 +18,7 @@ from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
 from roboeval.engines import Local, OpenEngine
-from roboeval.records import Completion
+from roboeval.records import Completion, unknown
 from roboeval.suite import Requirement, Scenario, Suite
 from roboeval.taxonomy import Verdict, failure
 
@@ -72,19 +73,41 @@ def evaluate(
         engine: where programs are run; by default in so many lanes of this machine, started and ended for it.
 
     Raises:
+        BadInput: there are no workers; or, when it is read, a completion is none or not of the suite.
         EngineError: no isolated process can be started.
     """
+    chosen = engine or Local(workers, require_isolation=require_isolation)
+    return _evaluated(completions, suite, ablated=ablated, engine=chosen)
+
+
+def _evaluated(
+    completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
+) -> Iterator[dict[str, Any]]:
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
         for completion in completions:
+            _expect_judgeable(completion, suite, ablated=ablated)
             waiting.append(completion)
             yield completion.task, completion.program
 
-    with engine or Local(workers, require_isolation=require_isolation) as opened:
+    with engine as opened:
         judging = partial(judged, suite, ablated=ablated)
         for told in opened.map_distinct(judging, works(), name=lambda work: digest(*work)):
             yield evaluation(waiting.popleft(), told)
+
+
+def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
+    if not isinstance(completion, Completion):
+        kind = type(completion).__name__
+        raise BadInput(
+            f"a completion is of the type {kind}; "
+            "make it a Completion(task=..., prompt=..., index=..., program=...)"
+        )
+    if (problem := unknown(completion.key, suite)) is not None:
+        raise BadInput(problem)
+    if ablated and suite.tasks[completion.task].ablation is None:
+        raise BadInput(f'the task "{completion.task}" has no ablation')
 
 
 def judged(suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool) -> dict[str, Any]:

@@ -23,6 +23,10 @@ def row(index: int = 0, program: object = GREETS, task: str = "SayGoodDay", prom
 
 # --- bad input
 
+LIKE_THIS = (
+    'a row looks like {"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
+)
+
 
 def test_a_missing_file(tmp_path: Path) -> None:
     assert refused("evaluate", tmp_path / "no.jsonl").endswith(
@@ -45,12 +49,58 @@ def test_an_empty_file(tmp_path: Path) -> None:
 
 def test_a_line_that_is_no_json(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "{oops\n" + row(1))
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl, line 2: this line is no JSON"
+    assert (
+        refused("evaluate", "a.jsonl", cwd=tmp_path) == f"a.jsonl, line 2: this line is no JSON; {LIKE_THIS}"
+    )
 
 
 def test_a_last_line_that_is_no_json_and_has_no_end(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + '{"task": "SayGoodDay", "program": "x')
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl, line 2: this line is no JSON"
+    assert (
+        refused("evaluate", "a.jsonl", cwd=tmp_path) == f"a.jsonl, line 2: this line is no JSON; {LIKE_THIS}"
+    )
+
+
+def test_a_program_is_no_file_of_completions(tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text(GREETS)
+    sentence = refused("evaluate", "program.py", cwd=tmp_path)
+    assert sentence.startswith('program.py: is one program; write it as a row of a .jsonl: {"task": ')
+    json.loads(sentence.partition(".jsonl: ")[2])
+
+
+@pytest.mark.parametrize("verb", ["evaluate", "import"])
+def test_a_file_is_no_run(tmp_path: Path, verb: str) -> None:
+    (tmp_path / "a.jsonl").write_text(row())
+    (tmp_path / "verdicts").write_text("mine")
+    sentence = refused(verb, "a.jsonl", "--out", "verdicts", cwd=tmp_path)
+    assert sentence == "verdicts: is a file, but a run is a folder; name another"
+    assert (tmp_path / "verdicts").read_text() == "mine"
+
+
+@pytest.mark.parametrize("command", [("evaluate",), ("import", "--out", "run")])
+@pytest.mark.parametrize("source", ["py", "py.zip"])
+def test_files_that_are_named_otherwise_are_left_aside_aloud(
+    tmp_path: Path, command: tuple[str, ...], source: str
+) -> None:
+    names = ["SayGoodDay_0_0.py", "SayGoodDay_1.py", "notes.txt", "x.py"]
+    (tmp_path / "py").mkdir()
+    for name in names:
+        (tmp_path / "py" / name).write_text("completion = ''")
+    if source.endswith(".zip"):
+        with zipfile.ZipFile(tmp_path / source, "w") as archive:
+            for name in names:
+                archive.write(tmp_path / "py" / name, name)
+    ended = roboeval(*command, source, cwd=tmp_path)
+    assert ended.status == 0
+    assert ended.err.splitlines()[0] == (
+        f"2 files were left aside, {source}/SayGoodDay_1.py the first; "
+        "a completion is named TASK_PROMPT_INDEX.py, such as LunchTime_0_1.py"
+    )
+
+
+def test_no_file_is_left_aside_where_all_are_named_alike(tmp_path: Path) -> None:
+    (tmp_path / "SayGoodDay_0_0.py").write_text("completion = ''")
+    assert roboeval("evaluate", tmp_path).err == ""
 
 
 def test_a_zip_with_a_damaged_member(tmp_path: Path) -> None:
@@ -64,7 +114,9 @@ def test_a_zip_with_a_damaged_member(tmp_path: Path) -> None:
 
 def test_a_line_that_is_no_object(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "[]\n")
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl, line 2: this line is no JSON object"
+    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == (
+        f"a.jsonl, line 2: this line is no JSON object; {LIKE_THIS}"
+    )
 
 
 def test_an_unknown_task(tmp_path: Path) -> None:
@@ -206,6 +258,12 @@ def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
         ended = roboeval()
         assert (ended.status, ended.err) == (0, "")
         assert "evaluate" in ended.out
+
+
+def test_a_question_ends_as_one() -> None:
+    sentence = refused("generat")
+    assert "did you mean" in sentence.lower()
+    assert sentence.endswith("? `roboeval --help` lists what there is")
 
 
 def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path) -> None:
@@ -378,7 +436,7 @@ def test_a_pipe_is_a_file_of_completions(tmp_path: Path) -> None:
     assert json.loads(ended.out)["completions"] == 2
     wrong = roboeval("evaluate", cwd=tmp_path, after="<(cat a.jsonl; echo oops)")
     assert (wrong.status, wrong.out) == (2, "")
-    assert re.fullmatch(r"roboeval: /dev/fd/\d+, line 3: this line is no JSON\n", wrong.err)
+    assert re.fullmatch(r"roboeval: /dev/fd/\d+, line 3: this line is no JSON; .*\n", wrong.err)
 
 
 def test_the_version() -> None:

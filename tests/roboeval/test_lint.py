@@ -23,7 +23,7 @@ from roboeval.lint import lint
 from roboeval.records import Completion
 from roboeval.satisfiability import Automaton, Reasoner, Undecided
 from roboeval.suite import Suite, load_suite
-from roboeval.trials import tried
+from roboeval.trials import tried, unasked
 from roboeval.verdicts import evaluate
 from roboeval.witnesses import can_match, representative_texts, samples
 
@@ -177,6 +177,30 @@ def test_a_check_that_no_wrong_program_trips(linted: Lint) -> None:
     assert finding.line == 6
     swears = RECORDED.replace("pass", "say('darn')")
     assert linted(checks, ["speaks", "not swears"], recorded=swears, untripped=True) == []
+
+
+def test_how_many_programs_trip_nothing_is_said_in_english(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
+    (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
+    assert finding.message == (
+        'the only wrong program of the task does not trip "not swears"; record one that does'
+    )
+    two = (
+        RECORDED
+        + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
+    )
+    (finding,) = linted(checks, ["speaks", "not swears"], recorded=two, untripped=True)
+    assert finding.message.startswith("none of the 2 wrong programs of the task trips ")
+
+
+def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:
+    speaks = RECORDED.replace("pass", "say('hello')")
+    found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], recorded=speaks, untripped=True)
+    (message,) = (one.message for one in found if one.kind == "untripped")
+    assert message == (
+        'none of the 2 wrong programs of the task trips "speaks" where it is required without "not"; '
+        "record one that does"
+    )
 
 
 def test_a_task_without_wrong_programs(linted: Lint) -> None:
@@ -433,6 +457,30 @@ def test_a_recorded_program_that_ends_otherwise_than_it_is_said_to(
     found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded, untripped=True)
     (finding,) = (one for one in found if one.kind == "misjudged")
     assert sentence in finding.message
+
+
+# --- recorded programs for what nobody asks
+
+
+def test_programs_for_an_instruction_that_is_no_prompt(linted: Lint) -> None:
+    recorded = RECORDED + RECORDED.replace("Say hello", "Say helo").replace("pass", "0")
+    (finding,) = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded)
+    assert finding.name == "unasked: Say helo in the kitchen."
+    assert finding.message == (
+        'programs are recorded for "Say helo in the kitchen.", which no prompt of the task is, so that they '
+        'are left out; the closest is "Say hello in the kitchen."'
+    )
+    assert (finding.path.parent.name, finding.path.name) == ("careful", "Hello.yaml")
+    assert finding.line == 7
+
+
+def test_a_task_that_borrows_need_not_ask_for_all_that_is_recorded(tmp_path: Path, paper: Suite) -> None:
+    recorded = tmp_path / "recorded" / "careful" / "LunchTime.yaml"
+    recorded.parent.mkdir(parents=True)
+    recorded.write_text(RECORDED)
+    task = replace(paper.task("LunchTime"), path=tmp_path / "tasks" / "LunchTime.yaml")
+    assert [*unasked(task)] == [("Say hello in the kitchen.", recorded, 2)]
+    assert [*unasked(replace(task, borrows=True))] == []
 
 
 # --- a new task

@@ -95,7 +95,8 @@ def test_two_files_of_one_completion(tmp_path: Path) -> None:
 
 def test_nothing_that_is_no_completion(tmp_path: Path) -> None:
     path = zipped(tmp_path / "a.zip", {"notes.py": FILE, "T_0_0.py/": "", "T_0_9999999999.py": FILE})
-    assert sentence_about(path) == f"{path}: there is no file named TASK_PROMPT_INDEX.py in it"
+    told = "there is no file named TASK_PROMPT_INDEX.py, such as LunchTime_0_1.py, in it"
+    assert sentence_about(path) == f"{path}: {told}"
 
 
 def test_an_encrypted_member(tmp_path: Path) -> None:

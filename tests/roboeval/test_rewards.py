@@ -4,6 +4,7 @@ import gc
 import logging
 import multiprocessing
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import groupby
+from typing import Any
 
 import pytest
 
@@ -160,6 +162,24 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
     with pytest.raises(BadInput, match="written by hand"):
         reward("SayGoodDay", 0, [RIGHT], worlds=3)
     assert reward("SayGoodDay", 0, []) == []
+
+
+@pytest.mark.parametrize(
+    ("task", "prompt", "programs", "sentence"),
+    [
+        ("LunchTime", 0, [None], "one of the programs is None, not a text"),
+        ("LunchTime", 0, None, "the programs are None, not a list of texts"),
+        ("LunchTime", "0", [], "the prompt is '0', not a whole number; the task has prompts 0 to 4"),
+        ("LunchTime", -1, [], "LunchTime/-1/0: the task has prompts 0 to 4"),
+        (["LunchTime"], 0, [], "the suite has no task"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(
+    task: object, prompt: object, programs: object, sentence: str
+) -> None:
+    wrong: Any = (task, prompt, programs)
+    with pytest.raises(BadInput, match=f"^{re.escape(sentence)}"):
+        reward(*wrong)
 
 
 # --- processes

@@ -1,10 +1,12 @@
 """What is right and wrong: errors, limits, worlds that may wait, options that cannot be judged."""
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from codebotler.badinput import BadInput
 from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.world import Room, World
 from roboeval.records import Completion
@@ -179,3 +181,32 @@ def test_the_first_unsatisfied_world_decides() -> None:
 
 def test_options_are_compared_as_they_were_offered() -> None:
     assert Option("1", is_text=False) != Option("1")
+
+
+OURS = Completion(task="Visit", prompt=0, index=0, program="")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        (OURS.model_copy(update={"task": "Vist"}), 'the suite has no task "Vist"; its tasks are '),
+        (OURS.model_copy(update={"prompt": 9}), "/9/0: the task has prompts 0 to "),
+        (OURS.model_dump(), "a completion is of the type dict; make it a Completion"),
+    ],
+)
+def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: object, sentence: str) -> None:
+    task = next(iter(paper.tasks))
+    if isinstance(wrong, Completion) and wrong.task == OURS.task:
+        wrong = wrong.model_copy(update={"task": task})
+    completion: Any = wrong
+    with pytest.raises(BadInput, match=re.escape(sentence)):
+        list(evaluate([completion], paper))
+
+
+def test_evaluating_takes_workers_and_an_ablation(paper: Suite) -> None:
+    with pytest.raises(BadInput, match="the number of workers is 0, but it must be at least 1"):
+        evaluate([], paper, workers=0)
+    task = next(task.name for task in paper.tasks.values() if task.ablation is None)
+    completion = OURS.model_copy(update={"task": task})
+    with pytest.raises(BadInput, match=f'the task "{task}" has no ablation'):
+        list(evaluate([completion], paper, ablated=True))

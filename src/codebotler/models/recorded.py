@@ -152,14 +152,26 @@ def read_replies(path: Path) -> Mapping[str, tuple[Reply, ...]]:
     Raises:
         BadInput: it is missing or wrong.
     """
-    file = YamlFile.read(path)
-    if not isinstance(file.data, list):
-        raise file.wrong("this is no list of instructions with their replies; start each with a dash")
-    recordings = [file.validate(RecordingFile, item, at=(index,)) for index, item in enumerate(file.data)]
     return {
         recording.instruction: tuple(Reply(r.about, r.program, r.fails) for r in recording.replies)
-        for recording in recordings
+        for recording in _recordings(YamlFile.read(path))
     }
+
+
+def lines_of_instructions(path: Path) -> Mapping[str, int | None]:
+    """Where in a file of recorded replies each instruction stands.
+
+    Raises:
+        BadInput: it is missing or wrong.
+    """
+    file = YamlFile.read(path)
+    return {one.instruction: file.line((index,)) for index, one in enumerate(_recordings(file))}
+
+
+def _recordings(file: YamlFile) -> list[RecordingFile]:
+    if not isinstance(file.data, list):
+        raise file.wrong("this is no list of instructions with their replies; start each with a dash")
+    return [file.validate(RecordingFile, item, at=(index,)) for index, item in enumerate(file.data)]
 
 
 class _Form(BaseModel):

@@ -76,6 +76,8 @@ def evaluate(
         opened = open_source(source, judged_by)
         run = run or opened.run
         scope = Scope.of(watched(opened.read(), "reading"), wanted)
+        if (aside := opened.passed_over()) is not None:
+            note(aside)
         if scope.total == 0:
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
@@ -181,7 +183,10 @@ def import_(
     from roboeval.run import Run, open_source
 
     known = load(suite)
-    count = Run(out).keep(open_source(path, known))
+    opened = open_source(path, known)
+    count = Run(out).keep(opened)
+    if (aside := opened.passed_over()) is not None:
+        note(aside)
     again = command("evaluate", out, suite=suite)
     they = ("is", "it") if count == 1 else ("are", "them")
     note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")

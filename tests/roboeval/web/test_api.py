@@ -297,3 +297,11 @@ def test_help_needs_none_of_the_pages() -> None:
     code = "import sys, roboeval.cli, codebotler.cli; print('nicegui' in sys.modules)"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout == "False\n"
+
+
+def test_a_folder_without_runs_is_said(tmp_path: Path, server: PageServer) -> None:
+    empty = tmp_path / "runs"
+    empty.mkdir()
+    with serving(empty) as without:
+        assert without.said.startswith(f"{empty} holds no run yet; those that come are shown, too\n")
+    assert "holds no run" not in server.said
