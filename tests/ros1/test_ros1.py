@@ -104,6 +104,14 @@ def test_missing_server_is_known_before_motion_and_looked_for_again(graph: Graph
     server.expect("goal", "hello")
 
 
+def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph) -> None:
+    graph.serve(GO_TO)
+    robot = graph.robot()
+    robot.connect()
+    graph.serve(SAY, KNOWS_LATE="0.15")
+    robot.perform("say", ["hello"])
+
+
 def test_server_with_another_definition_is_told_from_a_missing_one(graph: Graph) -> None:
     assert GO_TO.ros is not None
     graph.serve(SAY, replace(GO_TO, ros=replace(GO_TO.ros, goal=("string place",))))

@@ -27,6 +27,7 @@ from typing import IO, Any, Dict
 PACKAGE = "robot_actions_pkg"
 TICK = 0.1  # seconds between two looks of the watchdog
 ALIVE = 1.0  # seconds between two signs of life
+SETTLES = 0.2  # seconds until a server sends results to who has just connected: ROS tells neither side
 LEAVES = 3.0  # seconds for another worker to end, whose tool has just been killed
 LAST_PICTURE = 0.5  # seconds for a picture to come after the result, by a connection of its own
 LARGEST_PICTURE = 2_000_000  # bytes
@@ -338,6 +339,8 @@ class Server:
         self.goal = type(spec().action_goal.goal)
         self.heard = 0.0  # when its last status came, on a clock that nobody sets
         self._node: str | None = None
+        self._results: Any = None  # the connection by which they come
+        self._since = 0.0
         topic = rospy.remap_name(self.name) + "/status"
         self._status = rospy.Subscriber(topic, actionlib_msgs.msg.GoalStatusArray, self._hear)
         self._pictures = rospy.Subscriber(
@@ -364,10 +367,14 @@ class Server:
         client, node = self.client, self._node
         if node is None or self.silent_for() > silence:
             return False
-        return all(p.impl.has_connection(node) for p in (client.pub_goal, client.pub_cancel)) and all(
-            any(c.callerid_pub == node for c in s.impl.connections)
-            for s in (client.result_sub, client.feedback_sub)
+        results, feedback = (
+            next((c for c in subscriber.impl.connections if c.callerid_pub == node), None)
+            for subscriber in (client.result_sub, client.feedback_sub)
         )
+        if results is not self._results:
+            self._results, self._since = results, time.monotonic()
+        reached = all(p.impl.has_connection(node) for p in (client.pub_goal, client.pub_cancel))
+        return reached and None not in (results, feedback) and time.monotonic() - self._since > SETTLES
 
     def cancel(self, goal_id: str = "") -> None:
         """Cancel one goal; without a name, all of anybody.
@@ -470,7 +477,8 @@ class Worker:
         """Wait a while for the servers on the graph; those that are not there, with the reason, by skill."""
         until = time.monotonic() + self.patience
         awaited = [server for server in self.servers.values() if self.graph.nodes_of(server.name)]
-        while not all(s.is_connected(self.silence) for s in awaited) and time.monotonic() < until:
+        # Each is asked each time, since it settles from when it was first found connected.
+        while sum(s.is_connected(self.silence) for s in awaited) < len(awaited) and time.monotonic() < until:
             if self.graph.is_left():
                 break
             time.sleep(0.005)
