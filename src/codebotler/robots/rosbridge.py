@@ -42,6 +42,7 @@ GUARD = Path(__file__).with_name("bridge_guard.py")
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell which ROS it has; one without rosapi cannot
 AGAIN = 0.5  # seconds after which what nobody has taken notice of is said again
+SETTLES = 0.6  # seconds for which a server's status comes until its results are sure to come, too
 TICK = 0.005  # seconds between two looks whether a server is heard
 TURN = 0.05  # seconds of one turn of waiting
 NOTE = "robots of ROS 2 behind it were only tested against a stand-in for the protocol"
@@ -283,8 +284,9 @@ class Line:
         self._news: queue.SimpleQueue[News] = queue.SimpleQueue()
         self._version: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._heard: dict[str, float] = {}
+        self._heard_first: dict[str, float] = {}
         self.well_heard: set[str] = set()
-        """Servers whose status came twice: by then their results are connected as well."""
+        """Servers whose status comes for a while: by then their results are connected as well."""
         self.is_lost, self.complaint = False, ""
         self.dialect: Dialect = Topics()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -365,9 +367,9 @@ class Line:
                 self.complaint = visible(complaint)
         for news in self.dialect.news(message):
             if news.server and not news.goal:
-                if news.server in self._heard:
+                self._heard[news.server] = now = time.monotonic()
+                if now - self._heard_first.setdefault(news.server, now) > SETTLES:
                     self.well_heard.add(news.server)
-                self._heard[news.server] = time.monotonic()
             if news.goal:
                 self._news.put(news)
 
