@@ -42,7 +42,7 @@ GUARD = Path(__file__).with_name("bridge_guard.py")
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell which ROS it has; one without rosapi cannot
 AGAIN = 0.5  # seconds after which what nobody has taken notice of is said again
-SETTLES = 0.6  # seconds for which a server's status comes until its results are sure to come, too
+SETTLES = 1.5  # seconds for which a server's status comes until its results come, too, on a busy machine
 TICK = 0.005  # seconds between two looks whether a server is heard
 TURN = 0.05  # seconds of one turn of waiting
 NOTE = "robots of ROS 2 behind it were only tested against a stand-in for the protocol"
@@ -147,7 +147,7 @@ class Rosbridge:
 
     def _hold(self, line: Line, server: str) -> None:
         """Wait until a server is well heard; the result of a goal that is sent before may be lost."""
-        until = time.monotonic() + self._waits.patience
+        until = time.monotonic() + self._waits.patience + SETTLES
         while line.dialect.is_heard and server not in line.well_heard and not (line.is_lost or self._stopped):
             if time.monotonic() > until:
                 raise RobotLostError(line.absent(server))
