@@ -53,7 +53,7 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
 _MOST_DRAWN = 6
 """In how many worlds that require different things the logic of drawn ones is looked at."""
 
-_MOST_ALIKE = 4
+_MOST_ALIKE = 5
 """How many of the requirements that one line of `require` makes by its `for` the logic looks at."""
 
 

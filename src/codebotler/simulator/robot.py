@@ -270,24 +270,29 @@ def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Ru
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
 
-    def says(option: Option, *words: str) -> bool:
-        return any(finds(option.text, word, rules.matching) for word in words)
-
-    def first(*words: str) -> int | None:
-        return next((number for number, option in enumerate(options) if says(option, *words)), None)
-
-    direct = first(answer)
+    direct = _first_saying((answer,), options, rules)
     if direct is not None:
         return direct
-    if answer == "no" and rules.words_for_no:
-        return first(*rules.words_for_no)
-    if answer == "yes" and rules.words_for_no:
-        may_be = [
-            number for number, option in enumerate(options) if not says(option, "no", *rules.words_for_no)
-        ]
-        meant = [number for number in may_be if says(options[number], *rules.words_for_yes)]
-        return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
-    return first("yes" if finds(question, answer, rules.matching) else "no")
+    if answer in {"yes", "no"} and rules.words_for_no:
+        return _in_other_words(answer, options, rules)
+    return _first_saying(("yes" if finds(question, answer, rules.matching) else "no",), options, rules)
+
+
+def _in_other_words(answer: str, options: tuple[Option, ...], rules: Rules) -> int | None:
+    """Which option means yes or no; the only one that does not mean no means yes, whatever it says."""
+    if answer == "no":
+        return _first_saying(rules.words_for_no, options, rules)
+    may_be = [n for n, option in enumerate(options) if not _says(option, ("no", *rules.words_for_no), rules)]
+    meant = [number for number in may_be if _says(options[number], rules.words_for_yes, rules)]
+    return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
+
+
+def _first_saying(words: tuple[str, ...], options: tuple[Option, ...], rules: Rules) -> int | None:
+    return next((number for number, option in enumerate(options) if _says(option, words, rules)), None)
+
+
+def _says(option: Option, words: tuple[str, ...], rules: Rules) -> bool:
+    return any(finds(option.text, word, rules.matching) for word in words)
 
 
 def pick(robot: SimulatedRobot, obj: str) -> None:
