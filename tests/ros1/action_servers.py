@@ -27,16 +27,34 @@ def tell(*what: str) -> None:
     print(json.dumps(what), flush=True)
 
 
+SERVERS: dict[str, actionlib.ActionServer] = {}
+
+
 def know_late(seconds: float) -> None:
-    """Answer who wants results so long before anything is sent there, as a busy machine does."""
+    """Note who wants results so long after a status has come there, as a busy machine does."""
     at_once = rospy.topics._PublisherImpl.add_connection
 
     def late(publisher: Any, connection: Any) -> Any:
-        if publisher.resolved_name.endswith("/result"):
-            time.sleep(seconds)
-        return at_once(publisher, connection)
+        name, _, topic = publisher.resolved_name.rpartition("/")
+        if topic != "result":
+            return at_once(publisher, connection)
+        threading.Thread(target=note, args=(SERVERS[name], publisher, connection), daemon=True).start()
+        return True
+
+    def note(server: Any, publisher: Any, connection: Any) -> None:
+        while not is_known_else(server):
+            time.sleep(0.001)
+        server.publish_status()
+        time.sleep(seconds)
+        at_once(publisher, connection)
 
     rospy.topics._PublisherImpl.add_connection = late
+
+
+def is_known_else(server: Any) -> bool:
+    """Whether all that belongs to a goal but its result has somebody at the other end."""
+    ends = server.goal_sub, server.cancel_sub, server.status_pub, server.feedback_pub
+    return all(end is not None and end.get_num_connections() for end in ends)
 
 
 class Deaf(actionlib.ActionServer):  # type: ignore[misc]  # it has no types
@@ -52,6 +70,7 @@ class Deaf(actionlib.ActionServer):  # type: ignore[misc]  # it has no types
 class Server:
     def __init__(self, name: str, spec: Any) -> None:
         self.server = Deaf(name, spec, self.start, self.cancel, auto_start=False)
+        SERVERS[rospy.resolve_name(name)] = self.server
         self.server.start()
         self.goals: dict[str, Any] = {}
 

@@ -108,7 +108,7 @@ def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph
     graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    graph.serve(SAY, KNOWS_LATE="0.15")
+    graph.serve(SAY, KNOWS_LATE="0.1")
     robot.perform("say", ["hello"])
 
 

@@ -57,6 +57,12 @@ def test_goal_is_executed_and_the_result_comes_back(graph: Graph, robot: Rosbrid
         robot.perform("say", ["hello"])
 
 
+def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph, robot: Rosbridge) -> None:
+    graph.serve(SAY, KNOWS_LATE="1.0")
+    robot.connect()
+    robot.perform("say", ["hello"])
+
+
 @pytest.mark.parametrize(
     ("goal", "kind", "message"),
     [
