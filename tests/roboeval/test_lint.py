@@ -2,8 +2,9 @@
 
 import json
 import re
+import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -538,6 +539,17 @@ require:
 """
 
 
+@pytest.fixture
+def an_end() -> Iterator[None]:
+    """End a test that would go on for hours."""
+    before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it has not ended after a minute"))
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.usefixtures("an_end")
 def test_of_requirements_that_one_line_makes_a_few_stand_for_all(tmp_path: Path) -> None:
     (tmp_path / "tasks").mkdir()
     (tmp_path / "suite.yaml").write_text("name: mine\nversion: 1\nworlds: 2\nseed: 1\n")
