@@ -140,6 +140,47 @@ def test_rooms_that_are_no_names_are_refused(rooms: object, sentence: str) -> No
         codebotler.generate("Go to the kitchen.", rooms=wrong)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"samples": 0}, "the number of samples is 0, but it must be at least 1"),
+        ({"samples": "5"}, "the number of samples is '5', not a whole number"),
+        ({"seed": None}, "the seed is None, not a whole number"),
+        ({"workers": -1}, "the number of workers is -1, but it must be at least 1"),
+        ({"workers": 0}, "the number of workers is 0, but it must be at least 1"),
+        ({"workers": 1.5}, "the number of workers is 1.5, not a whole number"),
+        ({"start": 3}, "the start is 3, not a text"),
+    ],
+)
+def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+        codebotler.check("def task_program():\n    say('hello')\n", **wrong)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"retries": -1}, "the number of retries is -1, but it must be at least 0"),
+        ({"temperature": "hot"}, "the temperature is 'hot', not a number"),
+        ({"top_p": "all"}, "top-p is 'all', not a number"),
+        ({"timeout": None}, "the timeout is None, not a number"),
+        ({"max_tokens": True}, "the limit of tokens is True, not a whole number"),
+        ({"seed": 1.5}, "the seed is 1.5, not a whole number"),
+    ],
+)
+def test_settings_of_another_kind_are_refused(wrong: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+        codebotler.generate("Say hello.", **wrong)
+
+
+def test_a_suite_is_named_by_a_text_or_a_folder(tmp_path: Path) -> None:
+    wrong: Any = 3
+    with pytest.raises(codebotler.BadInput, match=r"^the suite's name is 3, not a text$"):
+        roboeval.load_suite(wrong)
+    with pytest.raises(codebotler.BadInput, match=f'^there is no suite "{tmp_path}": '):
+        roboeval.load_suite(tmp_path)
+
+
 def test_a_program_and_an_instruction_are_texts() -> None:
     nothing: Any = None
     with pytest.raises(codebotler.BadInput, match="the program is None, not a text"):

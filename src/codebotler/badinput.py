@@ -6,6 +6,7 @@ import io
 import re
 from collections.abc import Collection, Mapping, Sequence
 from datetime import date
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -268,6 +269,37 @@ def expect_texts(given: object, what: str) -> None:
         raise BadInput(f"{what} are {given!r}, not a list of texts")
     for one in given:
         expect_text(one, f"one of {what}")
+
+
+def expect_number(given: object, what: str) -> None:
+    """Refuse what is no number.
+
+    Args:
+        given: what was given.
+        what: what it is to be, in words.
+
+    Raises:
+        BadInput: it is none.
+    """
+    if isinstance(given, bool) or not isinstance(given, Real):
+        raise BadInput(f"{what} is {given!r}, not a number")
+
+
+def expect_whole(given: object, what: str, *, least: int | None = None) -> None:
+    """Refuse what is no whole number, or too small a one.
+
+    Args:
+        given: what was given.
+        what: what it is to be, in words.
+        least: the smallest number that will do.
+
+    Raises:
+        BadInput: it is none.
+    """
+    if isinstance(given, bool) or not isinstance(given, Integral):
+        raise BadInput(f"{what} is {given!r}, not a whole number")
+    if least is not None and given < least:
+        raise BadInput(f"{what} is {given}, but it must be at least {least}")
 
 
 def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:

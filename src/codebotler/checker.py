@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-from codebotler.badinput import BadInput, expect_text, expect_texts
+from codebotler.badinput import BadInput, expect_text, expect_texts, expect_whole
 from codebotler.drives import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.problems import Check, Problem, Sample, failures, no_room
 from codebotler.program import Problem as Flaw
@@ -103,14 +103,18 @@ def check(
         plan: the rooms and the start, in the place of those two, for who knows more of them.
 
     Raises:
-        BadInput: the name of a room is no regular expression, or a text or a list of texts is none.
+        BadInput: the name of a room is no regular expression, or an argument is not of its kind or range.
         EngineError: no isolated process could be started.
     """
     expect_text(program, "the program")
     expect_texts(rooms or (), "the rooms")
+    if start is not None:
+        expect_text(start, "the start")
+    expect_whole(samples, "the number of samples", least=1)
+    expect_whole(seed, "the seed")
     settings = Settings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
     plan = plan or _plan(program, rooms, start, skills)
-    with nullcontext(lanes) if lanes else Lanes(workers or 1) as open_lanes:
+    with nullcontext(lanes) if lanes else Lanes(1 if workers is None else workers) as open_lanes:
 
         def run(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:
             return open_lanes.map_distinct(

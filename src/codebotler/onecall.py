@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from codebotler.badinput import BadInput, expect_text, expect_texts
+from codebotler.badinput import BadInput, expect_text, expect_texts, expect_whole
 from codebotler.checker import check
 from codebotler.generation import Generation
 from codebotler.generation import generate as ask
@@ -59,8 +59,7 @@ def generate(
     expect_text(instruction, "the instruction")
     expect_texts(rooms or (), "the rooms")
     tries = int(repair) if retries is None else retries
-    if tries < 0:
-        raise BadInput(f"the number of retries is {tries}, but it must be at least 0")
+    expect_whole(tries, "the number of retries", least=0)
     if not instruction.strip():
         raise BadInput("the instruction is empty; say what the robot is to do")
     settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
-from codebotler.badinput import BadInput
+from codebotler.badinput import expect_whole
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.lane import Lane
 
@@ -49,13 +49,13 @@ class Local:
     """
 
     def __init__(self, lanes: Lanes | int, *, require_isolation: bool = False) -> None:
-        if isinstance(lanes, int) and lanes < 1:
-            raise BadInput(f"the number of workers is {lanes}, but it must be at least 1")
+        if not isinstance(lanes, Lanes):
+            expect_whole(lanes, "the number of workers", least=1)
         self._given, self._required = lanes, require_isolation
         self._lanes = lanes if isinstance(lanes, Lanes) else None
 
     def __enter__(self) -> Self:
-        if self._lanes is None and isinstance(self._given, int):
+        if self._lanes is None and not isinstance(self._given, Lanes):
             self._lanes = Lanes(self._given, require_isolation=self._required)
         return self
 

@@ -8,10 +8,11 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
+from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
-from codebotler.badinput import BadInput, YamlFile
+from codebotler.badinput import BadInput, YamlFile, expect_text, expect_whole
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS, SkillTable
 from roboeval.installed import installed_folder, installed_suites
@@ -79,10 +80,14 @@ class Suite:
             seed: from which to draw them; the same as now by default.
 
         Raises:
-            BadInput: its worlds are written by hand.
+            BadInput: its worlds are written by hand, or a number is none.
         """
         if self.worlds is None or self.folder is None:
             raise BadInput(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
+        if count is not None:
+            expect_whole(count, "the number of worlds", least=1)
+        if seed is not None:
+            expect_whole(seed, "the seed")
         return _read_suite(self.folder, SKILLS, count or self.worlds, self.seed if seed is None else seed)
 
     def with_own_worlds(self) -> Suite:
@@ -107,16 +112,18 @@ def shipped_suites() -> tuple[str, ...]:
     return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
 
 
-def load_suite(name: str = "paper", *, skills: SkillTable = SKILLS) -> Suite:
+def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKILLS) -> Suite:
     """Read a suite.
 
     Args:
-        name: of a suite that ships with RoboEval, or that an installed package brings, or a folder.
+        name: of a suite that ships with RoboEval, or that an installed package brings, or its folder.
         skills: what can stand in formulas.
 
     Raises:
         BadInput: there is no such suite, or one of its files is wrong.
     """
+    name = str(name) if isinstance(name, PathLike) else name
+    expect_text(name, "the suite's name")
     if name in shipped_suites():
         return _read_suite(SUITES / name, skills)
     if SUITE_NAME.fullmatch(name) and (brought := installed_folder(name)) is not None:

@@ -161,6 +161,11 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
         reward("SayGoodDay", 5, [RIGHT])
     with pytest.raises(BadInput, match="written by hand"):
         reward("SayGoodDay", 0, [RIGHT], worlds=3)
+    with pytest.raises(BadInput, match="the number of worlds is 0, but it must be at least 1"):
+        reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=0)
+    wrong: Any = "7"
+    with pytest.raises(BadInput, match="the seed is '7', not a whole number"):
+        reward("SayGoodDay", 0, [RIGHT], suite="plus", seed=wrong)
     assert reward("SayGoodDay", 0, []) == []
 
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import ParamSpec, Self, TypeVar
 
+from codebotler.badinput import expect_whole
 from codebotler.simulator.distinct import Distinct
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
@@ -52,9 +53,11 @@ def run(
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Raises:
+        BadInput: there are no workers.
         EngineError: no isolated process could be started.
     """
-    with Lanes(workers or os.cpu_count() or 1, require_isolation=require_isolation) as lanes:
+    workers = (os.cpu_count() or 1) if workers is None else workers
+    with Lanes(workers, require_isolation=require_isolation) as lanes:
 
         def run_pair(pair: tuple[str, World]) -> Outcome:
             source, world = pair
@@ -86,10 +89,12 @@ class Lanes:
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Raises:
+        BadInput: there are to be less than 1.
         EngineError: no zygote can be started, or a wall is missing that is required.
     """
 
     def __init__(self, workers: int, *, require_isolation: bool = False) -> None:
+        expect_whole(workers, "the number of workers", least=1)
         if sys.platform == "win32":
             raise EngineError(ON_WINDOWS)
         self.workers = workers

@@ -140,7 +140,7 @@ def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
         ({"temperature": float("nan")}, "the temperature is nan, but it must be between 0 and 100"),
         ({"top_p": 0.0}, "top-p is 0, but it must be above 0 and at most 1"),
         ({"top_p": 1.5}, "top-p is 1.5, but it must be above 0 and at most 1"),
-        ({"max_tokens": 0}, "the limit is 0 tokens, but it must be at least 1"),
+        ({"max_tokens": 0}, "the limit of tokens is 0, but it must be at least 1"),
         ({"timeout": 0.0}, "the timeout is 0 seconds, but it must be above 0"),
         ({"base_url": "localhost:8000"}, "the base URL does not begin with http:// or https:// and a host; "),
         ({"base_url": "http://a:99999/v1"}, "the base URL has no valid host and port; write one like http"),
