@@ -9,10 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from codebotler.badinput import BadInput
-from codebotler.home import pasted
 from codebotler.live import in_words
 from codebotler.mission import STEPS, State
 from codebotler.missionlog import SUMMARY, Line, Log, Summary, doing, events_of
+from codebotler.pasted import mission_command
 
 ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
@@ -44,7 +44,7 @@ def find(home: Path, name: str) -> Path:
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
     if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
-        lists = pasted("codebotler", "missions")
+        lists = mission_command("missions")
         raise BadInput(f'there is no mission "{name}"; `{lists}` lists those there are')
     return folder
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
-import shutil
-import sys
 from pathlib import Path
 
 from codebotler.badinput import BadInput
@@ -25,20 +22,3 @@ def home() -> Path:
         return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
     except RuntimeError:
         raise BadInput("nobody knows where your home is; set CODEBOTLER_HOME to a folder") from None
-
-
-def pasted(*words: str) -> str:
-    """A command line about what lies there, to be pasted into a shell in the current folder.
-
-    It names the folder where CODEBOTLER_HOME does, and a command by its path where a shell would not find it.
-
-    Args:
-        words: the command and its arguments.
-    """
-    command, *arguments = words
-    folder, _ = os.path.split(sys.argv[0])
-    if folder and shutil.which(command) is None and (beside := Path(folder, command)).is_file():
-        command = str(beside)
-    named = os.environ.get("CODEBOTLER_HOME")
-    where = f"CODEBOTLER_HOME={shlex.quote(named)} " if named else ""
-    return where + shlex.join([command, *arguments])

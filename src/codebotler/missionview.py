@@ -11,10 +11,10 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.home import pasted
 from codebotler.live import in_words
 from codebotler.mission import State
 from codebotler.missionlog import Line, Summary
+from codebotler.pasted import mission_command
 from codebotler.robots.base import Readiness
 from codebotler.skills import SKILLS
 from codebotler.storyboard import grid
@@ -143,7 +143,7 @@ def ending(summary: Summary) -> Group:
     text = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))
     if state is State.STOPPED:
         text.append("\nthe robot has stopped")
-    again = f"`{pasted('codebotler', 'missions', summary.id)}` shows it again"
+    again = f"`{mission_command('missions', summary.id)}` shows it again"
     return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -66,11 +67,20 @@ def as_judged(run: Path, suite: Suite, *, ablated: bool) -> Suite:
 
 def command(verb: str, *arguments: object, suite: str, ablated: bool = False) -> str:
     """A command for the user to paste."""
-    import shlex
+    from codebotler.pasted import runnable
 
-    words = ["roboeval", verb, *map(str, arguments)]
+    return shlex.join([runnable("roboeval"), *_words(verb, *arguments, suite=suite, ablated=ablated)])
+
+
+def command_anywhere(verb: str, *arguments: object, suite: str) -> str:
+    """A command for whoever reads it, wherever that is."""
+    return shlex.join(["roboeval", *_words(verb, *arguments, suite=suite)])
+
+
+def _words(verb: str, *arguments: object, suite: str, ablated: bool = False) -> list[str]:
+    words = [verb, *map(str, arguments)]
     words += [] if suite == "paper" else ["--suite", suite]
-    return shlex.join([*words, "--ablation"] if ablated else words)
+    return [*words, "--ablation"] if ablated else words
 
 
 def options_of(evaluation: Evaluation, suite: Suite) -> list[str]:

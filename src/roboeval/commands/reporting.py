@@ -15,6 +15,7 @@ from roboeval.commands.options import (
     WorkersOption,
     as_judged,
     command,
+    command_anywhere,
     cores,
     expect_current,
     load,
@@ -84,7 +85,7 @@ def report(
         *([] if check else ["--no-check"]),
     ]
     words += [word for text in price or () for word in ("--price", text)]
-    wishes = Wishes(published, prices, command("report", *words, suite=suite))
+    wishes = Wishes(published, prices, command_anywhere("report", *words, suite=suite))
     with busy("putting together"):
         parts = sections(read, known, wishes)
     written = write_report(*headline(read, known), parts, out)

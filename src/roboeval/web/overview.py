@@ -10,6 +10,7 @@ from typing import Any
 from nicegui import html, ui
 
 from codebotler.badinput import BadInput
+from codebotler.pasted import runnable
 from codebotler.terminal import shortened
 from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Press, Words
@@ -32,7 +33,7 @@ ORDERS: Mapping[str, Callable[[Mapping[str, Any]], tuple[float, str]]] = {
 SORTED = {"Run": "ascending", "pass@1": "descending", "Completions": "descending"}
 GROWING = {State.READING, State.GENERATING, State.JUDGING}
 NOTHING = "There is no run here yet. The first one, without a key or a network:"
-FIRST = "roboeval run --model recorded:hasty --num-completions 3"
+FIRST = "run --model recorded:hasty --num-completions 3"
 MOST_NAME = 80
 
 
@@ -85,7 +86,7 @@ class _Table:
         self._empty = ui.element("div").classes("first-run")
         with self._empty:
             Words("p", NOTHING, "quiet")
-            Words("pre", FIRST, "source").props("tabindex=0")
+            Words("pre", f"{runnable('roboeval')} {FIRST}", "source").props("tabindex=0")
         self._form = ui.element("form").props("action=/side-by-side method=get")
         with self._form:
             with (
