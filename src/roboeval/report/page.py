@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -123,11 +124,15 @@ def _table(sheet: Sheet) -> str:
     return f'<div class="sheet" id="table-{name}"><h3>{title}</h3>{inside}</div>\n'
 
 
+BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")
+"""Where a long name may go on in the next line."""
+
+
 def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
     cells = []
     for number, (cell, column) in enumerate(zip(row, columns, strict=True)):
         sort = "" if cell is None or isinstance(cell, str) else f' data-v="{cell!r}"'
-        words = _text(told(cell, column.kind))
+        words = BREAKS.sub("<wbr>", _text(told(cell, column.kind)))
         is_head = number == 0 and column.kind == "text"
         tag = 'th scope="row"' if is_head else "td"
         long = " long" if isinstance(cell, str) and len(cell) > LONG_TEXT else ""

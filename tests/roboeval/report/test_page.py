@@ -17,7 +17,7 @@ from roboeval.report.writing import pieces, write_report
 class Tags(HTMLParser):
     """Collects the tags, attributes and words of a page, and complains about what is not closed."""
 
-    VOID = ("meta", "img", "source", "br", "input")
+    VOID = ("meta", "img", "source", "br", "input", "wbr")
 
     def __init__(self, text: str) -> None:
         super().__init__()
