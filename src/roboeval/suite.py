@@ -7,7 +7,7 @@ import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import lru_cache, partial
 from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
@@ -143,8 +143,22 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     return _read_suite(folder.resolve(), skills)
 
 
-@cache
 def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
+    """The suite in a folder as its files are now, which are read again only if they have changed."""
+    files = [folder / "suite.yaml", *sorted((folder / "tasks").glob("*.yaml"))]
+    stats = [(file.name, file.stat()) for file in files if file.is_file()]
+    as_they_are = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
+    return _suite_of(folder, skills, count, seed, as_they_are)
+
+
+Files: TypeAlias = tuple[tuple[str, int, int], ...]
+"""The name, the time of the last change in nanoseconds, and the size in bytes of each."""
+
+
+@lru_cache(maxsize=8)  # a training loop may draw other worlds for each step
+def _suite_of(
+    folder: Path, skills: SkillTable, count: int | None, seed: int | None, _as_they_are: Files
+) -> Suite:
     file = YamlFile.read(folder / "suite.yaml")
     head = file.validate(SuiteFile)
     if head.name.endswith(ABLATED):

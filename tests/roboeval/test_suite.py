@@ -206,6 +206,17 @@ def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
     assert load_suite(str(tmp_path / folder)).name == name
 
 
+def test_a_suite_is_read_anew_only_when_its_files_have_changed(tmp_path: Path) -> None:
+    folder = a_suite(tmp_path)
+    before = load_suite(folder)
+    assert load_suite(folder) is before
+    (tmp_path / "tasks" / "T.yaml").write_text(TASK.replace("about: one", "about: another"))
+    after = load_suite(folder)
+    assert [scenario.world.about for scenario in after.task("T").scenarios] == ["another"]
+    (tmp_path / "tasks" / "U.yaml").write_text(TASK.replace("name: T", "name: U"))
+    assert [*load_suite(folder).tasks] == ["T", "U"]
+
+
 def test_the_rules_of_the_paper() -> None:
     suite = load_suite("paper")
     assert (suite.rules.limits.seconds, suite.rules.limits.calls, suite.rules.limits.ticks) == (

@@ -1,6 +1,7 @@
 """Drawn worlds: what a description may say, what is drawn from it, and what each world then requires."""
 
 import ast
+import gc
 from pathlib import Path
 from random import Random
 
@@ -9,7 +10,7 @@ import pytest
 from codebotler.badinput import BadInput
 from roboeval.expression import ExpressionError, PersonFact, each_of, parsed, value
 from roboeval.pairwise import covering, met, pairs, spread
-from roboeval.suite import load_suite
+from roboeval.suite import Suite, load_suite
 
 SUITE = "name: mine\nversion: 1\nabout: my tasks\nworlds: 12\nseed: 3\n"
 TASK = """\
@@ -95,6 +96,15 @@ def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: 
     assert more.with_own_worlds().digest == mine.digest
     assert other.tasks["Tea"].scenarios[2:] != mine.tasks["Tea"].scenarios[2:]
     assert other.tasks["Tea"].scenarios[:2] == mine.tasks["Tea"].scenarios[:2]
+
+
+def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:
+    mine = load_suite(suite(tmp_path))
+    for seed in range(30):
+        mine.with_worlds(seed=seed)
+    gc.collect()
+    held = [one for one in gc.get_objects() if isinstance(one, Suite) and one.name == mine.name]
+    assert len(held) < 12
 
 
 def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:

@@ -86,6 +86,10 @@ def test_names_of_models_are_text() -> None:
     assert Tags(text).tags.count("script") == 1
 
 
+def test_long_names_may_be_broken(usual: Path) -> None:
+    assert "Task<wbr>Completion<wbr>Error" in (usual / "index.html").read_text()
+
+
 def test_only_the_script_of_the_page_may_run() -> None:
     policy = re.search(r'Content-Security-Policy" content="([^"]+)"', page("t", [], [], {}))
     assert policy is not None
