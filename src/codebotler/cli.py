@@ -249,8 +249,8 @@ def serve(
 ) -> None:
     """Serve the page from which a robot is operated, until Ctrl-C, which also stops the robot."""
     from codebotler.home import home
-    from codebotler.models.base import Settings
-    from codebotler.models.open import kind_of, open_model
+    from codebotler.models.base import Model, Settings
+    from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_faced, open_robot
@@ -263,11 +263,16 @@ def serve(
     models = tuple(model or ("recorded:careful", "recorded:hasty"))
     for each in models:
         kind_of(each)
-    settings = Settings(base_url=base_url)
+    if base_url is not None:
+        expect_server(*models)
+
+    def opened(name: str) -> Model:
+        return open_model(name, Settings(base_url=base_url if runs_on_server(name) else None))
+
     options = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
     body = open_robot(robot, options) if shown is None else open_faced(robot, options, shown)
-    desk = Desk(body, home(), lambda m: open_model(m, settings), models=models, world=known, face=shown)
+    desk = Desk(body, home(), opened, models=models, world=known, face=shown)
 
     from codebotler.web.further import installed
     from codebotler.web.serving import serve as serve_page

@@ -152,8 +152,9 @@ class Run:
         """Keep other processes from writing this run.
 
         Raises:
-            BadInput: one is writing it, or the folder cannot be written.
+            BadInput: one is writing it, or the folder cannot be written, or is one of other things.
         """
+        self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
         try:
@@ -177,6 +178,16 @@ class Run:
             raise
         finally:
             os.close(descriptor)
+
+    def _expect_no_others(self) -> None:
+        """Refuse a folder that holds something, and is no run."""
+        if self.completions.exists() or self.about.exists() or not self.path.is_dir():
+            return
+        others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
+        if others:
+            raise BadInput(
+                f'is no run, but holds other files, such as "{others[0]}"; name a new folder', file=self.path
+            )
 
     def keep(self, source: Source) -> int:
         """Make this the run of a source's completions: copy them, unless they are here already.

@@ -335,6 +335,16 @@ def test_a_full_disk_leaves_an_exported_table_as_it_was(tmp_path: Path) -> None:
         assert not (tmp_path / "table.new").exists()
 
 
+@pytest.mark.parametrize("verb", ["evaluate", "import"])
+def test_a_folder_of_other_things_is_no_place_for_a_run(tmp_path: Path, verb: str) -> None:
+    (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "mine.md").write_text("mine")
+    said = refused(verb, "a.jsonl", "--out", "docs", cwd=tmp_path)
+    assert said == 'docs: is no run, but holds other files, such as "mine.md"; name a new folder'
+    assert [path.name for path in (tmp_path / "docs").iterdir()] == ["mine.md"]
+
+
 def test_an_output_that_is_full_or_closed() -> None:
     ended = roboeval("tasks", "--json", after="> /dev/full")
     assert ended.status == 1

@@ -82,6 +82,17 @@ def test_what_is_refused(runs: Path, tmp_path: Path) -> None:
     assert refused("report", runs / "careful", "--out", "") == "nothing is named; name a folder"
 
 
+def test_a_folder_of_other_things_is_no_place_for_a_report(runs: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "figures" / "tasks.pdf"
+    mine.parent.mkdir()
+    mine.write_text("mine")
+    said = refused("report", runs / "careful", "--out", tmp_path, "--no-check")
+    assert said == f'{tmp_path}: is no report, but holds other files, such as "figures"; name a new folder'
+    (tmp_path / "index.html").write_text("my own page")
+    assert refused("report", runs / "careful", "--out", tmp_path, "--no-check") == said
+    assert (mine.read_text(), (tmp_path / "index.html").read_text()) == ("mine", "my own page")
+
+
 def test_runs_of_different_suites_are_not_set_side_by_side(runs: Path) -> None:
     head = runs / "careful" / "evaluations" / "paper.json"
     kept = head.read_text()

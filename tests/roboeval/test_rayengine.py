@@ -222,7 +222,7 @@ def test_who_wants_no_more_results_harms_nothing() -> None:
         for number in range(40):  # a shard that was cancelled when just done would abort this process soon
             results = cluster.map_distinct(lambda _, key: key, range(500), name=lambda key: b"%d" % key)
             assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
-            results.close()
+            del results
 
 
 def test_a_node_that_is_killed_in_the_middle_loses_nothing(nodes: Nodes, paper: Suite) -> None:

@@ -25,6 +25,8 @@ def open_model(name: str, settings: Settings) -> Model:
         BadInput: there is no such model, a key is not in the environment, or something is not installed.
     """
     kind, rest = kind_of(name), name.partition(":")[2]
+    if settings.base_url is not None:
+        expect_server(name)
     # Each of these imports a large library, which only who uses it should wait for.
     match kind:
         case "recorded":
@@ -43,6 +45,27 @@ def open_model(name: str, settings: Settings) -> Model:
             from codebotler.models.chat import Chat  # noqa: PLC0415 - see above
 
             return Chat(name, settings)
+
+
+def expect_server(*names: str) -> None:
+    """Refuse models none of which runs on a server, where it is said at which URL it does.
+
+    Args:
+        names: of the models.
+
+    Raises:
+        BadInput: nobody would be asked there.
+    """
+    if not any(map(runs_on_server, names)):
+        raise BadInput(
+            f"a base URL is given, but {' and '.join(names)} run{'s' * (len(names) == 1)} on no server; "
+            "name a model that does, such as openai-chat:NAME"
+        )
+
+
+def runs_on_server(name: str) -> bool:
+    """Whether a model is asked over HTTP, rather than recorded or on this machine."""
+    return kind_of(name) not in {"recorded", "hf"}
 
 
 def kind_of(name: str) -> str:

@@ -60,8 +60,9 @@ def report(
     from roboeval.report.contents import Wishes, headline, sections
     from roboeval.report.cost import expect_known, price_from
     from roboeval.report.reading import named_apart
-    from roboeval.report.writing import pieces, write_report
+    from roboeval.report.writing import expect_no_others, pieces, write_report
 
+    expect_no_others(out)
     prices = tuple(map(price_from, price or ()))
     known = as_judged(runs[0], load(suite), ablated=False)
     evaluations = [open_evaluation(run, known, suite, ablated=False) for run in runs]

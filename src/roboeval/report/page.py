@@ -24,6 +24,10 @@ Drawn = tuple[bytes, bytes]
 """A figure as SVG, for light pages and for dark ones."""
 
 
+GENERATOR = '<meta name="generator" content="RoboEval">'
+"""By which a page that stands in a folder is known to be a report."""
+
+
 def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Mapping[str, Drawn]) -> str:
     """The page. Every text in it is text: whatever a model wrote is shown and never obeyed.
 
@@ -42,6 +46,7 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Ma
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        f"{GENERATOR}\n"
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
         f"<title>{_text(title)}</title>\n<style>\n{STYLE.read_text()}</style>\n</head>\n<body>\n"

@@ -9,11 +9,15 @@ from pathlib import Path
 from codebotler.badinput import BadInput
 from roboeval.report.contents import Picture, Section
 from roboeval.report.drawing import DARK, LIGHT, looking, written
-from roboeval.report.page import Drawn, page
+from roboeval.report.page import GENERATOR, Drawn, page
 from roboeval.report.sheets import Sheet, write_csv
 from roboeval.run import write_whole
 
 FORMATS = ("png", "pdf")
+PARTS = ("figures", "tables")
+PAGE = "index.html"
+UNFINISHED = ("This report is not finished; give the command again that writes it.",)
+HEAD = 4_000  # characters at the beginning of a page, in which it says what it is
 OPTIONAL = {
     *("abilities", "accepted", "beside", "beside-tasks", "budget", "coming-back", "cost", "differences"),
     *("failures", "published", "rejection-sampling", "rejection-sampling-curves", "reversals"),
@@ -22,7 +26,7 @@ OPTIONAL = {
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
-    """Write a report into a folder, which is made if it is not there; the page comes last.
+    """Write a report into a folder, which is made if it is not there; the whole page comes last.
 
     Args:
         title: of the page.
@@ -39,10 +43,12 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
     """
     parts = [part for section in sections for part in section.parts]
     try:
-        for folder in (out / "figures", out / "tables"):
-            folder.mkdir(parents=True, exist_ok=True)
+        for name in PARTS:
+            (out / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(f"cannot be made ({error.strerror})", file=out) from None
+    if not (out / PAGE).exists():
+        write_whole(out / PAGE, page(title, UNFINISHED, [], {}).encode())
     drawn: dict[str, Drawn] = {}
     for part in parts:
         match part:
@@ -55,9 +61,34 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
                 yield part.name
             case _:
                 pass
-    write_whole(out / "index.html", page(title, lead, sections, drawn).encode())
+    write_whole(out / PAGE, page(title, lead, sections, drawn).encode())
     _forget_others(out, {*drawn, *(part.name for part in parts if isinstance(part, Sheet))})
     yield "page"
+
+
+def expect_no_others(out: Path) -> None:
+    """Refuse a folder that holds something else than a report.
+
+    Args:
+        out: the folder, which need not exist.
+
+    Raises:
+        BadInput: files would be lost there.
+    """
+    if not out.is_dir():
+        return
+    others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
+    if others and not _is_report(out / PAGE):
+        raise BadInput(
+            f'is no report, but holds other files, such as "{others[0]}"; name a new folder', file=out
+        )
+
+
+def _is_report(page_file: Path) -> bool:
+    if not page_file.is_file():
+        return False
+    with page_file.open(errors="replace") as file:
+        return GENERATOR in file.read(HEAD)
 
 
 def _forget_others(out: Path, names: AbstractSet[str]) -> None:

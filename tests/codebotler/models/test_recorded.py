@@ -8,7 +8,7 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.models import base
 from codebotler.models.base import Settings
-from codebotler.models.open import open_model
+from codebotler.models.open import expect_server, open_model
 from codebotler.models.recorded import NAMES, read_replies, recorded_model
 from codebotler.prompts import prompt_for
 
@@ -153,6 +153,18 @@ def test_settings_out_of_range_are_told(wrong: dict[str, Any], sentence: str) ->
         Settings(**wrong)
     assert str(caught.value).startswith(sentence)
     assert "sk-secret" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["recorded", "hf:folder"])
+def test_who_runs_on_no_server_has_no_base_url(name: str) -> None:
+    with pytest.raises(BadInput, match=f"^a base URL is given, but {name} runs on no server; name a model"):
+        open_model(name, Settings(base_url="http://localhost:8000/v1"))
+
+
+def test_of_several_models_one_is_enough_for_a_base_url() -> None:
+    expect_server("recorded", "openai-chat:mine")
+    with pytest.raises(BadInput, match="but recorded and recorded:hasty run on no server"):
+        expect_server("recorded", "recorded:hasty")
 
 
 def test_seed_counts_on_with_the_number_of_the_reply() -> None:

@@ -11,7 +11,7 @@ from made_up_runs import HOSTILE, SUITE, cases, made_up
 from roboeval.report.contents import Picture, Section, Wishes, sections
 from roboeval.report.page import page
 from roboeval.report.reading import JudgedRun
-from roboeval.report.writing import pieces, write_report
+from roboeval.report.writing import expect_no_others, pieces, write_report
 
 
 class Tags(HTMLParser):
@@ -111,6 +111,13 @@ def test_the_same_runs_give_the_same_bytes(usual: Path, tmp_path: Path) -> None:
     assert len(files) > 15
     for file in files:
         assert (usual / file).read_bytes() == (again / file).read_bytes(), file
+
+
+def test_a_report_that_was_interrupted_is_one_and_says_so(tmp_path: Path) -> None:
+    piece = next(write_report("a report", ["about it"], parts([made_up("a", {"Visit": (10,)})]), tmp_path))
+    assert piece in {path.stem for path in tmp_path.glob("*/*")}
+    assert "This report is not finished" in (tmp_path / "index.html").read_text()
+    expect_no_others(tmp_path)
 
 
 def test_what_an_earlier_report_had_more_is_gone(usual: Path, tmp_path: Path) -> None:
