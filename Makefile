@@ -1,13 +1,13 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
 # installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
 # FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
-# `make test-transformers` tests models and detectors that run on this machine, with a Python for which there is a
-# torch (3.11); it makes an environment of its own, since nothing else needs so much. `make test-pyrobosim` tests the
-# robot in pyrobosim in one, too; `make test-inspect` and `make test-ray` test the benchmark in Inspect and on a Ray
-# cluster, and share one. `make test-faults` asks a server that fails one request in ten. `make test-ros1` tests
-# robots on ROS 1, for which the system's Python must have rospy (`codebotler robots` says what is missing). `make
-# test-browser` tests the page in Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make
-# pictures` makes those of the guide anew. `make docs` makes the documentation as a site, in build/site.
+# `make test-transformers` tests models and detectors that run on this machine; it makes an environment with torch of
+# its own, since nothing else needs so much. `make test-pyrobosim` tests the robot in pyrobosim in one, too; `make
+# test-inspect` and `make test-ray` test the benchmark in Inspect and on a Ray cluster, and share one. `make
+# test-faults` asks a server that fails one request in ten. `make test-ros1` tests robots on ROS 1, for which the
+# system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
+# Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make pictures` makes those of the
+# guide anew. `make docs` makes the documentation as a site, in build/site.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
