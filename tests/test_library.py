@@ -129,6 +129,7 @@ for wrong in ({"retries": -1}, {"model": "nobody"}, {"temperature": -1}):
     [
         ("kitchen", "the rooms are one text; put it into a list"),
         ([1, 2], "one of the rooms is 1, not a text"),
+        ({"hall"}, "the rooms are {'hall'}, not a list of texts"),
         (5, "the rooms are 5, not a list of texts"),
     ],
 )
@@ -138,6 +139,8 @@ def test_rooms_that_are_no_names_are_refused(rooms: object, sentence: str) -> No
         codebotler.check("def task_program():\n    go_to('kitchen')\n", rooms=wrong)
     with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
         codebotler.generate("Go to the kitchen.", rooms=wrong)
+    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+        codebotler.prompt_for("Go to the kitchen.", rooms=wrong)
 
 
 @pytest.mark.parametrize(
@@ -150,6 +153,7 @@ def test_rooms_that_are_no_names_are_refused(rooms: object, sentence: str) -> No
         ({"workers": 0}, "the number of workers is 0, but it must be at least 1"),
         ({"workers": 1.5}, "the number of workers is 1.5, not a whole number"),
         ({"start": 3}, "the start is 3, not a text"),
+        ({"behaviours": {"fly": print}}, 'no behaviour says what the skill "get_current_location" does'),
     ],
 )
 def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], sentence: str) -> None:
@@ -166,11 +170,33 @@ def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], sen
         ({"timeout": None}, "the timeout is None, not a number"),
         ({"max_tokens": True}, "the limit of tokens is True, not a whole number"),
         ({"seed": 1.5}, "the seed is 1.5, not a whole number"),
+        ({"model": None}, "the model's name is None, not a text"),
     ],
 )
 def test_settings_of_another_kind_are_refused(wrong: dict[str, Any], sentence: str) -> None:
     with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
         codebotler.generate("Say hello.", **wrong)
+
+
+def test_what_is_no_text_has_no_program_and_no_prompt() -> None:
+    wrong: Any = None
+    with pytest.raises(codebotler.BadInput, match=r"^the reply is None, not a text$"):
+        codebotler.program_of(wrong)
+    with pytest.raises(codebotler.BadInput, match=r"^the instruction is None, not a text$"):
+        codebotler.prompt_for(wrong)
+
+
+def test_the_name_of_a_suite_is_none() -> None:
+    wrong: Any = "paper"
+    sentence = "^the suite is 'paper', but it must be one that load_suite has read$"
+    with pytest.raises(codebotler.BadInput, match=sentence):
+        roboeval.evaluate([], wrong)
+    with pytest.raises(codebotler.BadInput, match=sentence):
+        next(roboeval.recorded_completions("recorded", wrong))
+    with pytest.raises(codebotler.BadInput, match=sentence):
+        next(roboeval.read_completions("x.jsonl", wrong))
+    with pytest.raises(codebotler.BadInput, match=r"^x\.jsonl: there is no such file$"):
+        next(roboeval.read_completions("x.jsonl"))
 
 
 def test_a_suite_is_named_by_a_text_or_a_folder(tmp_path: Path) -> None:

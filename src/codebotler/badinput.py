@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import date
 from numbers import Integral, Real
 from pathlib import Path
@@ -265,7 +265,7 @@ def expect_texts(given: object, what: str) -> None:
     """
     if isinstance(given, str):
         raise BadInput(f"{what} are one text; put it into a list")
-    if not isinstance(given, Collection):
+    if not isinstance(given, Sequence):  # a set is in another order each time
         raise BadInput(f"{what} are {given!r}, not a list of texts")
     for one in given:
         expect_text(one, f"one of {what}")

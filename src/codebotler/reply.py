@@ -9,6 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from codebotler.badinput import expect_text
 from codebotler.program import TASK, Problem, Program, bound_names, entries, parsed, undefined_names
 from codebotler.skills import SKILLS
 
@@ -24,7 +25,11 @@ def program_of(reply: str) -> Program:
 
     Args:
         reply: code with or without fences and prose, or the indented body of `task_program` alone.
+
+    Raises:
+        BadInput: the reply is no text.
     """
+    expect_text(reply, "the reply")
     lines = re.split(r"\r\n|\r|\n", reply)
     if _is_plain(lines):
         return Program(_text(lines))

@@ -12,14 +12,15 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO, SupportsIndex, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from codebotler.badinput import BadInput
+from codebotler.badinput import BadInput, expect_text
 from codebotler.models.recorded import recorded_model
-from roboeval.suite import Suite
+from roboeval.suite import Suite, expect_suite
 
 MAX_ROW = 5_000_000
 MAX_EVALUATION = 1_000_000_000  # of our own rows: a trace may be a million characters in each of many worlds
@@ -127,7 +128,11 @@ def _parsed(line: bytes, name: Path | str, number: int, mend: str) -> dict[str, 
 
 
 def read_completions(
-    path: Path, suite: Suite | None = None, *, growing: bool = False, name: Path | str | None = None
+    path: str | PathLike[str],
+    suite: Suite | None = None,
+    *,
+    growing: bool = False,
+    name: Path | str | None = None,
 ) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
 
@@ -140,7 +145,10 @@ def read_completions(
     Raises:
         BadInput: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
     """
+    path = Path(path)
     name = name or path
+    if suite is not None:
+        expect_suite(suite)
     seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
     for number, row in read_rows(path, growing=growing, name=name, example=EXAMPLE):
         try:
@@ -247,7 +255,7 @@ def unknown(key: Key, suite: Suite) -> str | None:
 
 def _is_whole(number: object) -> bool:
     """Whether it is a whole number, of any library's kind."""
-    return isinstance(number, SupportsIndex)
+    return isinstance(number, SupportsIndex) and not isinstance(number, bool)
 
 
 def name_of(key: Key) -> str:
@@ -264,8 +272,10 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     """Every reply that a recorded model has for a suite's prompts, as completions.
 
     Raises:
-        BadInput: there is no such model, or it knows none of the suite's instructions.
+        BadInput: there is no such model or suite, or the model knows none of its instructions.
     """
+    expect_text(name, "the model's name")
+    expect_suite(suite)
     model = recorded_model(name)
     found = False
     for task in suite.tasks.values():

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import CancelledError, Future
 from dataclasses import dataclass
 from functools import partial
+from os import PathLike
 from statistics import fmean
 
 from codebotler.badinput import BadInput, expect_texts
@@ -33,7 +34,7 @@ def reward(
     *,
     worlds: int | None = None,
     seed: int | None = None,
-    suite: Suite | str = "paper",
+    suite: Suite | str | PathLike[str] = "paper",
 ) -> list[float]:
     """Say of each program how much of its task it does: 1 exactly if it passes, 0 if it does nothing.
 
@@ -59,7 +60,7 @@ def reward(
         EngineError: no isolated process could be started.
     """
     expect_texts(programs, "the programs")
-    chosen = load_suite(suite) if isinstance(suite, str) else suite
+    chosen = suite if isinstance(suite, Suite) else load_suite(suite)
     if worlds is not None or seed is not None:
         chosen = chosen.with_worlds(worlds, seed)
     if (problem := unknown((task, prompt, 0), chosen)) is not None:

@@ -44,6 +44,19 @@ Further: TypeAlias = Callable[[Task, int, int], tuple[Scenario, ...]]
 """Makes so many worlds of a task with what they require, from a seed; the same seed makes the same ones."""
 
 
+def expect_suite(given: object) -> None:
+    """Refuse what is no suite, such as the name of one.
+
+    Args:
+        given: what was given.
+
+    Raises:
+        BadInput: it is none.
+    """
+    if not isinstance(given, Suite):
+        raise BadInput(f"the suite is {given!r}, but it must be one that load_suite has read")
+
+
 @dataclass(frozen=True)
 class Suite:
     """Tasks and the rules by which they are judged.

@@ -19,7 +19,7 @@ from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
 from roboeval.engines import Local, OpenEngine
 from roboeval.records import Completion, unknown
-from roboeval.suite import Requirement, Scenario, Suite
+from roboeval.suite import Requirement, Scenario, Suite, expect_suite
 from roboeval.taxonomy import Verdict, failure
 
 
@@ -73,9 +73,11 @@ def evaluate(
         engine: where programs are run; by default in so many lanes of this machine, started and ended for it.
 
     Raises:
-        BadInput: there are no workers; or, when it is read, a completion is none or not of the suite.
+        BadInput: there are no workers or no suite; or, when it is read, a completion is none or not of the
+            suite.
         EngineError: no isolated process can be started.
     """
+    expect_suite(suite)
     chosen = engine or Local(workers, require_isolation=require_isolation)
     return _evaluated(completions, suite, ablated=ablated, engine=chosen)
 

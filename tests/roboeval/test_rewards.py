@@ -166,6 +166,9 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
     wrong: Any = "7"
     with pytest.raises(BadInput, match="the seed is '7', not a whole number"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", seed=wrong)
+    wrong = None
+    with pytest.raises(BadInput, match="the suite's name is None, not a text"):
+        reward("SayGoodDay", 0, [RIGHT], suite=wrong)
     assert reward("SayGoodDay", 0, []) == []
 
 
@@ -175,6 +178,7 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
         ("LunchTime", 0, [None], "one of the programs is None, not a text"),
         ("LunchTime", 0, None, "the programs are None, not a list of texts"),
         ("LunchTime", "0", [], "the prompt is '0', not a whole number; the task has prompts 0 to 4"),
+        ("LunchTime", True, [], "the prompt is True, not a whole number; the task has prompts 0 to 4"),
         ("LunchTime", -1, [], "LunchTime/-1/0: the task has prompts 0 to 4"),
         (["LunchTime"], 0, [], "the suite has no task"),
     ],

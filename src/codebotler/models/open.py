@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codebotler.badinput import BadInput
+from codebotler.badinput import BadInput, expect_text
 from codebotler.models.base import Model, Settings
 from codebotler.models.recorded import Recital, recorded_model
 
@@ -24,6 +24,7 @@ def open_model(name: str, settings: Settings) -> Model:
     Raises:
         BadInput: there is no such model, a key is not in the environment, or something is not installed.
     """
+    expect_text(name, "the model's name")
     kind, rest = kind_of(name), name.partition(":")[2]
     if settings.base_url is not None:
         expect_server(name)

@@ -13,6 +13,7 @@ from pathlib import Path
 from string import Template
 from typing import Literal, TypeAlias
 
+from codebotler.badinput import expect_text, expect_texts
 from codebotler.program import TASK
 from codebotler.skills import SKILLS, Skill, SkillTable
 from codebotler.syntaxtree import parse
@@ -127,7 +128,12 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
         instruction: what the robot is to do, in plain words.
         rooms: the names of all rooms, if they are known.
         skills: what a program may call.
+
+    Raises:
+        BadInput: the instruction is no text, or the rooms are no list of texts.
     """
+    expect_text(instruction, "the instruction")
+    expect_texts(rooms, "the rooms")
     about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
     wish = "\n\n".join(filter(None, (instruction.strip(), about_rooms)))
     stubs = [_stub(skill) for skill in skills.values()]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
 
+from codebotler.badinput import BadInput
 from codebotler.simulator.rules import PAPER, Matching, Rules
 from codebotler.skills import SKILLS, SkillTable
 from codebotler.trace import Event, Option, Trace
@@ -87,6 +88,9 @@ class SimulatedRobot:
         rules: how requests are matched.
         skills: the skills that can be called.
         behaviours: what each skill does, by name.
+
+    Raises:
+        BadInput: it does not say what one of them does.
     """
 
     def __init__(
@@ -98,6 +102,8 @@ class SimulatedRobot:
     ) -> None:
         self.rules, self.skills = rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
+        if missing := [name for name in skills if name not in self.behaviours]:
+            raise BadInput(f'no behaviour says what the skill "{missing[0]}" does')
         self.never_fails = frozenset(name for name, does in self.behaviours.items() if does is say)
         self.only_looks = frozenset(name for name, does in self.behaviours.items() if does in LOOKING)
         self.rooms = tuple(room.name for room in world.rooms)
