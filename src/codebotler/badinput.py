@@ -325,7 +325,7 @@ def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
 
 
 def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
-    """The text that a file's bytes are, with the line ends of any system.
+    """The text that a file's bytes are, with the line ends of any system and without a byte order mark.
 
     Args:
         data: the bytes; of a larger file one more than the limit is enough.
@@ -338,7 +338,7 @@ def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
     if len(data) > limit:
         raise BadInput(f"is larger than {limit:,} bytes", file=name)
     try:
-        return io.StringIO(data.decode(), newline=None).read()
+        return io.StringIO(data.decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise BadInput("is no UTF-8 text; save it as UTF-8", file=name, line=line) from None

@@ -22,3 +22,17 @@ def home() -> Path:
         return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
     except RuntimeError:
         raise BadInput("nobody knows where your home is; set CODEBOTLER_HOME to a folder") from None
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder there, if it is not there already.
+
+    Raises:
+        BadInput: this is not allowed.
+        OSError: it cannot be made for another reason.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except PermissionError as error:
+        sentence = f"this cannot be made ({error.strerror}); name another folder by CODEBOTLER_HOME"
+        raise BadInput(sentence, file=folder) from None

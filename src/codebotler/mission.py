@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeAlias
 
+from codebotler.home import make_folder
 from codebotler.live import LiveRobot, StoppedError
 from codebotler.missionlog import Line, Log, Summary
 from codebotler.missionpictures import Pictures
@@ -355,7 +356,7 @@ def _reason(error: BaseException) -> str:
 
 def _new_folder(missions: Path) -> Path:
     """A folder that no mission has, named by the time."""
-    missions.mkdir(parents=True, exist_ok=True)
+    make_folder(missions)
     name = f"{datetime.now().astimezone():%Y%m%d-%H%M%S}"
     number = 1
     while True:

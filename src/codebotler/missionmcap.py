@@ -208,5 +208,7 @@ def export(
         with new.open("xb") as file:
             write_mcap(file, summary, events, folder=folder, clock=clock)
         new.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         new.unlink(missing_ok=True)

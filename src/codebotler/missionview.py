@@ -177,9 +177,11 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
     if summary.model:
         head.append(f"\nwritten by {shortened(summary.model)}", "dim")
     table = grid("left", "right", "left")
+    before: Text | None = None
     for line in events:
         text = told(line)
-        if text is not None:
+        if text is not None and text != before:  # another program, while one is drafted, is no other state
+            before = text if line["event"] == "state" else None
             at = datetime.fromtimestamp(line["time"]).astimezone()
             table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_at(line), "dim"), text)
     state = State(summary.state)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.badinput import MAX_BYTES, BadInput, YamlFile, read_text
+from codebotler.badinput import MAX_BYTES, BadInput, YamlFile, read_text, text_of
 
 
 class Inner(BaseModel):
@@ -245,6 +245,10 @@ def test_part_of_a_file_is_validated_where_it_stands() -> None:
     assert file.validate(Inner, file.data[0], at=(0,)) == Inner(name="a")
     with pytest.raises(BadInput, match=re.escape('w.yaml, line 2: "name" is a number, not a text')):
         file.validate(Inner, file.data[1], at=(1,))
+
+
+def test_byte_order_mark_is_no_part_of_the_text() -> None:
+    assert text_of(b"\xef\xbb\xbfdef f(): ...\r\n", "f.py") == "def f(): ...\n"
 
 
 def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_path: Path) -> None:

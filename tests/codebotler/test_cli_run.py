@@ -315,6 +315,15 @@ def test_home_that_is_no_folder_is_said(folder: Path, what: str) -> None:
         assert "home/missions: this cannot be a folder of missions; name another by CODEBOTLER_HOME" in err
 
 
+def test_home_that_cannot_be_made_is_said(folder: Path) -> None:
+    words = ("run", "good.py", "--yes", "--world", "world.yaml")
+    process = command(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
+    _, err = process.communicate("", timeout=60)
+    assert process.returncode == 2
+    assert err.startswith("codebotler: /sys/home/robots: this cannot be made (")
+    assert err.endswith("; name another folder by CODEBOTLER_HOME\n")
+
+
 def test_two_tools_on_one_robot(folder: Path) -> None:
     process = driving(folder)
     with stopping(process):
@@ -427,6 +436,18 @@ def test_mission_is_written_as_mcap(folder: Path) -> None:
         with (folder / "one.mcap").open("rb") as file:
             topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
         assert topics == {"/mission/state", "/skill/go_to", "/skill/is_in_room", "/skill/pick", "/skill/say"}
+
+
+def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:
+    run(folder, "good.py", "--yes")
+    status, _, err = ended(folder, "missions", "last", "--mcap", "/nowhere/one.mcap")
+    assert (status, err) == (2, "codebotler: /nowhere/one.mcap: No such file or directory\n")
+
+
+def test_mission_tells_each_state_once(folder: Path) -> None:
+    run(folder, "good.py", "--yes")
+    _, out, _ = ended(folder, "missions", "last")
+    assert out.count("drafting") == 1
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ from pydantic_ai.settings import ModelSettings
 
 from codebotler.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
-from codebotler.models.faults import brief, broken_off, fault, late, refused, retry_after
+from codebotler.models.faults import brief, broken_off, fault, late, refused, retry_after, unreachable
 from codebotler.models.keys import blank_is_unset, key_in
 from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.prompts import Message, Prompt, Shown
@@ -138,7 +138,8 @@ class Chat:
             hopeless = isinstance(
                 error, exceptions.ModelRequestRejectedError | exceptions.ModelQuotaExceededError
             )
-            return fault(self.name, error, may_pass=not hopeless)
+            nobody = unreachable(self.name, error, self.settings.base_url)
+            return nobody or fault(self.name, error, may_pass=not hopeless)
         if isinstance(error, exceptions.ContentFilterError | exceptions.UserError):
             return fault(self.name, error, may_pass=False)
         if isinstance(error, exceptions.UnexpectedModelBehavior):

@@ -11,7 +11,7 @@ from openai.types import Completion
 
 from codebotler.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
-from codebotler.models.faults import broken_off, fault, late, refused, retry_after
+from codebotler.models.faults import broken_off, fault, late, refused, retry_after, unreachable
 from codebotler.models.keys import key_in
 from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.prompts import Prompt
@@ -114,7 +114,8 @@ class Completions:
                 retry_after=retry_after(error.response.headers),
                 hopeless=error.code == NO_MONEY,
             )
-        return fault(self.name, error, may_pass=True)  # what is told within a stream has no status
+        nobody = unreachable(self.name, error, self.settings.base_url)
+        return nobody or fault(self.name, error, may_pass=True)  # what is told within a stream has no status
 
 
 def _usage(chunk: Completion) -> Usage | None:

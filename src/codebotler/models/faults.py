@@ -29,6 +29,31 @@ def fault(name: str, what: str | Exception, *, may_pass: bool) -> ModelError:
     return ModelError(f"{name}: {said}{cause and f' ({cause})'}", may_pass=may_pass)
 
 
+def unreachable(name: str, error: Exception, url: str | None) -> ModelError | None:
+    """The error for a server that does not even take a connection; None if something else went wrong.
+
+    Args:
+        name: the model.
+        error: what was noticed.
+        url: where the server was looked for; None for the model's own.
+    """
+    failed = next((cause for cause in _causes(error) if type(cause).__name__ == NO_CONNECTION), None)
+    if failed is None:
+        return None
+    where = "its server" if url is None else url
+    mend = "is there a network?" if url is None else "is the server running, and the base URL right?"
+    return ModelError(f"{name}: no connection to {where} ({brief(failed)}); {mend}", may_pass=True)
+
+
+NO_CONNECTION = "ConnectError"  # of httpx, whichever of its versions a provider's library has
+
+
+def _causes(error: BaseException | None) -> Iterator[BaseException]:
+    while error is not None:
+        yield error
+        error = error.__cause__ or error.__context__
+
+
 def _first_cause(error: BaseException) -> str:
     first = error
     while first.__cause__ is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from dataclasses import dataclass, field
 
@@ -18,6 +19,7 @@ from codebotler.badinput import BadInput
 from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
 
+LOG = logging.getLogger("codebotler.models")
 LONGEST_WAIT = 30.0  # seconds between two tries, where the other side asks for nothing else
 LONGEST_PEACE = 600.0  # seconds that the other side may ask for; a request that waits longer has failed
 CHARACTERS = 3  # of a text, for a token of it, where nobody says how many it has; a high estimate
@@ -59,6 +61,7 @@ class Paced:
     """The tokens of all replies, as far as the model counts them."""
     spent: int = field(default=0, init=False)
     """The tokens that count against the budget, with estimates where the model does not count them."""
+    _has_heard: bool = field(default=False, init=False, repr=False)
     _free: asyncio.Semaphore = field(init=False, repr=False)
     _gate: asyncio.Lock = field(default_factory=asyncio.Lock, init=False, repr=False)
     _next_start: float = field(default=-math.inf, init=False, repr=False)
@@ -132,6 +135,7 @@ class Paced:
             if length:
                 self.spent += _estimate(prompt, length)
             raise
+        self._has_heard = True
         self.usage = Usage(
             _sum(self.usage.input_tokens, reply.usage.input_tokens),
             _sum(self.usage.output_tokens, reply.usage.output_tokens),
@@ -158,6 +162,8 @@ class Paced:
 
     def _before_sleep(self, state: RetryCallState) -> None:
         self.retried += 1
+        if not self._has_heard and self.retried == 1 and state.outcome is not None:
+            LOG.warning("trying again, up to %d times: %s", self.retries, state.outcome.exception())
         # Whoever asks for peace means all requests, not only the one that was refused.
         self._peace_until = max(self._peace_until, asyncio.get_running_loop().time() + _peace(state))
 

@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Self
 from urllib.parse import quote
 
+from codebotler.home import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
 LONGEST = 200  # characters of the name of a lock; no file system takes more than 255
@@ -79,7 +80,7 @@ class Reservation:
         if self.robot.address:
             return machine_wide()
         folder = self._home / "robots"
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         return folder
 
     def _name(self) -> str:

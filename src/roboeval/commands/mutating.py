@@ -54,7 +54,10 @@ def mutate(
     from roboeval.mutation.keeping import keep
 
     known = load(suite)
-    wanted = [known.task(name) for name in dict.fromkeys(tasks or known.tasks)]
+    names = [
+        name for word in tasks or known.tasks for name in word.split(",")
+    ]  # as --tasks of others takes them
+    wanted = [known.task(name) for name in dict.fromkeys(names)]
     further = named_programs(also or [], known)
     how = How(worlds=worlds, most=most, seed=seed)
     jobs = [job_of(known, task, further.get(task.name, ()), **how) for task in wanted]

@@ -89,6 +89,29 @@ def test_what_may_pass_is_tried_again(name: str, server: Server, fault: Fault) -
     assert len(server.requests) == 3
 
 
+def test_that_the_first_request_is_tried_again_is_told_once(
+    server: Server, caplog: pytest.LogCaptureFixture
+) -> None:
+    server.faults.extend([Fault.HUNG_UP, Fault.HUNG_UP])
+    use(server, one)
+    (told,) = caplog.messages
+    assert told.startswith("trying again, up to ")
+    assert told.endswith("(Server disconnected without sending a response)")
+
+
+def test_that_a_later_request_is_tried_again_is_not_told(
+    server: Server, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def two(paced: Paced) -> int:
+        await paced.reply(prompt_for("x"), number=0)
+        server.faults.append(Fault.HUNG_UP)
+        await paced.reply(prompt_for("x"), number=1)
+        return paced.retried
+
+    assert use(server, two)[1] == 1
+    assert caplog.messages == []
+
+
 @both
 @pytest.mark.parametrize(
     "fault",

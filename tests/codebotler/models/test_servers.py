@@ -227,7 +227,10 @@ def test_server_that_is_not_there_is_told(name: str, server: Server) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         server.url = f"http://127.0.0.1:{taken.getsockname()[1]}/v1"
-        with pytest.raises(ModelError, match=r"Connection error \(.*attempts failed|refused") as caught:
+        sentence = (
+            rf"no connection to {server.url} \(.*(attempts failed|refused).*\); is the server running, and"
+        )
+        with pytest.raises(ModelError, match=sentence) as caught:
             ask(name, server)
     assert caught.value.may_pass
 

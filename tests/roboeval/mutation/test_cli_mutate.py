@@ -157,6 +157,7 @@ def test_a_mutant_on_the_list_is_not_shown_again(small: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
+        (("SayGoodDay,SayGoodNight",), 'the suite "paper" has no task "SayGoodNight"; its tasks are '),
         (("SayGoodNight",), 'the suite "paper" has no task "SayGoodNight"; its tasks are '),
         (
             ("SayGoodDay", "--worlds", "200"),
