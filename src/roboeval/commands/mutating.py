@@ -54,9 +54,8 @@ def mutate(
     from roboeval.mutation.keeping import keep
 
     known = load(suite)
-    names = [
-        name for word in tasks or known.tasks for name in word.split(",")
-    ]  # as --tasks of others takes them
+    # As other commands take them after --tasks, too.
+    names = [name for word in tasks or known.tasks for name in word.split(",")]
     wanted = [known.task(name) for name in dict.fromkeys(names)]
     further = named_programs(also or [], known)
     how = How(worlds=worlds, most=most, seed=seed)
