@@ -23,7 +23,7 @@ import roboeval.cli
 ROOT = Path(__file__).parent.parent
 PAGES, SITE = ROOT / "build" / "pages", ROOT / "build" / "site"
 
-WIDTH = 82  # letters in a line of the site
+WIDTH = 82  # letters in a line of `--help` here
 
 MODULES = {
     "codebotler": (
@@ -41,7 +41,8 @@ def main() -> None:
     shutil.rmtree(ROOT / "build" / "pages", ignore_errors=True)
     shutil.rmtree(SITE, ignore_errors=True)
     shutil.copytree(ROOT / "docs", PAGES)
-    shutil.copy(ROOT / "website" / "site.css", PAGES)
+    for name in ("site.css", "iframe-worker.js"):
+        shutil.copy(ROOT / "website" / name, PAGES)
     for path in PAGES.glob("*.md"):
         path.write_text(_within(path.read_text()))
     (PAGES / "changes.md").write_text((ROOT / "CHANGELOG.md").read_text())
