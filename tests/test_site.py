@@ -98,12 +98,13 @@ def test_what_a_style_sheet_would_load_is_found(build: dict[str, Any], tmp_path:
 
 
 def test_a_drawing_may_load_nothing_either(build: dict[str, Any], tmp_path: Path) -> None:
-    (tmp_path / "bad.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"><image href="//a.b/c.png"/></svg>')
+    drawing = '<svg xmlns="http://www.w3.org/2000/svg"><image href="//a.b/c.png"/></svg>'
+    (tmp_path / "bad.svg").write_text(drawing)
     assert [*build["outside_loads"](tmp_path)] == ["bad.svg: image //a.b/c.png"]
 
 
 def test_the_site_is_searched_from_a_folder() -> None:
-    """By a worker of our own: the builder would have one loaded from a server, unless there is one of its name."""
+    """By a worker of our own: without one of its name, the builder would have it loaded from a server."""
     configured = yaml.safe_load((ROOT / "mkdocs.yml").read_text())
     assert "offline" in configured["plugins"]
     (worker,) = configured["extra"]["polyfills"]
