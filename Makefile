@@ -7,7 +7,7 @@
 # test-faults` asks a server that fails one request in ten. `make test-ros1` tests robots on ROS 1, for which the
 # system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
 # Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make pictures` makes those of the
-# guide anew. `make docs` makes the documentation as a site, in build/site.
+# guide anew, with figures of a report. `make docs` makes the documentation as a site, in build/site.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -62,6 +62,9 @@ test-browser: $(VENV)/tested
 pictures: $(VENV)/tested
 	@shots=$$(mktemp -d) && \
 	$(BIN)/python -m pytest --no-skips --shots "$$shots" -k "desk-light or tablet-light" tests/browser && \
+	for model in hasty careful; do $(BIN)/roboeval run --model recorded:$$model --num-completions 4 --no-report \
+		--out "$$shots/$$model" || exit 1; done && \
+	$(BIN)/roboeval report "$$shots/hasty" "$$shots/careful" --no-check --out "$$shots/report" && \
 	$(BIN)/python tests/browser/pictures.py "$$shots" docs/pictures && rm -r "$$shots"
 
 test-transformers: $(TORCH_VENV)/tested

@@ -60,22 +60,53 @@ def test_links_to_examples_stay_within_the_site(build: dict[str, Any]) -> None:
         ('<link rel="stylesheet" href=//a.b/c.css>', "link //a.b/c.css"),
         ('<p><img alt="" src="http://a.b/c.png"/>', "img http://a.b/c.png"),
         ("<link rel=preconnect href='https://a.b' crossorigin>", "link https://a.b"),
+        ('<img src=c.png srcset="d.png 1x, https://a.b/c.png 2x">', "img https://a.b/c.png 2x"),
+        ('<object data="HTTPS://a.b/c"></object>', "object HTTPS://a.b/c"),
+        ('<p style="background: URL( https://a.b/c.png )">', "p https://a.b/c.png"),
+        ("<style>p { color: red } @import url(https://a.b/c.css);</style>", "style https://a.b/c.css"),
+        ("<svg><image href='https://a.b/c.png'/></svg>", "image https://a.b/c.png"),
+        ("<svg><use xlink:href='https://a.b/c.svg#d'/></svg>", "use https://a.b/c.svg#d"),
+        ("<iframe srcdoc='<img src=https://a.b/c>'></iframe>", "img https://a.b/c"),
+        ("<video poster=' //a.b/c.png'></video>", "video //a.b/c.png"),
+        ("<base href='https://a.b/'>", "base https://a.b/"),
     ],
 )
 def test_what_would_be_loaded_from_elsewhere_is_found(
     build: dict[str, Any], tmp_path: Path, page: str, load: str
 ) -> None:
     (tmp_path / "good.html").write_text(
-        '<a href="https://a.b">x</a><img src="c.png"><link rel=canonical href="https://a.b/good.html">'
+        '<a href="https://a.b">x</a><img src="c.png" srcset="d.png 2x"><p style="background: url(d.png)">'
+        '<link rel=canonical href="https://a.b/good.html"><code>@import url(https://a.b)</code>'
     )
     assert [*build["outside_loads"](tmp_path)] == []
     (tmp_path / "bad.html").write_text(page)
     assert [*build["outside_loads"](tmp_path)] == [f"bad.html: {load}"]
 
 
-@pytest.mark.parametrize("sheet", ["@import 'https://a.b/c.css';", "a { background: url(//a.b/c.png) }"])
+@pytest.mark.parametrize(
+    "sheet",
+    [
+        *("@import 'https://a.b/c.css';", "@import url(https://a.b/c.css);", "@import/**/'//a.b/c.css';"),
+        *("a { background: url(//a.b/c.png) }", 'a { background: image-set("https://a.b/c.png" 1x) }'),
+    ],
+)
 def test_what_a_style_sheet_would_load_is_found(build: dict[str, Any], tmp_path: Path, sheet: str) -> None:
     (tmp_path / "good.css").write_text("a { background: url(data:image/png;base64,AA) }")
     assert [*build["outside_loads"](tmp_path)] == []
     (tmp_path / "bad.css").write_text(sheet)
     assert len([*build["outside_loads"](tmp_path)]) == 1
+
+
+def test_a_drawing_may_load_nothing_either(build: dict[str, Any], tmp_path: Path) -> None:
+    drawing = '<svg xmlns="http://www.w3.org/2000/svg"><image href="//a.b/c.png"/></svg>'
+    (tmp_path / "bad.svg").write_text(drawing)
+    assert [*build["outside_loads"](tmp_path)] == ["bad.svg: image //a.b/c.png"]
+
+
+def test_the_site_is_searched_from_a_folder() -> None:
+    """By a worker of our own: without one of its name, the builder would have it loaded from a server."""
+    configured = yaml.safe_load((ROOT / "mkdocs.yml").read_text())
+    assert "offline" in configured["plugins"]
+    (worker,) = configured["extra"]["polyfills"]
+    assert worker == "iframe-worker.js"
+    assert (ROOT / "website" / worker).exists()

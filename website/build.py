@@ -23,7 +23,7 @@ import roboeval.cli
 ROOT = Path(__file__).parent.parent
 PAGES, SITE = ROOT / "build" / "pages", ROOT / "build" / "site"
 
-WIDTH = 82  # letters in a line of the site
+WIDTH = 82  # letters in a line of `--help` here
 
 MODULES = {
     "codebotler": (
@@ -41,7 +41,8 @@ def main() -> None:
     shutil.rmtree(ROOT / "build" / "pages", ignore_errors=True)
     shutil.rmtree(SITE, ignore_errors=True)
     shutil.copytree(ROOT / "docs", PAGES)
-    shutil.copy(ROOT / "website" / "site.css", PAGES)
+    for name in ("site.css", "iframe-worker.js"):
+        shutil.copy(ROOT / "website" / name, PAGES)
     for path in PAGES.glob("*.md"):
         path.write_text(_within(path.read_text()))
     (PAGES / "changes.md").write_text((ROOT / "CHANGELOG.md").read_text())
@@ -104,35 +105,65 @@ def _help(command: Any, name: str) -> str:
 # --- what a browser would load
 
 
-LOADS = {"link": "href", "script": "src", "img": "src", "iframe": "src", "source": "src", "video": "src"}
+LOADS = {"src", "srcset", "imagesrcset", "poster", "data", "background", "xlink:href"}  # of any element
+HREF_LOADS = {"link", "base", "image", "feimage", "use"}  # of others, `href` only leads somewhere
+LISTS = {"srcset", "imagesrcset"}
 NO_LOAD = {"canonical", "next", "prev", "license"}  # a link that is only told
+ELSEWHERE = re.compile(r"(?:https?:|ftp:|wss?:|[\\/]{2})", re.IGNORECASE)
+SHEET_LOADS = re.compile(
+    r"(?:@import|url\(|image-set\()\s*(?:url\(\s*)?[\"']?\s*((?:https?:|[\\/]{2})[^\"')\s]+)", re.IGNORECASE
+)
+
+
+def _of_sheet(text: str) -> list[str]:
+    """Addresses elsewhere that a style sheet, or a part of one, would load from."""
+    return [str(address) for address in SHEET_LOADS.findall(re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL))]
 
 
 class _Loads(HTMLParser):
     def __init__(self) -> None:
         super().__init__()
         self.found: list[str] = []
+        self.in_style = False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        given = dict(attrs)
-        address = given.get(LOADS.get(tag, "")) or ""
-        if re.match(r"(?:https?:)?//", address) and given.get("rel") not in NO_LOAD:
-            self.found.append(f"{tag} {address}")
+        self.in_style = tag == "style"
+        is_told = tag == "link" and dict(attrs).get("rel") in NO_LOAD
+        for name, value in attrs:
+            loads = name in LOADS or (name == "href" and tag in HREF_LOADS and not is_told)
+            addresses = (value or "").split(",") if name in LISTS else [value or ""]
+            near = (address.strip() for address in addresses if loads)
+            self.found += [f"{tag} {address}" for address in near if ELSEWHERE.match(address)]
+            self.found += [f"{tag} {address}" for address in _of_sheet(value or "")]
+            if name == "srcdoc":
+                self.found += _of_page(value or "")
+
+    def handle_endtag(self, tag: str) -> None:
+        self.in_style = self.in_style and tag != "style"
+
+    def handle_data(self, data: str) -> None:
+        if self.in_style:
+            self.found += [f"style {address}" for address in _of_sheet(data)]
+
+
+def _of_page(text: str) -> list[str]:
+    parser = _Loads()
+    parser.feed(text)
+    parser.close()
+    return parser.found
 
 
 def outside_loads(site: Path) -> Iterator[str]:
-    """What pages and style sheets of a site would load from elsewhere.
+    """What pages, drawings and style sheets of a site would load from elsewhere; of scripts nothing is known.
 
     Args:
         site: its folder.
     """
-    for path in sorted(site.rglob("*.html")):
-        parser = _Loads()
-        parser.feed(path.read_text())
-        yield from (f"{path.relative_to(site)}: {found}" for found in parser.found)
-    for path in sorted(site.rglob("*.css")):
-        found = re.findall(r"(?:@import\s+|url\()[\"']?((?:https?:)?//[^\"')\s]+)", path.read_text())
-        yield from (f"{path.relative_to(site)}: {address}" for address in found)
+    readers = {".html": _of_page, ".svg": _of_page, ".css": _of_sheet}
+    for path in sorted(site.rglob("*")):
+        if path.suffix in readers:
+            found = readers[path.suffix](path.read_text())
+            yield from (f"{path.relative_to(site)}: {each}" for each in found)
 
 
 if __name__ == "__main__":

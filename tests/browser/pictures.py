@@ -1,16 +1,24 @@
-"""Takes the pictures of the guide from the screenshots of tests: python pictures.py SHOTS docs/pictures."""
+"""Takes the pictures of the guide: python pictures.py SHOTS docs/pictures.
+
+SHOTS holds the screenshots of tests, and in report/ a report of the programs that ship with the package.
+"""
 
 import sys
 from pathlib import Path
 
 from PIL import Image
 
-CHOSEN = (
-    "checked-desk-light",
-    "operator-asked-desk-light",
-    "face-asks-tablet-light",
-    "face-moves-tablet-light",
-)
+CHOSEN = {
+    "checked-desk-light": "checked-desk-light.png",
+    "operator-asked-desk-light": "operator-asked-desk-light.png",
+    "face-asks-tablet-light": "face-asks-tablet-light.png",
+    "face-moves-tablet-light": "face-moves-tablet-light.png",
+    "run-desk-light": "run-desk-light.png",
+    "report-tasks": "report/figures/tasks.png",
+    "report-causes": "report/figures/causes.png",
+}
+"""Each picture, and what it is made from."""
+
 WIDEST, TALLEST, COLOURS = 1200, 900, 256
 """Pixels of a picture; those of a tablet are half as wide and not cut off."""
 
@@ -19,8 +27,8 @@ def main() -> None:
     """Shrink those that are chosen, so that they are quickly loaded."""
     shots, pictures = map(Path, sys.argv[1:])
     pictures.mkdir(exist_ok=True)
-    for name in CHOSEN:
-        shot = Image.open(shots / f"{name}.png").convert("RGB")
+    for name, path in CHOSEN.items():
+        shot = Image.open(shots / path).convert("RGB")
         shot.thumbnail(
             (WIDEST if shot.width > WIDEST else WIDEST // 2, 10 * TALLEST), Image.Resampling.LANCZOS
         )
