@@ -79,7 +79,10 @@ def generate(
     timeout: TimeoutOption = 60.0,
     base_url: BaseUrlOption = None,
 ) -> None:
-    """Have a model write a program, and print it; status 1 if a check finds problems in it."""
+    """Have a model write a program, and print it.
+
+    The status is 1 if a check finds problems in it.
+    """
     from codebotler.badinput import BadInput
     from codebotler.generating import show, write
     from codebotler.models.base import Settings
@@ -111,7 +114,10 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="Runs that go on at the same time.")] = 1,
 ) -> None:
-    """Look for problems in a program, in its text and in imagined worlds; status 1 if there are any."""
+    """Look for problems in a program before it is run.
+
+    It looks in the text and in imagined worlds; the status is 1 if there are any.
+    """
     from codebotler.checker import check as look_for_problems
     from codebotler.checking import check_view, read_program
     from codebotler.terminal import busy, print_json, print_rich
@@ -152,7 +158,10 @@ def run(
     address: AddressOption = "",
     ros_python: RosPythonOption = ROS_PYTHON,
 ) -> None:
-    """Check a program, ask, and run it on a robot; Ctrl-C stops the robot, with status 130."""
+    """Check a program, ask, and run it on a robot.
+
+    Ctrl-C stops the robot, with status 130.
+    """
     from codebotler.home import home
     from codebotler.models.base import Settings
     from codebotler.models.open import open_model
@@ -205,7 +214,10 @@ def robots(
     ros_python: RosPythonOption = ROS_PYTHON,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
-    """List the kinds of robots: which work here, what is missing for the others, and the mend."""
+    """List the kinds of robots, and which of them work here.
+
+    For the others it says what is missing, and the mend.
+    """
     from dataclasses import asdict
 
     from codebotler.missionview import robots_view
@@ -247,7 +259,10 @@ def serve(
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
 ) -> None:
-    """Serve the page from which a robot is operated, until Ctrl-C, which also stops the robot."""
+    """Serve the page from which a robot is operated.
+
+    Ctrl-C ends it, which also stops the robot.
+    """
     from codebotler.home import home
     from codebotler.models.base import Model, Settings
     from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
@@ -294,7 +309,10 @@ def virtual_robot(
         Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
     ] = ROS_PYTHON,
 ) -> None:
-    """Offer a simulated robot's skills on ROS 1, until Ctrl-C; starts a ROS master if none answers."""
+    """Offer a simulated robot's skills on ROS 1.
+
+    It starts a ROS master if none answers; Ctrl-C ends it.
+    """
     from contextlib import suppress
 
     from codebotler.robots.virtual import VirtualRobot

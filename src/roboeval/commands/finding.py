@@ -44,7 +44,10 @@ def find(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Find completions that did something in some world, and put those that fail together by the reason."""
+    """Find completions by what they did, and group the failures.
+
+    Of those that did something in some world, those that fail are put together by the reason.
+    """
     from roboeval.clusters import clusters, groups
     from roboeval.search import Question, search
 

@@ -64,7 +64,10 @@ def generate(
     timeout: TimeoutOption = 60.0,
     base_url: BaseUrlOption = None,
 ) -> None:
-    """Have a model write programs for a suite; the same command goes on after any interruption."""
+    """Have a model write programs for a suite.
+
+    The same command goes on after any interruption.
+    """
     path = generated(
         model,
         out,
@@ -106,7 +109,10 @@ def run(
     ] = True,
     json: JsonOption = False,
 ) -> None:
-    """Have a model write programs for a suite, judge them, print the tables, and write the report."""
+    """Have a model write programs, judge them, write the report.
+
+    The tables are printed, and the same command goes on after any interruption.
+    """
     path = generated(
         model,
         out,

@@ -49,7 +49,10 @@ def mutate(
     ] = None,
     workers: WorkersOption = None,
 ) -> None:
-    """Make right programs wrong as models do, and say which of them the checks let through."""
+    """Say which wrong programs the checks of a suite let through.
+
+    Right programs are made wrong, as models do, and judged.
+    """
     from codebotler.simulator.engine import Lanes
     from roboeval.mutation.keeping import keep
 

@@ -53,7 +53,10 @@ def report(
     ] = True,
     workers: WorkersOption = None,
 ) -> None:
-    """Draw the figures of the paper, and one page about how models do, why, and how sure that is."""
+    """Draw the paper's figures, and one page about how models do.
+
+    The page also says why, and how sure that is.
+    """
     from dataclasses import replace
 
     from codebotler.terminal import busy
@@ -111,7 +114,10 @@ def compare(
     ablation: AblationOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Say by how much the second run passes more often than the first, and how sure that is."""
+    """Say by how much one run is better, and how sure that is.
+
+    That is: by how much the second run passes more often than the first.
+    """
     if suites is not None:
         compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
     elif len(runs) == PAIR:

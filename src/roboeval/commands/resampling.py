@@ -43,7 +43,10 @@ def resample(
     engine: EngineOption = "local",
     json: JsonOption = False,
 ) -> None:
-    """What asking again for programs that a check rejects would have given, from a judged run."""
+    """Say what checking programs before a run would have saved.
+
+    From a judged run: what asking again for those that a check rejects would have given.
+    """
     from roboeval.resampling import LIMITS, curve_data, ran, render
     from roboeval.tables import key_of
 

@@ -23,7 +23,10 @@ def serve(
         typer.Option(help="The folder of a suite by which runs were judged; more than one may be named."),
     ] = None,
 ) -> None:
-    """Show runs in a browser, side by side and each completion by itself, until Ctrl-C; needs no robot."""
+    """Show runs in a browser.
+
+    They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
+    """
     from codebotler.badinput import BadInput
     from codebotler.web.place import entrance
     from codebotler.web.serving import serve as serve_page

@@ -1,0 +1,31 @@
+"""What `--help` says can be read on a narrow terminal."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+NARROW = 80
+"""Columns of a terminal that nobody made wider."""
+
+
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [("codebotler", 7), ("roboeval", 13)],
+)
+def test_every_command_is_told_in_a_whole_sentence(name: str, least: int) -> None:
+    code = f"import sys, {name}.cli; sys.argv = ['{name}', '--help']; {name}.cli.main()"
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "COLUMNS": str(NARROW)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    _, _, listed = ended.stdout.partition("\nCommands:\n")
+    told = dict(re.findall(r"^  (\S+) +(.*)$", listed, re.MULTILINE))
+    assert len(told) >= least, ended.stdout
+    assert {command: sentence for command, sentence in told.items() if not re.search(r"[^.]\.$", sentence)} == {}
+    assert all(len(line) <= NARROW for line in ended.stdout.splitlines())
