@@ -53,7 +53,7 @@ LESS = {
         ("roboeval serve ", "roboeval serve --help "),  # other pages serve
         ("codebotler serve ", "codebotler serve --help "),
     ],
-    "benchmark-pages.md": [("--num-completions 1", "--num-completions 1 --tasks LunchTime")],
+    "benchmark-pages.md": [("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report")],
     "evaluate-your-model.md": [("--num-completions 50", "--num-completions 1 --tasks LunchTime")],
     "index.md": [("recorded:hasty", "recorded:hasty --tasks LunchBreak")],
     "report.md": [("--num-completions 4", "--num-completions 4 --tasks LunchTime,LunchBreak,SetTemperature")],
@@ -198,6 +198,52 @@ def test_what_a_page_has_written_into_the_root_is_left_alone(
     subprocess.run([*git, "init", "--quiet"], check=True)
     seen = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True)
     assert seen.stdout == "?? .gitignore\n"
+
+
+def test_who_reads_one_page_after_the_other_in_one_folder_can_follow_them(
+    followed: Callable[[str], Reader], tmp_path: Path
+) -> None:
+    reader = Reader(tmp_path, followed("index.md").url)
+    for page in ("README.md", "index.md", "tutorial.md"):
+        reader.follow(page)
+
+
+MADE = re.compile(r"(?:--out|--record|--mcap|(?<![<>=-])>|mkdir(?: -p)?|--new \S+ --suite) ?([\w./-]+)")
+"""What a command makes: a file or a folder."""
+
+
+def made(text: str) -> Iterator[tuple[str, str]]:
+    """What the commands in a text make, and by which command, without a remark behind it."""
+    for line in text.replace("\\\n", " ").splitlines():
+        command = " ".join(line.partition("   # ")[0].split())
+        program = re.search(r"(?:codebotler|roboeval) .*|(?:cat|mkdir) .*", command)
+        if program is not None:
+            files = MADE.findall(command)
+            if not files and (model := re.search(r"roboeval (?:run|generate) --model ([\w:-]+)", command)):
+                files = [f"runs/{model[1].replace(':', '-')}"]
+            yield from ((file, program[0]) for file in files)
+
+
+def commands_of(page: str) -> Iterator[str]:
+    """What a page has in blocks for the shell, and in a sentence as a command."""
+    yield from (block.text for block in blocks(page) if block.language == "sh")
+    yield from re.findall(r"(?<!`)`(roboeval [^`]+)`", FENCE.sub("", PAGES[page].read_text()))
+
+
+def test_what_two_pages_make_has_two_names_but_where_they_make_it_by_the_same_command() -> None:
+    """So that whoever follows both in one folder meets no run that holds other completions."""
+    makers: dict[str, dict[str, set[str]]] = {}
+    demo = (ROOT / "Makefile").read_text().replace("$(BIN)", ".venv/bin").replace('"', "")
+    for place, texts in [("Makefile", [demo]), *((page, commands_of(page)) for page in PAGES)]:
+        for file, command in (one for text in texts for one in made(text)):
+            alone = (
+                f" on {place}" if command.startswith("cat >") else ""
+            )  # what is written follows in other lines
+            makers.setdefault(file, {}).setdefault(place, set()).add(command + alone)
+    assert {"Makefile", "index.md"} <= makers["runs/hasty"].keys()
+    assert {"runs/first-model", "runs/recorded-hasty", "first.py", "office"} <= makers.keys()
+    shared = {file: pages for file, pages in makers.items() if len(pages) > 1}
+    assert {file: pages for file, pages in shared.items() if len(set.union(*pages.values())) > 1} == {}
 
 
 def is_printed(told: str, printed: str) -> bool:

@@ -42,7 +42,7 @@ def test_the_packages_are_those_that_are_needed() -> None:
 def test_two_commands_are_the_whole_path(tmp_path: Path) -> None:
     blocks = {kind: re.findall(rf"```{kind}\n(.*?)```", PAGE, re.DOTALL) for kind in ("yaml", "python", "sh")}
     (tmp_path / "office.yaml").write_text(blocks["yaml"][0])
-    (tmp_path / "tea.py").write_text(blocks["python"][0])
+    (tmp_path / "mug.py").write_text(blocks["python"][0])
     robot, tool = (line.split()[1:] for line in blocks["sh"][1].splitlines())
     port = free_port()
     environment = {
