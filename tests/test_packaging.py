@@ -29,7 +29,7 @@ ON_TOP = {
         "pyproject.toml",
     ),
     *(path.name for path in ROOT.glob("constraints*.txt")),
-    *("bench", "docs", "examples", "packaging", "src", "tests", "website"),
+    *(".ci", "bench", "docs", "examples", "packaging", "src", "tests", "website"),
 }
 """Of what a source archive is made."""
 
