@@ -12,13 +12,13 @@ import queue
 import sys
 import threading
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from PIL.Image import Image
 
-from codebotler.badinput import BadInput
+from codebotler import BadInput
+from codebotler.models.base import Settings
 from codebotler.perception import (
     Detector,
     PerceptionError,
@@ -28,14 +28,12 @@ from codebotler.perception import (
     open_detector,
     read_image,
 )
-from codebotler.perception.open import LEAST_SCORE, LOOKING
 from codebotler.robots.base import NotReadyError
-from codebotler.robots.ros import PYTHON, actions_of
+from codebotler.robots.ros import actions_of
 from codebotler.robots.ros1 import master_uri
 from codebotler.robots.virtual import SCRIPT
 from codebotler.robots.worker import Worker
 from codebotler.skills import SKILLS, SkillTable
-from codebotler.terminal import visible
 
 SKILL = "is_in_room"
 HEARS = 3600.0  # seconds of one turn of listening
@@ -95,10 +93,10 @@ class Server:
             except Exception as error:  # noqa: BLE001 - whatever it is, the robot waits for an answer
                 expected = isinstance(error, BadInput | PerceptionError)
                 why = str(error) if expected else f"{type(error).__name__}: {error}"
-                print(visible(f"{label}: {why}"), flush=True)
+                print(f"{label!r}: {why!r}", flush=True)
                 self.end(goal, do="abort", text=why)
                 continue
-            print(visible(f"{label}: {sighting}"), flush=True)
+            print(f"{label!r}: {sighting}", flush=True)
             picture = base64.b64encode(jpeg_of(boxed(image, sighting))).decode()
             self.end(goal, do="succeed", value=sighting.found, picture=picture, skill=SKILL)
 
@@ -132,14 +130,17 @@ def main() -> None:
     source.add_argument("--file", type=Path, help="a picture, which is read anew for each goal")
     parser.add_argument("--model", required=True, help="a chat model that sees, or hf:PATH")
     parser.add_argument("--base-url", help="where a chat model is served")
-    parser.add_argument("--least-score", type=float, default=LEAST_SCORE, help="of what hf:PATH finds")
+    parser.add_argument("--least-score", type=float, default=0.1, help="of what hf:PATH finds")
     parser.add_argument("--oldest", type=float, default=5.0, help="seconds since a picture of a camera came")
-    parser.add_argument("--ros-python", type=Path, default=PYTHON, help="the Python that has rospy")
+    python = Path("/usr/bin/python3")
+    parser.add_argument("--ros-python", type=Path, default=python, help="the Python that has rospy")
     said = parser.parse_args()
     if not 0 < said.oldest < math.inf:
         parser.error(f"--oldest is {said.oldest:g}, but must be a number of seconds above 0")
     try:
-        settings = replace(LOOKING, base_url=said.base_url)
+        settings = Settings(
+            temperature=0.0, top_p=None, max_tokens=2000, timeout=30.0, base_url=said.base_url
+        )
         detector = open_detector(said.model, settings, least_score=said.least_score)
         server = Server(
             detector, file=said.file, topic=said.topic, oldest=said.oldest, python=said.ros_python

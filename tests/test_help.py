@@ -27,5 +27,5 @@ def test_every_command_is_told_in_a_whole_sentence(name: str, least: int) -> Non
     _, _, listed = ended.stdout.partition("\nCommands:\n")
     told = dict(re.findall(r"^  (\S+) +(.*)$", listed, re.MULTILINE))
     assert len(told) >= least, ended.stdout
-    assert {command: sentence for command, sentence in told.items() if not re.search(r"[^.]\.$", sentence)} == {}
+    assert [command for command, sentence in told.items() if not re.search(r"[^.]\.$", sentence)] == []
     assert all(len(line) <= NARROW for line in ended.stdout.splitlines())

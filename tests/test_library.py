@@ -3,8 +3,10 @@
 import ast
 import json
 import re
+import runpy
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +18,8 @@ import codebotler
 import roboeval
 from roboeval import Suite
 
-DOCS = Path(__file__).parent.parent / "docs"
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
 PAGE = (DOCS / "library.md").read_text()
 EXAMPLES = re.findall(r"^```python\n(.*?)^```\n\n```text\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
 PACKAGES = {"codebotler": codebotler.__all__, "roboeval": roboeval.__all__}
@@ -99,11 +102,54 @@ def test_the_page_lists_the_public_names(package: str) -> None:
     assert sorted(re.findall(r"`(\w+)`", " ".join(firsts))) == sorted(PACKAGES[package])
 
 
-@pytest.mark.parametrize(("code", "shown"), EXAMPLES)
-def test_an_example_prints_what_the_page_shows(code: str, shown: str) -> None:
+@pytest.fixture(scope="module")
+def documented() -> set[str]:
+    """The modules on the reference pages of the site."""
+    build = runpy.run_path(str(ROOT / "website" / "build.py"))
+    return {module for modules in build["MODULES"].values() for module in modules}
+
+
+def imports(code: str) -> Iterator[tuple[str, str]]:
+    """From which of our modules which name; none where the module itself is imported."""
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, "") for alias in node.names if alias.name.split(".")[0] in PACKAGES)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in PACKAGES:
+            yield from ((node.module or "", alias.name) for alias in node.names)
+
+
+def shown() -> Iterator[tuple[str, str]]:
+    """Code that a reader may take over, and where it stands."""
+    for page in (ROOT / "README.md", *sorted(DOCS.glob("*.md"))):
+        text = page.read_text()
+        for session in re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+            lines = re.findall(r"^(?:>>>|\.\.\.) ?(.*)$", session, re.MULTILINE)
+            yield page.name, "\n".join(lines) if session.startswith(">>> ") else session
+    for example in sorted((ROOT / "examples").glob("*.py")):
+        yield example.name, example.read_text()
+
+
+def test_pages_and_examples_import_what_is_public_or_documented(documented: set[str]) -> None:
+    found = [(place, *one) for place, code in shown() for one in imports(code)]
+    assert {"robots.md", "rtl.md", "is_in_room_server.py", "judge_a_program.py"} <= {one[0] for one in found}
+    for place, module, name in found:
+        assert module in documented, (place, module)
+        assert module not in PACKAGES or name in PACKAGES[module], (place, name)
+
+
+def test_the_page_lists_the_documented_modules(documented: set[str]) -> None:
+    _, _, table = PAGE.partition("\n| documented module |")
+    firsts = re.findall(r"^\| (`.*?) \|", table.partition("\n\n")[0], re.MULTILINE)
+    listed = re.findall(r"`([\w.]+)`", " ".join(firsts))
+    assert sorted(listed) == sorted(documented - set(PACKAGES))
+    assert all(import_module(module).__doc__ for module in documented)
+
+
+@pytest.mark.parametrize(("code", "printed"), EXAMPLES)
+def test_an_example_prints_what_the_page_shows(code: str, printed: str) -> None:
     assert len(ast.parse(code).body) == 3
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert ended.stdout == shown
+    assert ended.stdout == printed
 
 
 def test_all_four_examples_are_there() -> None:

@@ -28,12 +28,15 @@ WIDTH = 82  # letters in a line of `--help` here
 MODULES = {
     "codebotler": (
         *("codebotler", "codebotler.simulator", "codebotler.program", "codebotler.world", "codebotler.trace"),
-        *("codebotler.skills", "codebotler.rtl", "codebotler.mission", "codebotler.robots.base"),
-        *("codebotler.models.base", "codebotler.models.open", "codebotler.perception"),
+        *("codebotler.tracefile", "codebotler.skills", "codebotler.rtl", "codebotler.mission"),
+        *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
+        *("codebotler.robots.ros", "codebotler.robots.ros1", "codebotler.robots.virtual"),
+        *("codebotler.robots.worker", "codebotler.models.base", "codebotler.models.open"),
+        *("codebotler.models.paced", "codebotler.perception", "codebotler.web.further"),
     ),
     "roboeval": ("roboeval", "roboeval.suite", "roboeval.records", "roboeval.metrics"),
 }
-"""What somebody calls from a program of their own."""
+"""The packages, whose names are public, and the modules that are documented; see docs/library.md."""
 
 
 def main() -> None:
@@ -84,7 +87,12 @@ def _examples() -> str:
 
 
 def _python(package: str) -> str:
-    about = "What programs of your own may call; [examples](examples.md) show it at work."
+    about = (
+        f"The names that `{package}` itself gives are public and stay as they are. What its modules on this "
+        "page give may change from one minor version to the next, with a line in the [changes](changes.md). "
+        "All other modules are private. [From Python](library.md#public-names) lists both; "
+        "[examples](examples.md) show them at work."
+    )
     head = f"# {package} from Python\n\n{about}"
     return "\n\n".join([head, *(f"::: {module}" for module in MODULES[package])]) + "\n"
 
