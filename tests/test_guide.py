@@ -2,12 +2,33 @@
 
 import re
 from pathlib import Path
+from typing import get_args
+
+import pytest
+from pydantic import BaseModel
 
 from codebotler.checker import check
+from codebotler.models.recorded import RecordingFile, ReplyFile
 from codebotler.simulator.engine import run
 from codebotler.simulator.sandbox.stdlib import LISTED
 from codebotler.trace import Status
-from codebotler.world import Room, World
+from codebotler.world import OptionFile, PersonFile, Room, RoomFile, World
+from roboeval.findings import Kind
+from roboeval.suitefile import (
+    Ability,
+    AcceptedFile,
+    Category,
+    CheckFile,
+    CornerFile,
+    DrawnPersonFile,
+    DrawnTaskFile,
+    DrawnThingFile,
+    DrawnWorldsFile,
+    FactFile,
+    ScenarioFile,
+    SuiteFile,
+    TaskFile,
+)
 
 DOCS = Path(__file__).parent.parent / "docs"
 GUIDE = (DOCS / "index.md").read_text()
@@ -38,3 +59,77 @@ def test_the_keys_of_a_check_are_documented() -> None:
     data = check("def task_program():\n    go_to('a')\n    say(b)\n").data()
     told = [*data, *data["problems"][0], *data["samples"][0]]
     assert [key for keys in documented for key in keys] == told
+
+
+# --- what a task file may say
+
+
+TASKS, DRAWN = "write-a-task.md", "roboeval-plus.md"
+
+
+def table(page: str, head: str) -> list[list[str]]:
+    """The rows of a table on a page, as cells."""
+    _, _, rest = (DOCS / page).read_text().partition(f"\n| {head} |")
+    assert rest, head
+    return [line.strip("|").split(" | ") for line in rest.partition("\n\n")[0].splitlines()[2:]]
+
+
+def named(page: str, head: str) -> list[str]:
+    """What the first column of a table names."""
+    return [name for first, *_ in table(page, head) for name in re.findall(r"`([^`]+)`", first)]
+
+
+def keys(*forms: type[BaseModel]) -> set[str]:
+    """What files may say, as it is written there."""
+    fields = (field for form in forms for field in form.model_fields.items())
+    return {field.alias or name for name, field in fields}
+
+
+@pytest.mark.parametrize(
+    ("head", "known"),
+    [("category", get_args(Category)), ("ability", get_args(Ability)), ("finding", get_args(Kind))],
+)
+def test_categories_abilities_and_findings_are_listed(head: str, known: tuple[str, ...]) -> None:
+    assert sorted(named(TASKS, head)) == sorted(known)
+    assert all(all(cell.strip() for cell in row) for row in table(TASKS, head))
+
+
+@pytest.mark.parametrize(
+    ("page", "head", "forms"),
+    [
+        (TASKS, "key of `suite.yaml`", (SuiteFile,)),
+        (TASKS, "key of a task", (TaskFile, DrawnTaskFile)),
+        (TASKS, "key of a world", (ScenarioFile,)),
+        (TASKS, "key of a room", (RoomFile,)),
+        (TASKS, "key of a person", (PersonFile,)),
+        (DRAWN, "key", (DrawnWorldsFile,)),
+        (DRAWN, "key of a person", (DrawnPersonFile,)),
+        (DRAWN, "key of a thing", (DrawnThingFile,)),
+    ],
+)
+def test_the_keys_of_files_are_listed(page: str, head: str, forms: tuple[type[BaseModel], ...]) -> None:
+    listed = named(page, head)
+    assert len(listed) == len(set(listed))
+    assert set(listed) == keys(*forms)
+
+
+@pytest.mark.parametrize(
+    ("page", "head", "row", "form"),
+    [
+        (TASKS, "key of a task", "`facts`", FactFile),
+        (TASKS, "key of a task", "`checks`", CheckFile),
+        (TASKS, "key of a task", "`accepted`", AcceptedFile),
+        (TASKS, "key of a person", "`answers`", OptionFile),
+        (DRAWN, "key", "`corners`", CornerFile),
+    ],
+)
+def test_the_keys_within_a_key_are_told(page: str, head: str, row: str, form: type[BaseModel]) -> None:
+    (meaning,) = (told for first, told in table(page, head) if first.strip() == row)
+    told = re.findall(r"`\{?(\w+)(?:: [^`]*)?`", meaning)
+    assert keys(form) <= set(told)
+
+
+def test_the_keys_of_recorded_programs_are_told() -> None:
+    _, _, rest = (DOCS / TASKS).read_text().partition("\nIn `recorded/ANY NAME/TASK.yaml`")
+    told = re.findall(r"`(\w+)`", rest.partition("\n\n")[0])
+    assert set(told) - {"null"} == keys(RecordingFile, ReplyFile)
