@@ -16,7 +16,7 @@ import pytest
 
 import codebotler
 import roboeval
-from roboeval import Suite
+from roboeval import Suite, load_suite
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -143,6 +143,14 @@ def test_the_page_lists_the_documented_modules(documented: set[str]) -> None:
     listed = re.findall(r"`([\w.]+)`", " ".join(firsts))
     assert sorted(listed) == sorted(documented - set(PACKAGES))
     assert all(import_module(module).__doc__ for module in documented)
+
+
+@pytest.mark.parametrize("suite", ["paper", "plus", "plus` with `worlds=5"])
+def test_in_how_many_worlds_a_program_is_rewarded(suite: str) -> None:
+    name, _, count = suite.partition("` with `worlds=")
+    loaded = load_suite(name).with_worlds(int(count)) if count else load_suite(name)
+    numbers = [len(task.scenarios) for task in loaded.tasks.values()]
+    assert f"\n| `{suite}` | {min(numbers)} to {max(numbers)} | " in PAGE
 
 
 @pytest.mark.parametrize(("code", "printed"), EXAMPLES)
