@@ -230,7 +230,7 @@ class WorldFile(_Form):
         """
         names = [room.name for room in self.rooms]
         for index, name in enumerate(names):
-            _regex(name, file, (*at, "rooms", index))
+            expect_regex(name, file, (*at, "rooms", index))
             if name in names[:index]:
                 raise file.wrong(f'the room "{name}" stands here twice; remove one', *at, "rooms", index)
             room = self.rooms[index]
@@ -265,7 +265,7 @@ class WorldFile(_Form):
                     f'there are objects in "{room}", but the rooms are: {known}', *at, "objects", room
                 )
             for index, label in enumerate(labels):
-                _regex(label, file, (*at, "objects", room, index))
+                expect_regex(label, file, (*at, "objects", room, index))
         for room, people in self.people.items():
             if room not in rooms:
                 raise file.wrong(
@@ -273,12 +273,12 @@ class WorldFile(_Form):
                 )
             for index, person in enumerate(people):
                 here = (*at, "people", room, index)
-                _regex(person.name, file, (*here, "name"))
+                expect_regex(person.name, file, (*here, "name"))
                 for number, answer in enumerate(person.answers):
-                    _regex(answer, file, (*here, "answers", number))
+                    expect_regex(answer, file, (*here, "answers", number))
                 for topic, answer in person.topics.items():
-                    _regex(topic, file, (*here, "topics", topic))
-                    _regex(answer, file, (*here, "topics", topic))
+                    expect_regex(topic, file, (*here, "topics", topic))
+                    expect_regex(answer, file, (*here, "topics", topic))
 
 
 _ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
@@ -306,7 +306,17 @@ def _distance(point: Point, start: Point, end: Point) -> float:
     return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
-def _regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
+def expect_regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
+    """Refuse a text of a file that is no regular expression.
+
+    Args:
+        text: what stands there; an option by its position is none.
+        file: the file.
+        place: where in it.
+
+    Raises:
+        BadInput: it is none.
+    """
     if isinstance(text, OptionFile):
         return
     try:

@@ -14,6 +14,7 @@ Kind = Literal[
     "unused",
     "misjudged",
     "unasked",
+    "unsaid",
     "untripped",
     "dead-regex",
     "absent",

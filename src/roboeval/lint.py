@@ -7,6 +7,7 @@ then with any. Only a text unlike all samples, or an option that is no text, cou
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +38,8 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
         verdicts: on programs that are meant to be right or wrong.
     """
     places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
-    found = [*_unused(task), *_unasked(task), *_misjudged(task, verdicts), *_untripped(task, verdicts)]
+    found = [*_unused(task), *_unsaid(task), *_unasked(task)]
+    found += [*_misjudged(task, verdicts), *_untripped(task, verdicts)]
     if task.drawn:
         found += _of_drawn(places)
     else:
@@ -112,6 +114,24 @@ def _unused(task: Task) -> Iterator[Finding]:
         if check.name not in used:
             message = f'no world requires the check "{check.name}"; require it or remove it'
             yield Finding("unused", check.name, message, task.path, check.line)
+
+
+def _unsaid(task: Task) -> Iterator[Finding]:
+    """Facts that a prompt does not tell the model, or tells it although they are to be common sense."""
+    if task.borrows:
+        return
+    file = YamlFile.read(task.path)
+    for number, fact in enumerate(task.facts):
+        for prompt, text in enumerate(task.prompts):
+            word = next((word for word in fact.words if re.search(word, text, re.IGNORECASE)), None)
+            if word is None and not fact.commonsense:
+                wrong = f'does not say "{fact.fact}", by none of its words; say it'
+            elif word is not None and fact.commonsense:
+                wrong = f'says "{fact.fact}" by "{word}", but that is to be common sense; leave it out'
+            else:
+                continue
+            line = file.line(("facts", number))
+            yield Finding("unsaid", fact.fact, f"prompt {prompt} {wrong}", task.path, line)
 
 
 def _unasked(task: Task) -> Iterator[Finding]:

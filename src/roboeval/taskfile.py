@@ -12,6 +12,7 @@ from codebotler.badinput import BadInput, Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
 from codebotler.skills import SKILLS, SkillTable
 from codebotler.syntaxtree import parse_expression
+from codebotler.world import expect_regex
 from roboeval.suitefile import DrawnTaskFile, ScenarioFile, TaskFile
 from roboeval.task import Accepted, Check, Fact, Requirement, Scenario, Task
 from roboeval.worlds import Description
@@ -69,6 +70,9 @@ def read_task(
     form = file.validate(DrawnTaskFile, data) if drawn else file.validate(TaskFile, data)
     if form.name != path.stem:
         raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"', "name")
+    for number, fact in enumerate(form.facts):
+        for word in fact.words:
+            expect_regex(word, file, ("facts", number, "words"))
     given = _given(form, file, words) if isinstance(form, DrawnTaskFile) else {}
     checks = {check.name: check for check in _checks(form, file, given)}
     reader = _Reader(file, checks, skills, given)

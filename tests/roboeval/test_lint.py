@@ -509,6 +509,36 @@ def test_a_new_task_leaves_programs_that_are_recorded_for_it(tmp_path: Path) -> 
     assert [*tmp_path.glob("recorded/*/*")] == [recorded]
 
 
+FACTS = "prompts: [Say hello in the kitchen.]\nfacts: [{fact: where, words: [%s], commonsense: %s}]\n"
+
+
+@pytest.mark.parametrize(
+    ("word", "commonsense", "message"),
+    [
+        ("Kitchen", "false", None),
+        ("lab", "true", None),
+        ("lab", "false", 'prompt 0 does not say "where", by none of its words; say it'),
+        (
+            "kit.hen",
+            "true",
+            'prompt 0 says "where" by "kit.hen", but that is to be common sense; leave it out',
+        ),
+    ],
+)
+def test_a_fact_that_a_prompt_does_not_say(
+    tmp_path: Path, word: str, commonsense: str, message: str | None
+) -> None:
+    path = new_task(tmp_path, "MakeTea")
+    head, _, _ = path.read_text().partition("prompts:")
+    _, _, rest = path.read_text().partition("checks:")
+    path.write_text(head + FACTS % (word, commonsense) + "checks:" + rest)
+    task = load_suite(tmp_path).task("MakeTea")
+    found = [one for one in lint(task, []) if one.kind == "unsaid"]
+    assert [(one.name, one.message) for one in found] == [("unsaid: where", message)] * (message is not None)
+    assert all(path.read_text().splitlines()[(one.line or 0) - 1].startswith("facts:") for one in found)
+    assert not any(one.kind == "unsaid" for one in lint(replace(task, borrows=True), []))
+
+
 # --- drawn worlds
 
 NAMES = [f"{letter}am" for letter in "bcdfghjklmnprtwz"]

@@ -100,6 +100,11 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ),
         ("require: [goes,", "demand: [goes,", 'line 8: the key "require" is missing'),
         ("robot: kitchen", "robot: hall", 'line 9: the robot starts in "hall", but the rooms are: kitchen'),
+        (
+            "prompts: [p]",
+            'prompts: [p]\nfacts:\n  - {fact: f, words: ["("]}',
+            'line 5: "(" is no valid regular expression: missing ), unterminated subpattern at position 0',
+        ),
         ("summary: s", "summary: s\nsummary: t", 'line 3: the key "summary" stands here a second time'),
         ("summary: s", "summary: [s", "line 3: this is no valid YAML"),
     ],
