@@ -155,12 +155,16 @@ def new_task(folder: Path, name: str) -> Path:
         name: of the task.
 
     Raises:
-        BadInput: the name cannot be one, the task is there already, or the folder cannot be written.
+        BadInput: the name cannot be one, the task is there already, or the folder cannot be written or lies
+            within another suite.
     """
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
         raise BadInput(
             f'"{name}" is no name for a task; write words together, each with a capital, such as WaterPlants'
         )
+    around = folder.resolve().parent
+    if (around / "suite.yaml").exists():
+        raise BadInput("lies within a suite; name the folder around it", file=folder)
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
         raise BadInput("is there already; choose another name, or edit it", file=path)

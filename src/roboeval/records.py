@@ -244,7 +244,7 @@ def unknown(key: Key, suite: Suite) -> str | None:
     """
     task = suite.tasks.get(str(key[0]))
     if task is None:
-        return f'the suite has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
+        return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
     there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
     if not _is_whole(key[1]):
         return f"the prompt is {key[1]!r}, not a whole number; {there_are}"

@@ -124,7 +124,7 @@ def test_an_unknown_task(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(task="SayGoodNight"))
     sentence = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert sentence.startswith(
-        'a.jsonl, line 2: the suite has no task "SayGoodNight"; its tasks are CountSavory,'
+        'a.jsonl, line 2: the suite "paper" has no task "SayGoodNight"; its tasks are CountSavory,'
     )
 
 
@@ -140,7 +140,9 @@ def test_an_unknown_task_of_a_published_file(tmp_path: Path) -> None:
     (tmp_path / "py").mkdir()
     (tmp_path / "py" / "SayGoodNight_0_0.py").write_text("completion = ''")
     sentence = refused("evaluate", "py", cwd=tmp_path)
-    assert sentence.startswith('py/SayGoodNight_0_0.py: the suite has no task "SayGoodNight"; its tasks are')
+    assert sentence.startswith(
+        'py/SayGoodNight_0_0.py: the suite "paper" has no task "SayGoodNight"; its tasks are'
+    )
 
 
 @pytest.mark.parametrize(

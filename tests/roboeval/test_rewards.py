@@ -180,7 +180,7 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
         ("LunchTime", "0", [], "the prompt is '0', not a whole number; the task has prompts 0 to 4"),
         ("LunchTime", True, [], "the prompt is True, not a whole number; the task has prompts 0 to 4"),
         ("LunchTime", -1, [], "LunchTime/-1/0: the task has prompts 0 to 4"),
-        (["LunchTime"], 0, [], "the suite has no task"),
+        (["LunchTime"], 0, [], 'the suite "paper" has no task'),
     ],
 )
 def test_arguments_of_another_kind_are_refused(

@@ -211,6 +211,13 @@ def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
     assert load_suite(str(tmp_path / folder)).name == name
 
 
+def test_a_suite_is_not_started_within_another(tmp_path: Path) -> None:
+    new_task(tmp_path / "lab", "MakeTea")
+    with pytest.raises(BadInput, match=r"lab/tasks: lies within a suite; name the folder around it$"):
+        new_task(tmp_path / "lab" / "tasks", "MakeCoffee")
+    assert [path.name for path in (tmp_path / "lab" / "tasks").iterdir()] == ["MakeTea.yaml"]
+
+
 def test_a_suite_is_read_anew_only_when_its_files_have_changed(tmp_path: Path) -> None:
     folder = a_suite(tmp_path)
     before = load_suite(folder)

@@ -189,7 +189,7 @@ OURS = Completion(task="Visit", prompt=0, index=0, program="")
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        (OURS.model_copy(update={"task": "Vist"}), 'the suite has no task "Vist"; its tasks are '),
+        (OURS.model_copy(update={"task": "Vist"}), 'has no task "Vist"; its tasks are '),
         (OURS.model_copy(update={"prompt": 9}), "/9/0: the task has prompts 0 to "),
         (OURS.model_dump(), "a completion is of the type dict; make it a Completion"),
     ],
