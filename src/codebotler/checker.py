@@ -8,7 +8,8 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-from codebotler.badinput import BadInput, expect_text, expect_texts, expect_whole
+from codebotler.arguments import expect_text, expect_texts, expect_whole
+from codebotler.badinput import BadInput
 from codebotler.drives import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.problems import Check, Problem, Sample, failures, no_room
 from codebotler.program import Problem as Flaw

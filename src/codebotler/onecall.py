@@ -6,7 +6,8 @@ import asyncio
 from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
-from codebotler.badinput import BadInput, expect_text, expect_texts, expect_whole
+from codebotler.arguments import expect_text, expect_texts, expect_whole
+from codebotler.badinput import BadInput
 from codebotler.checker import check
 from codebotler.generation import Generation
 from codebotler.generation import generate as ask

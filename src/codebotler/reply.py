@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from codebotler.badinput import expect_text
+from codebotler.arguments import expect_text
 from codebotler.program import TASK, Problem, Program, bound_names, entries, parsed, undefined_names
 from codebotler.skills import SKILLS
 

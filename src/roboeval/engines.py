@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import Protocol, Self, TypeVar
 
-from codebotler.badinput import expect_whole
+from codebotler.arguments import expect_whole
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.lane import Lane
 

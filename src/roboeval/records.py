@@ -18,7 +18,8 @@ from typing import Annotated, Any, BinaryIO, SupportsIndex, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from codebotler.badinput import BadInput, expect_text
+from codebotler.arguments import expect_text
+from codebotler.badinput import BadInput
 from codebotler.models.recorded import recorded_model
 from roboeval.suite import Suite, expect_suite
 

@@ -12,7 +12,8 @@ from functools import partial
 from os import PathLike
 from statistics import fmean
 
-from codebotler.badinput import BadInput, expect_texts
+from codebotler.arguments import expect_texts
+from codebotler.badinput import BadInput
 from codebotler.simulator.engine import digest
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.warm import warm

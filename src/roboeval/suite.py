@@ -12,7 +12,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
-from codebotler.badinput import BadInput, YamlFile, expect_text, expect_whole
+from codebotler.arguments import expect_text, expect_whole
+from codebotler.badinput import BadInput, YamlFile
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS, SkillTable
 from roboeval.installed import installed_folder, installed_suites

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 from urllib.parse import urlsplit
 
-from codebotler.badinput import BadInput, expect_number, expect_whole
+from codebotler.arguments import expect_number, expect_whole
+from codebotler.badinput import BadInput
 from codebotler.prompts import Prompt
 from codebotler.reply import program_of
 

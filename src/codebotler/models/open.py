@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from codebotler.badinput import BadInput, expect_text
+from codebotler.arguments import expect_text
+from codebotler.badinput import BadInput
 from codebotler.models.base import Model, Settings
 from codebotler.models.recorded import Recital, recorded_model
 

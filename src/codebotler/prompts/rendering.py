@@ -13,7 +13,7 @@ from pathlib import Path
 from string import Template
 from typing import Literal, TypeAlias
 
-from codebotler.badinput import expect_text, expect_texts
+from codebotler.arguments import expect_text, expect_texts
 from codebotler.program import TASK
 from codebotler.skills import SKILLS, Skill, SkillTable
 from codebotler.syntaxtree import parse

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import ParamSpec, Self, TypeVar
 
-from codebotler.badinput import expect_whole
+from codebotler.arguments import expect_whole
 from codebotler.simulator.distinct import Distinct
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
