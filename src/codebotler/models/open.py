@@ -27,11 +27,11 @@ def open_model(name: str, settings: Settings) -> Model:
     """
     expect_text(name, "the model's name")
     kind, rest = kind_of(name), name.partition(":")[2]
-    if settings.base_url is not None:
-        expect_server(name)
     # Each of these imports a large library, which only who uses it should wait for.
     match kind:
         case "recorded":
+            if settings.base_url is not None:
+                expect_server(name)
             return Recital(recorded_model(name))
         case "completions":
             from codebotler.models.completions import Completions  # noqa: PLC0415 - see above
