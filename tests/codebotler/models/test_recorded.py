@@ -156,7 +156,7 @@ def test_settings_out_of_range_are_told(wrong: dict[str, Any], sentence: str) ->
 
 
 def test_recorded_programs_have_no_base_url() -> None:
-    with pytest.raises(BadInput, match="^a base URL is given, but recorded runs on no server; name a model"):
+    with pytest.raises(BadInput, match=r"^a base URL is given, but recorded runs on no server; name a model"):
         open_model("recorded", Settings(base_url="http://localhost:8000/v1"))
 
 
