@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import ast
-import threading
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-# CPython before 3.13 counts the depth of all trees that are being made in one place: where two threads read,
-# one of them gets a SystemError. And what `catch_warnings` puts back is what another thread has set.
-_ONE = threading.RLock()
+from codebotler.unwarned import unwarned
 
 
 def parse(source: str, *, compiled: bool = False) -> ast.Module:
@@ -48,5 +44,7 @@ def parse_expression(source: str) -> ast.expr:
 @contextmanager
 def reading() -> Iterator[None]:
     """While a source is read: no other thread reads one, and nobody is warned of odd escapes in it."""
-    with _ONE, warnings.catch_warnings(action="ignore"):
+    # CPython before 3.13 counts the depth of all trees that are being made in one place: where two threads
+    # read, one of them gets a SystemError. So it matters, too, that no other thread is in there.
+    with unwarned():
         yield

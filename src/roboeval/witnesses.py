@@ -7,7 +7,6 @@ there may still be one, so "no text was found" is as much as can be said.
 from __future__ import annotations
 
 import re
-import warnings
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
@@ -18,6 +17,7 @@ from typing import Any
 
 from codebotler.rtl import Claim, Number, Regex, Text, Time, Without, Words
 from codebotler.simulator.robot import found_in
+from codebotler.unwarned import unwarned
 
 _MOST_SAMPLES = 4
 _MOST_SUBSETS = 400
@@ -258,8 +258,7 @@ def _forbidden(pattern: str) -> tuple[str, ...]:
 
 
 def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)
+    with unwarned():
         return import_module("re._parser").parse(pattern, re.IGNORECASE | re.DOTALL)
 
 

@@ -35,6 +35,9 @@ from roboeval.suite import Suite
 from roboeval.verdicts import evaluate
 from viewing import chromium
 
+# Inspect leaves one of its own streams open for each sample.
+pytestmark = pytest.mark.filterwarnings("ignore:Unclosed <MemoryObjectReceiveStream:ResourceWarning")
+
 TASK = "codebotler/roboeval"
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -14,6 +13,7 @@ from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 from codebotler.badinput import BadInput
 from codebotler.models.faults import brief
 from codebotler.perception.base import Sighting
+from codebotler.unwarned import unwarned
 
 FORMATS = ("JPEG", "PNG", "WEBP")
 MAX_BYTES = 50_000_000
@@ -48,8 +48,7 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
         raise BadInput(f"{name} is larger than {MAX_BYTES:,} bytes; take a smaller one")
     try:
         # A picture that says it is huge is refused here before anything of it is unpacked.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        with unwarned([Image.DecompressionBombWarning]):
             opened = Image.open(io.BytesIO(data), formats=FORMATS)
         _check_size(*opened.size, name)
         opened.load()

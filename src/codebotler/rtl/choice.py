@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-import warnings
 from functools import cache
 from importlib import import_module
 from itertools import product
 from typing import TYPE_CHECKING, Any
+
+from codebotler.unwarned import unwarned
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -78,8 +79,7 @@ def _is_next(one: str, other: str) -> bool:
 
 
 def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", FutureWarning)
+    with unwarned():
         return import_module("re._parser").parse(pattern, _FLAGS)
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-import warnings
+
+from codebotler.unwarned import unwarned
 
 
 def compile_regex(pattern: str) -> re.Pattern[str]:
@@ -15,9 +16,8 @@ def compile_regex(pattern: str) -> re.Pattern[str]:
     Raises:
         re.error: it is none.
     """
-    with warnings.catch_warnings():
-        # `[[` and the like may mean something else in a later Python; in this one they are plain.
-        warnings.simplefilter("ignore", FutureWarning)
+    # `[[` and the like may mean something else in a later Python; in this one they are plain.
+    with unwarned():
         return re.compile(pattern, re.IGNORECASE | re.DOTALL)
 
 
