@@ -56,11 +56,17 @@ LESS = {
     "benchmark-pages.md": [("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report")],
     "evaluate-your-model.md": [("--num-completions 50", "--num-completions 1 --tasks LunchTime")],
     "index.md": [("recorded:hasty", "recorded:hasty --tasks LunchBreak")],
-    "report.md": [("--num-completions 4", "--num-completions 4 --tasks LunchTime,LunchBreak,SetTemperature")],
+    "report.md": [
+        ("--out runs/hasty-4\n", "--out runs/hasty-4 --no-report\n"),
+        ("--num-completions 4", "--num-completions 4 --tasks LunchTime,LunchBreak,SetTemperature"),
+    ],
     "roboeval-plus.md": [("--worlds 200", "--worlds 31"), ("--num-completions 3", "--num-completions 1")],
     "tutorial.md": [("--num-completions 2", "--num-completions 1 --tasks LunchTime --no-report")],
 }
 """What a reader is told to do, and what is done here instead: the same with less."""
+
+JOURNEY = ("README.md", "index.md", "tutorial.md")
+"""Pages that one reader follows one after the other, in one folder; each other page has its own."""
 
 FOLLOWED = [page for page in PAGES if page not in RUN_BY]
 CODE, DATA = {"sh", "python"}, {"yaml", "json", "text"}
@@ -130,7 +136,8 @@ class Reader:
     printed: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        (self.folder / "examples").symlink_to(ROOT / "examples")
+        if not (self.folder / "examples").exists():
+            (self.folder / "examples").symlink_to(ROOT / "examples")
         self.put("roboeval", SHIM.format(python=sys.executable, name="roboeval"))
         self.put("codebotler", SHIM.format(python=sys.executable, name="codebotler"))
         self.put("pip", PIP.format(python=sys.executable, site=str(self.folder / "site")))
@@ -177,7 +184,9 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str
 
         def follow(page: str) -> Reader:
             if page not in readers:
-                readers[page] = Reader(tmp_path_factory.mktemp("reader"), server.url)
+                before = JOURNEY[: JOURNEY.index(page)] if page in JOURNEY else ()
+                folder = follow(before[-1]).folder if before else tmp_path_factory.mktemp("reader")
+                readers[page] = Reader(folder, server.url)
                 readers[page].follow(page)
             return readers[page]
 
@@ -198,14 +207,6 @@ def test_what_a_page_has_written_into_the_root_is_left_alone(
     subprocess.run([*git, "init", "--quiet"], check=True)
     seen = subprocess.run([*git, "status", "--porcelain"], check=True, capture_output=True, text=True)
     assert seen.stdout == "?? .gitignore\n"
-
-
-def test_who_reads_one_page_after_the_other_in_one_folder_can_follow_them(
-    followed: Callable[[str], Reader], tmp_path: Path
-) -> None:
-    reader = Reader(tmp_path, followed("index.md").url)
-    for page in ("README.md", "index.md", "tutorial.md"):
-        reader.follow(page)
 
 
 MADE = re.compile(r"(?:--out|--record|--mcap|(?<![<>=-])>|mkdir(?: -p)?|--new \S+ --suite) ?([\w./-]+)")
