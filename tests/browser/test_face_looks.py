@@ -70,11 +70,7 @@ def expect_names_beside_stop(page: Page) -> None:
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
 def test_face(office: PageServer, opened: OpenPage, shots: Path, screen: Screen) -> None:
     which, size, dark = screen
-    office.call("POST", "/api/stop")
-    ends = time.monotonic() + 20
-    while not office.call("GET", "/api/robot").data["is_over"]:
-        assert time.monotonic() < ends
-        time.sleep(0.02)
+    office.rest()
     page = opened(office, size=size, dark=dark, link=office.face_link, script=SPEAKING + HEARING)
     operator = opened(office, size=size, dark=dark)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterator
 
 import pytest
@@ -23,11 +22,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 @pytest.fixture(autouse=True)
 def at_rest(server: PageServer) -> None:
     """Every test begins with a robot that does nothing."""
-    server.call("POST", "/api/stop")
-    ends = time.monotonic() + 20
-    while not server.call("GET", "/api/robot").data["is_over"]:
-        assert time.monotonic() < ends
-        time.sleep(0.02)
+    server.rest()
 
 
 # --- aloud

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -61,9 +60,7 @@ def test_pages(
     mission = office.call("POST", "/api/missions", {"program": PROBLEMS}).data["id"]
     expect(page.locator(".problem-line")).to_be_visible()
     look("problems")
-    office.call("POST", "/api/stop")
-    while not office.call("GET", "/api/robot").data["is_over"]:
-        time.sleep(0.02)
+    office.rest()
     for name, path in (("missions", "missions"), ("mission", f"missions/{mission}"), ("api", "api")):
         page.goto(f"http://localhost:{office.port}/{path}")
         expect(page.locator("h1")).to_be_visible()

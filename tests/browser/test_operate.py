@@ -67,9 +67,7 @@ def text_of(page: Page) -> str:
 @pytest.fixture(autouse=True)
 def at_rest(server: PageServer) -> None:
     """Every test begins with a robot that does nothing."""
-    server.call("POST", "/api/stop")
-    while not server.call("GET", "/api/robot").data["is_over"]:
-        time.sleep(0.02)
+    server.rest()
 
 
 def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> None:

@@ -148,6 +148,16 @@ class PageServer:
         approved = self.call("POST", "/api/missions/current/approve", approval)
         assert approved.status == 200, approved.text
 
+    def rest(self) -> None:
+        """Stop the mission at hand, and one that a page begins behind that, which was closed as it did so."""
+        stopped, ends = None, time.monotonic() + 60
+        while not (robot := self.call("GET", "/api/robot").data)["is_over"]:
+            assert time.monotonic() < ends, "the robot does not come to rest"
+            if robot["mission"] != stopped:
+                stopped = robot["mission"]
+                self.call("POST", "/api/stop")
+            time.sleep(0.02)
+
     @property
     def cookie(self) -> str:
         """What a browser sends that has opened the link."""
