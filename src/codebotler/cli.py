@@ -22,7 +22,6 @@ from codebotler.options import (
     NameOption,
     NoTokenOption,
     PortOption,
-    RobotOption,
     RosPythonOption,
     SeedOption,
     SpeedOption,
@@ -40,6 +39,21 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+def robot_names(incomplete: str) -> list[str]:
+    """What a shell completes where a kind of robot belongs."""
+    from codebotler.robots.open import KINDS
+
+    return [name for name in KINDS if name.startswith(incomplete)]
+
+
+RobotOption = Annotated[
+    str,
+    typer.Option(
+        help="Which robot: sim, or another that `codebotler robots` lists.", autocompletion=robot_names
+    ),
+]
 
 
 @app.callback(invoke_without_command=True)

@@ -25,9 +25,6 @@ BaseUrlOption = Annotated[
 ]
 RosPythonOption = Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")]
 ROS_PYTHON = Path("/usr/bin/python3")
-RobotOption = Annotated[
-    str, typer.Option(help="Which robot: sim, or another that `codebotler robots` lists.")
-]
 SpeedOption = Annotated[
     float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
 ]

@@ -138,28 +138,48 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     """
     name = str(name) if isinstance(name, PathLike) else name
     expect_text(name, "the suite's name")
+    folder = suite_folder(name)
+    suite = _read_suite(folder, skills)
+    if suite.name != name and not (Path(name) / "suite.yaml").is_file():
+        sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"; name both alike'
+        raise YamlFile.read(folder / "suite.yaml").wrong(sentence, "name")
+    return suite
+
+
+def suite_folder(name: str) -> Path:
+    """Where the files of a suite lie: one that ships with RoboEval, one that a package brings, or a folder.
+
+    Args:
+        name: of the suite, or its folder.
+
+    Raises:
+        BadInput: there is no such suite.
+    """
     if name in shipped_suites():
-        return _read_suite(SUITES / name, skills)
+        return SUITES / name
     if SUITE_NAME.fullmatch(name) and (brought := installed_folder(name)) is not None:
-        suite = _read_suite(brought.resolve(), skills)
-        if suite.name != name:
-            sentence = (
-                f'the suite is named "{suite.name}", but its package calls it "{name}"; name both alike'
-            )
-            raise YamlFile.read(brought / "suite.yaml").wrong(sentence, "name")
-        return suite
+        return brought.resolve()
     folder = Path(name)
     if not (folder / "suite.yaml").is_file():
         known = dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())])
         raise BadInput(
             f'there is no suite "{name}": neither one of {", ".join(known)} nor a folder with a suite.yaml'
         )
-    return _read_suite(folder.resolve(), skills)
+    return folder.resolve()
+
+
+def task_files(folder: Path) -> list[Path]:
+    """One file a task, which is named as it, in the order of their names.
+
+    Args:
+        folder: of a suite.
+    """
+    return sorted((folder / "tasks").glob("*.yaml"))
 
 
 def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
     """The suite in a folder as its files are now, which are read again only if they have changed."""
-    files = [folder / "suite.yaml", *sorted((folder / "tasks").glob("*.yaml"))]
+    files = [folder / "suite.yaml", *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     as_they_are = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
     return _suite_of(folder, skills, count, seed, as_they_are)
@@ -178,7 +198,7 @@ def _suite_of(
     if head.name.endswith(ABLATED):
         sentence = f'"{head.name}" ends as the files of an ablation do; choose a name without "{ABLATED}"'
         raise file.wrong(sentence, "name")
-    paths = sorted((folder / "tasks").glob("*.yaml"))
+    paths = task_files(folder)
     if not paths:
         raise BadInput("the suite has no tasks; put one file a task there", file=folder / "tasks")
     documents = [YamlFile.read(path) for path in paths]

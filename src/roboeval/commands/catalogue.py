@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboeval.commands.completing import task_names
 from roboeval.commands.options import JsonOption, SuiteOption, command, cores, load
 from roboeval.terminal import fail, note, print_json, print_rich, watched
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def tasks(
-    task: Annotated[str | None, typer.Argument(help="Show this task.")] = None,
+    task: Annotated[str | None, typer.Argument(help="Show this task.", autocompletion=task_names)] = None,
     suite: SuiteOption = "paper",
     lint: Annotated[bool, typer.Option("--lint", help="Look for faults; status 1 if there are any.")] = False,
     accepted: Annotated[

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboeval.commands.completing import task_names
 from roboeval.commands.options import (
     AblationOption,
     JsonOption,
@@ -32,7 +33,9 @@ def find(
         str | None, typer.Argument(help='An RTL formula, such as tr.Exists(goto("kitchen")); all by default.')
     ] = None,
     negated: Annotated[bool, typer.Option("--not", help="Where the formula does not hold.")] = False,
-    task: Annotated[str | None, typer.Option(help="Only completions of this task.")] = None,
+    task: Annotated[
+        str | None, typer.Option(help="Only completions of this task.", autocompletion=task_names)
+    ] = None,
     world: Annotated[
         str | None, typer.Option(help="Only in this world: its number, from 1, or what it is about.")
     ] = None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 import typer
 
 from codebotler.cli import STOPPED
+from roboeval.commands.completing import task_names
 from roboeval.commands.options import (
     AblationOption,
     EngineOption,
@@ -99,7 +100,10 @@ def evaluate(
 
 def show(
     run: RunArgument,
-    what: Annotated[str | None, typer.Argument(help="TASK, TASK/PROMPT or TASK/PROMPT/INDEX.")] = None,
+    what: Annotated[
+        str | None,
+        typer.Argument(help="TASK, TASK/PROMPT or TASK/PROMPT/INDEX.", autocompletion=task_names),
+    ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
     k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,

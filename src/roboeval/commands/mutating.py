@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
+from roboeval.commands.completing import task_names
 from roboeval.commands.options import SuiteOption, WorkersOption, cores, load, named
 from roboeval.terminal import note, print_rich, watched
 
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 def mutate(
     tasks: Annotated[
-        list[str] | None, typer.Argument(help="Tasks of the suite; all by default.", metavar="TASK...")
+        list[str] | None,
+        typer.Argument(
+            help="Tasks of the suite; all by default.", metavar="TASK...", autocompletion=task_names
+        ),
     ] = None,
     suite: SuiteOption = "paper",
     also: Annotated[

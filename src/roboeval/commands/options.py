@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from roboeval.commands.completing import engine_names, listed_task_names, suite_names
 from roboeval.terminal import fail, note
 
 if TYPE_CHECKING:
@@ -29,12 +30,23 @@ def named(what: str) -> Callable[[str], Path]:
 
 RunArgument = Annotated[Path, typer.Argument(help="A run.", parser=named("a run"))]
 SuiteOption = Annotated[
-    str, typer.Option(help="A suite that ships with RoboEval or is installed, by its name; or a folder.")
+    str,
+    typer.Option(
+        help="A suite that ships with RoboEval or is installed, by its name; or a folder.",
+        autocompletion=suite_names,
+    ),
 ]
-TasksOption = Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")]
+TasksOption = Annotated[
+    str | None,
+    typer.Option(help="Only these tasks, separated by commas.", autocompletion=listed_task_names),
+]
 AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common sense only.")]
 EngineOption = Annotated[
-    str, typer.Option(help="Where programs are run: local, on this machine, or ray, on a Ray cluster.")
+    str,
+    typer.Option(
+        help="Where programs are run: local, on this machine, or ray, on a Ray cluster.",
+        autocompletion=engine_names,
+    ),
 ]
 WorkersOption = Annotated[
     int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
