@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TypeAlias
 
 from codebotler.rtl import ActAtFirst, ActAtSome, And, Element, Formula, Not, Or, Regex, Text
 from codebotler.trace import Event, Option
 from roboeval.witnesses import representative_texts
+
+Matches: TypeAlias = Callable[[Text, str], bool]
+"""Whether a text of a formula is found in one that was said, asked or answered."""
 
 
 def elements(formula: Formula) -> Iterator[Element]:
@@ -73,13 +77,19 @@ def _choices(wanted: tuple[Text, ...]) -> Iterable[tuple[Option, ...]]:
     return found.values()
 
 
-def fits(element: Element, event: Event) -> bool:
-    """Whether an event is of a kind; its options are texts."""
+def fits(element: Element, event: Event, matches: Matches) -> bool:
+    """Whether an event is of a kind; its options are texts.
+
+    Args:
+        element: what kind.
+        event: the event.
+        matches: whether a text of the element is found in one of the event; it is asked of many events alike.
+    """
     if element.kind != event.kind or not element.happens_at(event.place):
         return False
-    if element.answer is not None and (event.answer is None or not element.answer.matches(event.answer)):
+    if element.answer is not None and (event.answer is None or not matches(element.answer, event.answer)):
         return False
-    if element.mention and any(element.text.matches(option.text) for option in event.options):
+    if element.mention and any(matches(element.text, option.text) for option in event.options):
         return True
-    offered = element.options is None or any(element.options.matches(o.text) for o in event.options)
-    return offered and element.text.matches(event.text)
+    offered = element.options is None or any(matches(element.options, o.text) for o in event.options)
+    return offered and matches(element.text, event.text)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import chain, count
 from typing import Any, TypeAlias, assert_never
 
@@ -31,7 +31,7 @@ from codebotler.rtl import (
     holds,
 )
 from codebotler.trace import Event, Trace
-from roboeval.representatives import elements, fits, representative_events
+from roboeval.representatives import Matches, elements, fits, representative_events
 
 MOST_STATES = 1_000
 """How many states one automaton may have before it is made as small as can be."""
@@ -78,6 +78,7 @@ class Reasoner:
             if any(element.place is not None for element in wanted):
                 self._driving = _driving(self.events, rooms, to)
         self._readings: dict[Formula, tuple[Automaton, tuple[int, ...]]] = {}
+        self._matches: Matches = cache(lambda wanted, text: wanted.matches(text))
 
     def clash(self, formulas: Sequence[Formula], denied: Formula | None = None) -> tuple[Formula, ...] | None:
         """Formulas that cannot all hold, or cannot while another fails; none of them can be left out.
@@ -134,7 +135,7 @@ class Reasoner:
         """The formula's automaton, and which of its letters each representative event is."""
         if formula not in self._readings:
             seen = [*dict.fromkeys(elements(formula))]
-            letters = [frozenset(e for e in seen if fits(e, event)) for event in self.events]
+            letters = [frozenset(e for e in seen if fits(e, event, self._matches)) for event in self.events]
             number = {letter: index for index, letter in enumerate(dict.fromkeys(letters))}
             automaton = Automaton.of(_machine(formula), tuple(number))
             self._readings[formula] = automaton, tuple(number[letter] for letter in letters)
