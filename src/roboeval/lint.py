@@ -11,11 +11,11 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import combinations
 from textwrap import shorten
 
 from codebotler.badinput import YamlFile
+from codebotler.cachedproperty import cached_property
 from codebotler.english import listed
 from codebotler.models.recorded import closest_to
 from codebotler.rtl import Element, Formula, Regex, Text

@@ -11,10 +11,11 @@ from __future__ import annotations
 import heapq
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from itertools import chain, count
 from typing import Any, TypeAlias, assert_never
 
+from codebotler.cachedproperty import cached_property
 from codebotler.rtl import (
     ActAtFirst,
     ActAtSome,

@@ -7,11 +7,11 @@ import fnmatch
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from random import Random
 from typing import Any, TypeAlias
 
 from codebotler.badinput import Place, YamlFile
+from codebotler.cachedproperty import cached_property
 from codebotler.world import OptionFile, Person, Room, World
 from roboeval.expression import ExpressionError, Names, PersonFact, ThingFact, each_of, parsed, value
 from roboeval.pairwise import Row, spread

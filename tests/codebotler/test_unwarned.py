@@ -33,6 +33,40 @@ def test_threads_leave_the_filters_as_they_found_them() -> None:
         sys.setswitchinterval(interval)
 
 
+def test_a_caller_who_catches_warnings_meanwhile_leaves_nobody_deaf() -> None:
+    before = list(warnings.filters)
+    caller, reading = warnings.catch_warnings(), unwarned()
+    with reading:
+        caller.__enter__()
+    caller.__exit__(None, None, None)
+    assert list(warnings.filters) == before
+    caller, reading = warnings.catch_warnings(action="error"), unwarned()
+    caller.__enter__()
+    with reading:
+        caller.__exit__(None, None, None)
+    assert list(warnings.filters) == before
+
+
+def test_filters_that_are_set_meanwhile_stay() -> None:
+    with warnings.catch_warnings():
+        with unwarned():
+            warnings.simplefilter("ignore", SyntaxWarning)
+            wanted = warnings.filters[0]
+        assert warnings.filters[0] == wanted
+        with unwarned():
+            warnings.resetwarnings()
+        assert not warnings.filters
+
+
+def test_what_is_told_once_is_not_told_again() -> None:
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("default")
+        for _ in range(3):
+            parse(r"say('\d')")
+            warnings.warn("said before", UserWarning, stacklevel=1)
+    assert [str(one.message) for one in told] == ["said before"]
+
+
 def test_other_warnings_are_given() -> None:
     with unwarned(), pytest.warns(ResourceWarning, match="left open"):
         warnings.warn("left open", ResourceWarning, stacklevel=1)

@@ -7,13 +7,14 @@ import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import SequenceMatcher
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.badinput import BadInput, YamlFile
+from codebotler.cachedproperty import cached_property
 from codebotler.models import base
 from codebotler.models.base import Heard, ModelError, Usage, unheard
 from codebotler.prompts import Prompt

@@ -6,8 +6,9 @@ import re
 from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
+from codebotler.cachedproperty import cached_property
 from codebotler.rtl.clauses import clauses, sentences
 from codebotler.rtl.clock import TimeOfDay, times_in
 from codebotler.rtl.numerals import numerals

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Literal, TypeAlias
 
+from codebotler.cachedproperty import cached_property
 from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 

@@ -12,9 +12,9 @@ import struct
 import threading
 import time
 from collections.abc import Callable
-from functools import cached_property
 from pathlib import Path
 
+from codebotler.cachedproperty import cached_property
 from codebotler.simulator.sandbox import (
     CPU_SECONDS,
     HEADER,

@@ -38,6 +38,9 @@ class Lane:
         except LostChildError as error:
             self._preparer.close()
             raise EngineError(f"the engine does not start: {error}") from None
+        except BaseException:  # an interrupt
+            self._preparer.close()
+            raise
 
     def run(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         """Run a program with a robot, once more if a process was lost through no fault of the program.

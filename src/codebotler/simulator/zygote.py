@@ -47,6 +47,9 @@ class Zygote:
         except (LostChildError, OSError):
             self.close()
             raise LostChildError("the zygote does not start") from None
+        except BaseException:  # an interrupt
+            self.close()
+            raise
 
     def fork(self) -> Child:
         """A fresh child.

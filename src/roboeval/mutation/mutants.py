@@ -7,9 +7,9 @@ import hashlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import chain, zip_longest
 
+from codebotler.cachedproperty import cached_property
 from roboeval.mutation.operator import Operator, Setting
 from roboeval.mutation.operators import OPERATORS
 from roboeval.mutation.rewriting import Source, changed, read

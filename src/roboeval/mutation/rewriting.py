@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, TypeAlias
 
+from codebotler.cachedproperty import cached_property
 from codebotler.program import Problem, parsed
 from codebotler.skills import SKILLS
 

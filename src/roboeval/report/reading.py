@@ -6,9 +6,9 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
+from codebotler.cachedproperty import cached_property
 from codebotler.terminal import visible
 from roboeval.clusters import trimmed
 from roboeval.evaluation import Evaluation

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, Self
 
+from codebotler.cachedproperty import cached_property
 from roboeval.metrics import Estimate, PromptScore, TaskScore, overall
 from roboeval.records import Key
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
 from pathlib import Path
 
 from codebotler.badinput import BadInput
+from codebotler.cachedproperty import cached_property
 from codebotler.simulator.rules import Rules
 from codebotler.terminal import note, shortened
 from roboeval.installed import installed_suites

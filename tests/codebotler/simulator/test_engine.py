@@ -24,6 +24,7 @@ from codebotler.simulator.isolated import codes
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
+from codebotler.simulator.zygote import Zygote
 from codebotler.skills import SKILLS, SkillTable
 from codebotler.trace import Outcome, RunError, Status
 from codebotler.world import Room, World
@@ -678,3 +679,16 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
     assert "maximum recursion depth exceeded" in plain
     assert {told(f"ulimit -s {size}", "pass") for size in ("1000000", "unlimited")} == {plain}
     assert "5 seconds of processor time" in told("trap '' XCPU INT", "sum(range(10**12))")
+
+
+def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(_: Zygote) -> None:
+        raise KeyboardInterrupt
+
+    codes()  # a file that stays open
+    before, processes = set(Path("/proc/self/fd").iterdir()), zygotes()
+    monkeypatch.setattr(Zygote, "_rehearse", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Lanes(1)
+    assert zygotes() <= processes
+    assert set(Path("/proc/self/fd").iterdir()) == before
