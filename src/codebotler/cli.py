@@ -31,11 +31,11 @@ from codebotler.options import (
     TopPOption,
     WorldOption,
 )
+from codebotler.terminal import FULL, system_sentence
 
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
 USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -360,6 +360,8 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
         print(f"{name}: {ON_WINDOWS}", file=sys.stderr)
         raise SystemExit(1)
     _open_what_is_closed()
+    if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
+        del os.environ["COLUMNS"]
     if isinstance(sys.stdout, io.TextIOWrapper):  # what a terminal cannot show must not end a command
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
@@ -406,7 +408,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
-        return (1 if error.errno in ENVIRONMENT else 2), _system_sentence(error)
+        return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None
 
 
@@ -417,12 +419,6 @@ def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' 
         return message
     after = " " if message.endswith("?") else "; "
     return f"{message}{after}`{error.ctx.command_path} --help` lists what there is"
-
-
-def _system_sentence(error: OSError) -> str:
-    where = "the output" if error.filename is None else os.fsdecode(error.filename)
-    mend = "; make room and give the same command again" if error.errno in FULL else ""
-    return f"{where}: {error.strerror}{mend}"
 
 
 def main() -> None:

@@ -15,6 +15,7 @@ from codebotler.models.base import Model, Settings
 from codebotler.models.open import kind_of, open_model
 from codebotler.models.paced import Paced
 from codebotler.prompts import Prompt
+from codebotler.replacing import expect_replaceable
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.imagined import Plan
 from codebotler.terminal import busy, note, print_text, visible
@@ -110,11 +111,13 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
         model: the name of who is asked.
 
     Raises:
+        BadInput: the file holds something else.
         OSError: at the end, if an attempt could not be added; after it, none is.
     """
     if path is None:
         yield untold
         return
+    expect_replaceable(path, b"{")
     failed: OSError | None = None
     with path.open("ab", buffering=0) as file:
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -24,8 +25,11 @@ def home() -> Path:
         raise BadInput("nobody knows where your home is; set CODEBOTLER_HOME to a folder") from None
 
 
+NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
+
+
 def make_folder(folder: Path) -> None:
-    """Make a folder there, if it is not there already.
+    """Make a folder there, if it is not there already, to write into.
 
     Raises:
         BadInput: this is not allowed.
@@ -33,6 +37,11 @@ def make_folder(folder: Path) -> None:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-    except PermissionError as error:
+    except OSError as error:
+        if error.errno not in NOT_ALLOWED:
+            raise
         sentence = f"this cannot be made ({error.strerror}); name another folder by CODEBOTLER_HOME"
         raise BadInput(sentence, file=folder) from None
+    if not os.access(folder, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids):
+        sentence = "nothing can be written into this folder; name another by CODEBOTLER_HOME"
+        raise BadInput(sentence, file=folder)

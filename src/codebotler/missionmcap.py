@@ -16,6 +16,7 @@ from mcap.writer import Writer
 from codebotler import __version__
 from codebotler.missionlog import Line, Summary
 from codebotler.missionpictures import picture_of
+from codebotler.replacing import expect_replaceable
 from codebotler.skills import SKILLS, Skill, SkillTable
 
 Clock: TypeAlias = Literal["wall", "robot"]
@@ -195,9 +196,11 @@ def export(
         folder: of the mission, for its pictures; None to leave them out.
 
     Raises:
+        BadInput: the file holds something else.
         OSError: it cannot be written.
     """
     path = path.resolve()
+    expect_replaceable(path, b"\x89MCAP")
     if path.exists() and not path.is_file():
         whole = io.BytesIO()
         write_mcap(whole, summary, events, folder=folder, clock=clock)

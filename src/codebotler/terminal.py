@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import sys
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 WIDEST = 10_000
 QUIET_S = 2.0  # for so long does a command say nothing at first
 
@@ -78,6 +80,13 @@ def says_yes(question: str) -> bool:
     """Ask the person who reads this; whoever says nothing, or is not there, does not say yes."""
     print(f"{question} [y/N] ", end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
+
+
+def system_sentence(error: OSError) -> str:
+    """What the system refuses, of which file, and the mend where there is one for sure."""
+    where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))
+    mend = "; make room and give the same command again" if error.errno in FULL else ""
+    return f"{where}: {error.strerror}{mend}"
 
 
 def visible(text: str) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import polars as pl
 
 from codebotler.badinput import BadInput
+from codebotler.replacing import expect_replaceable
 from roboeval.records import Completion, Key
 from roboeval.run import write_whole
 
@@ -107,13 +108,14 @@ def write(frame: pl.DataFrame, path: Path, kind: str) -> None:
         kind: csv or parquet.
 
     Raises:
-        BadInput: there is no such format or folder.
+        BadInput: there is no such format or folder, or the file holds something else than a table of ours.
         OSError: the file cannot be written; then what stood there stays.
     """
     if kind not in FORMATS:
         raise BadInput(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
     if not path.parent.is_dir():
         raise BadInput("there is no such folder", file=path.parent)
+    expect_replaceable(path, ",".join(COLUMNS).encode(), b"PAR1")
     content = io.BytesIO()
     if kind == "csv":
         _harmless(frame).write_csv(content)

@@ -192,6 +192,14 @@ def test_a_record_that_cannot_be_written(tmp_path: Path, paper: Suite) -> None:
     assert ended == (2, "", "codebotler: no/such/folder: No such file or directory\n")
 
 
+def test_a_record_is_added_to_no_file_of_other_things(tmp_path: Path, paper: Suite) -> None:
+    (tmp_path / "first.py").write_text("def task_program(): ...\n")
+    ended = codebotler("generate", instruction(paper), "--record", "first.py", cwd=tmp_path)
+    sentence = "first.py: this file holds something else; name another one, or remove it"
+    assert ended == (2, "", f"codebotler: {sentence}\n")
+    assert (tmp_path / "first.py").read_text() == "def task_program(): ...\n"
+
+
 def test_a_full_disk_under_the_record_is_told_and_costs_no_program(tmp_path: Path) -> None:
     with Server(answer=lost_at_first) as server:
         ended = written(server, "--retries", "3", "--record", "/dev/full", cwd=tmp_path)
@@ -205,7 +213,7 @@ def test_a_full_disk_under_the_record_is_told_and_costs_no_program(tmp_path: Pat
 
 def test_a_record_that_does_not_fit_keeps_only_whole_lines(tmp_path: Path, paper: Suite) -> None:
     record = tmp_path / "attempts.jsonl"
-    record.touch()
+    record.write_text("{")
     os.truncate(record, LIMIT - 100)
     words = ("generate", instruction(paper), "--record", record.name)
     ended = codebotler(*words, cwd=tmp_path, before=f"trap '' XFSZ; ulimit -f {LIMIT // 1024};")

@@ -442,6 +442,11 @@ def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:
     run(folder, "good.py", "--yes")
     status, _, err = ended(folder, "missions", "last", "--mcap", "/nowhere/one.mcap")
     assert (status, err) == (2, "codebotler: /nowhere/one.mcap: No such file or directory\n")
+    program = (folder / "good.py").read_bytes()
+    status, _, err = ended(folder, "missions", "last", "--mcap", "good.py")
+    sentence = "this file holds something else; name another one, or remove it"
+    assert (status, err) == (2, f"codebotler: {folder / 'good.py'}: {sentence}\n")
+    assert (folder / "good.py").read_bytes() == program
 
 
 def test_mission_tells_each_state_once(folder: Path) -> None:

@@ -328,13 +328,26 @@ def test_a_full_disk_leaves_an_exported_table_as_it_was(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("".join(map(row, range(12))))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     for kind in ("csv", "parquet"):
-        (tmp_path / "table").write_text("as it was")
+        assert roboeval("export", "run", "--format", kind, "--out", "table", cwd=tmp_path).status == 0
+        as_it_was = (tmp_path / "table").read_bytes()
         limit = "ulimit -f 1;"
         ended = roboeval("export", "run", "--format", kind, "--out", "table", cwd=tmp_path, before=limit)
         assert ended.status == 1, ended
         assert re.fullmatch("roboeval: table" + FULL, ended.err)
-        assert (tmp_path / "table").read_text() == "as it was"
+        assert (tmp_path / "table").read_bytes() == as_it_was
         assert not (tmp_path / "table.new").exists()
+
+
+def test_a_table_takes_the_place_of_no_other_file(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
+    for file in ("a.jsonl", "run/completions.jsonl"):
+        before = (tmp_path / file).read_bytes()
+        said = refused("export", "run", "--out", file, cwd=tmp_path)
+        assert said == f"{file}: this file holds something else; name another one, or remove it"
+        assert (tmp_path / file).read_bytes() == before
+    for name in ("table.csv", "table.csv", "table.parquet", "table.parquet"):
+        assert roboeval("export", "run", "--out", name, cwd=tmp_path).status == 0
 
 
 @pytest.mark.parametrize("verb", ["evaluate", "import"])
@@ -345,6 +358,14 @@ def test_a_folder_of_other_things_is_no_place_for_a_run(tmp_path: Path, verb: st
     said = refused(verb, "a.jsonl", "--out", "docs", cwd=tmp_path)
     assert said == 'docs: is no run, but holds other files, such as "mine.md"; name a new folder'
     assert [path.name for path in (tmp_path / "docs").iterdir()] == ["mine.md"]
+
+
+@pytest.mark.parametrize("columns", ["0", "000", ""])
+def test_a_terminal_of_no_columns_is_one_of_unknown_width(columns: str) -> None:
+    unknown = {name: value for name, value in ENVIRONMENT.items() if name != "COLUMNS"}
+    told = roboeval("tasks", environment=unknown | {"COLUMNS": columns}).out
+    assert told == roboeval("tasks", environment=unknown).out
+    assert "LunchTime" in told
 
 
 def test_an_output_that_is_full_or_closed() -> None:

@@ -123,7 +123,7 @@ def test_half_of_a_surrogate_pair_is_written_out(tmp_path: Path) -> None:
 
 
 def test_a_table_is_written_where_a_link_leads_and_replaces_nothing_but_files(tmp_path: Path) -> None:
-    (tmp_path / "t").write_text("old")
+    write(table([], []), tmp_path / "t", "parquet")
     (tmp_path / "link").symlink_to("t")
     write(table([], []), tmp_path / "link", "csv")
     assert (tmp_path / "link").is_symlink()

@@ -10,6 +10,7 @@ from typing import Self
 
 from codebotler.archive import recover
 from codebotler.checker import check
+from codebotler.home import make_folder
 from codebotler.mission import GRACE, MissionError
 from codebotler.missionlog import Line, Summary
 from codebotler.models.base import Model
@@ -68,6 +69,7 @@ class Desk:
 
     def __enter__(self) -> Self:
         self.interrupted = tuple(recover(self.home))
+        make_folder(self.home / "missions")
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -23,7 +23,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.running import beyond, preflight, unknown_rooms
 from codebotler.simulator.engine import EngineError
 from codebotler.simulator.imagined import Plan
-from codebotler.terminal import visible
+from codebotler.terminal import system_sentence, visible
 from codebotler.web.view import Order, View, digest
 
 LOG = logging.getLogger("codebotler.web")
@@ -174,7 +174,7 @@ class Turn:
             self._show(busy="connecting the robot")
             self._through()
         except EXPECTED as error:
-            self._show(trouble=visible(str(error)))
+            self._show(trouble=_sentence(error))
         except Exception as error:
             LOG.exception("a mission broke off")
             self._show(trouble=f"{type(error).__name__}: {visible(str(error))}")
@@ -321,3 +321,9 @@ class Turn:
         """Change what viewers see; the caller has the lock."""
         self._view = replace(self._view, **changes)  # type: ignore[arg-type]  # names and values of its fields
         self._means.changed()
+
+
+def _sentence(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename is not None:
+        return system_sentence(error)
+    return visible(str(error))

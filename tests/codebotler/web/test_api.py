@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -17,7 +18,7 @@ from typing import Any
 import pytest
 
 from codebotler.archive import missions
-from pageserver import PageServer
+from pageserver import SERVE, WORLD, PageServer
 from server import Server
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -227,6 +228,29 @@ def test_before_there_is_a_mission_that_is_said(tmp_path: Path, method: str, pat
         answer = server.call(method, f"/api/missions/current{path}", {} if path == "/again" else None)
         none = "there is no mission yet; POST /api/missions begins one"
         assert (answer.status, answer.data["detail"]) == (404, none)
+
+
+def test_missions_that_cannot_be_kept_are_said_before_the_page_is_there(tmp_path: Path) -> None:
+    (tmp_path / "world.yaml").write_text(WORLD)
+    ended = subprocess.run(
+        [sys.executable, "-m", *SERVE, "--port", "0"],
+        cwd=tmp_path,
+        env={**os.environ, "CODEBOTLER_HOME": "/sys/home"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1)
+    assert ended.stderr.startswith("codebotler: /sys/home/missions: this cannot be made (")
+
+
+def test_missions_that_can_no_longer_be_kept_are_said_in_a_sentence(tmp_path: Path) -> None:
+    with PageServer(tmp_path) as server:
+        (server.home / "missions").rmdir()
+        (server.home / "missions").touch()
+        answer = server.call("POST", "/api/missions", {"program": HELLO})
+    assert (answer.status, answer.data["detail"]) == (409, f"{server.home / 'missions'}: File exists")
 
 
 def test_a_mission_of_before_can_be_read_and_no_longer_followed(server: PageServer) -> None:
