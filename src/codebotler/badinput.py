@@ -6,6 +6,7 @@ import io
 import re
 from collections.abc import Mapping, Sequence
 from datetime import date
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -56,6 +57,9 @@ class BadInput(ValueError):  # noqa: N818 - named for what it says to the user, 
         self.sentence, self.file, self.line = _brief(" ".join(sentence.splitlines())), file, line
         where = "" if file is None else f"{file}: " if line is None else f"{file}, line {line}: "
         super().__init__(where + self.sentence)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return partial(type(self), file=self.file, line=self.line), (self.sentence,), vars(self)
 
 
 def _brief(text: str, most: int = MAX_SENTENCE) -> str:

@@ -6,6 +6,7 @@ import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol, TypeAlias
 from urllib.parse import urlsplit
 
@@ -168,6 +169,10 @@ class ModelError(Exception):
         super().__init__(sentence)
         self.sentence, self.may_pass, self.retry_after = sentence, may_pass, retry_after
 
+    def __reduce__(self) -> tuple[object, ...]:
+        made = partial(type(self), may_pass=self.may_pass, retry_after=self.retry_after)
+        return made, (self.sentence,), vars(self)
+
 
 class BudgetSpentError(Exception):
     """No further request may be made, because as many tokens are used as were allowed.
@@ -181,3 +186,6 @@ class BudgetSpentError(Exception):
         self.budget, self.used = budget, used
         self.sentence = f"the token budget of {budget:,} is spent: {used:,} tokens are used"
         super().__init__(self.sentence)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.budget, self.used), vars(self)

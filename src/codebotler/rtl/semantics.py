@@ -36,8 +36,8 @@ class CannotJudge(Exception):  # noqa: N818 - not a mistake of the caller but a 
         self.number = number
         self.option = option
 
-    def __reduce__(self) -> tuple[type[CannotJudge], tuple[int, int, Option]]:
-        return type(self), (self.event, self.number, self.option)
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.event, self.number, self.option), vars(self)
 
 
 def holds(formula: Formula, trace: Trace) -> bool:

@@ -66,8 +66,8 @@ class RtlSyntaxError(ValueError):
         self.column = column
         self.problem = problem
 
-    def __reduce__(self) -> tuple[type[RtlSyntaxError], tuple[int, str]]:
-        return type(self), (self.column, self.problem)
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.column, self.problem), vars(self)
 
 
 def parse(text: str, *, skills: SkillTable = SKILLS) -> Formula:

@@ -27,6 +27,9 @@ class RobotError(Exception):
         super().__init__(message)
         self.kind = kind
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.kind, str(self)), vars(self)
+
 
 Argument: TypeAlias = str | tuple[Option, ...]
 Result: TypeAlias = str | list[str] | bool | int | None

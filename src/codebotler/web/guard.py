@@ -75,6 +75,9 @@ class RefusedError(Exception):
         super().__init__(sentence)
         self.status, self.sentence = status, sentence
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.status, self.sentence), vars(self)
+
 
 class Guard:
     """ASGI in front of ASGI.

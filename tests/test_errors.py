@@ -1,0 +1,59 @@
+"""Exceptions reach whoever asked, also from another process."""
+
+import ast
+import pickle
+from http import HTTPStatus
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from codebotler.trace import Option
+
+SOURCES = Path(__file__).parent.parent / "src"
+ROOTS = {"Exception", "ValueError", "RuntimeError", "BadInput"}
+WITHIN = {"codebotler.robots.ros1_worker", "codebotler.simulator.sandbox.execution"}  # of another Python
+A_SENTENCE = ("a sentence",)
+MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
+    "codebotler.badinput.BadInput": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),
+    "codebotler.models.base.BudgetSpentError": ((1_000, 1_012), {}),
+    "codebotler.models.base.ModelError": (A_SENTENCE, {"may_pass": True, "retry_after": 2.5}),
+    "codebotler.rtl.semantics.CannotJudge": ((4, 1, Option("3", is_text=False)), {}),
+    "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
+    "codebotler.simulator.robot.RobotError": (("PickInvalidObject", "there is no mug"), {}),
+    "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
+    "roboeval.web.followed.GoneError": (A_SENTENCE, {"file": "runs/a"}),
+}
+"""What each exception takes; one sentence by default."""
+
+
+def exceptions() -> list[str]:
+    """All that our modules define and do not keep to themselves."""
+    found = []
+    for path in sorted(SOURCES.rglob("*.py")):
+        module = ".".join(path.relative_to(SOURCES).with_suffix("").parts)
+        if module in WITHIN or "/mutation/right/" in str(path):
+            continue
+        for node in ast.parse(path.read_text()).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                bases = {base.id for base in node.bases if isinstance(base, ast.Name)}
+                found += [f"{module}.{node.name}"] * bool(bases & ROOTS)
+    return found
+
+
+def test_the_exceptions_are_found() -> None:
+    assert {*MADE_OF, "codebotler.simulator.lane.EngineError", "codebotler.mission.MissionError"} <= {
+        *exceptions()
+    }
+
+
+@pytest.mark.parametrize("name", exceptions())
+def test_an_exception_comes_whole_from_another_process(name: str) -> None:
+    module, _, kind = name.rpartition(".")
+    given, named = MADE_OF.get(name, (A_SENTENCE, {}))
+    error = getattr(import_module(module), kind)(*given, **named)
+    error.add_note("a note")
+    for protocol in range(pickle.HIGHEST_PROTOCOL + 1):
+        again = pickle.loads(pickle.dumps(error, protocol))
+        assert type(again) is type(error)
+        assert (str(again), again.args, vars(again)) == (str(error), error.args, vars(error))
