@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ class SkillTable(Mapping[str, Skill]):
         kinds = [skill.recording.kind for skill in self.rows if skill.recording]
         if len(by_name) != len(self.rows) or len(set(kinds)) != len(kinds):
             raise ValueError("two skills share a name or a kind of event")
-        object.__setattr__(self, "_by_name", MappingProxyType(by_name))
+        object.__setattr__(self, "_by_name", by_name)
 
     def __getitem__(self, name: str) -> Skill:
         return self._by_name[name]

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from os import PathLike
 from pathlib import Path
@@ -81,10 +81,13 @@ class Suite:
     rules: Rules
     tasks: Mapping[str, Task]
     digest: str
-    further: Further | None = None
+    further: Further | None = field(default=None, compare=False)  # follows from the rest
     folder: Path | None = None
     worlds: int | None = None
     seed: int | None = None
+
+    def __hash__(self) -> int:
+        return hash(self.digest)  # tasks lie in a dictionary, which has no hash
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
         """The same suite with other worlds, drawn from the same descriptions.

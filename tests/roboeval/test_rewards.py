@@ -11,7 +11,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -25,7 +26,7 @@ from codebotler.trace import Event, Outcome, RunError, Status
 from processes import are_gone, children_of
 from roboeval.records import recorded_completions
 from roboeval.rewards import REWARDS, Share, reward, total
-from roboeval.suite import Suite
+from roboeval.suite import Suite, load_suite
 from roboeval.verdicts import evaluate
 
 RIGHT = """
@@ -239,6 +240,14 @@ def test_a_forked_process_has_an_engine_of_its_own() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
+def test_a_process_that_is_started_anew_is_given_the_suite_itself() -> None:
+    asked = partial(reward, "SayGoodDay", 0, [RIGHT, *NOTHING])
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        told = pool.submit(asked, suite=load_suite("plus")).result()
+    assert told == asked(suite="plus")
+    assert any(told)
+
+
 def test_nobody_forks_in_the_middle_of_a_start() -> None:
     began = threading.Event()
 

@@ -1,5 +1,7 @@
 """Task and suite files: what they may say, and one sentence for each way they can be wrong."""
 
+import copy
+import pickle
 import re
 from pathlib import Path
 
@@ -238,3 +240,13 @@ def test_the_rules_of_the_paper() -> None:
     )
     assert suite.rules.literals == "lowercase"
     assert suite.rules.clock_starts.isoformat() == "2024-01-01T12:00:00+00:00"
+
+
+@pytest.mark.parametrize("name", ["paper", "plus"])
+def test_a_suite_can_be_copied_and_sent_and_stand_in_a_set(name: str) -> None:
+    suite = load_suite(name)
+    again = pickle.loads(pickle.dumps(suite))
+    assert {suite, again, copy.deepcopy(suite)} == {suite}
+    if suite.further is not None:
+        task = suite.tasks["LunchTime"]
+        assert again.further(task, 9, 5) == suite.further(task, 9, 5)
