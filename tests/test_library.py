@@ -1,6 +1,7 @@
 """The public names: typed, documented, as they are shown, and cheap to import."""
 
 import ast
+import inspect
 import json
 import re
 import runpy
@@ -162,6 +163,46 @@ def test_an_example_prints_what_the_page_shows(code: str, printed: str) -> None:
 
 def test_all_four_examples_are_there() -> None:
     assert len(EXAMPLES) == 4
+
+
+@pytest.mark.parametrize(("package", "name"), NAMES)
+def test_help_shows_what_a_function_takes_and_no_pages_of_defaults(package: str, name: str) -> None:
+    found = getattr(import_module(package), name)
+    if inspect.isfunction(found):
+        assert len(str(inspect.signature(found))) < 500
+
+
+LONG = "def task_program():\n" + "    say('hello', 1)\n    say(x)\n" * 500
+
+
+def returned() -> Iterator[object]:
+    """What public functions return, where it is large, and what that is made of."""
+    for suite in (load_suite("paper"), load_suite("plus")):
+        yield suite
+        for task in suite.tasks.values():
+            yield task
+            for scenario in task.scenarios:
+                yield from (scenario, scenario.world, *scenario.require)
+    yield codebotler.program_of(LONG)
+    for check in (codebotler.check(LONG), codebotler.check(LONG.replace(", 1)", ")").replace("say(x)", ""))):
+        yield from (check, check.plan, *check.samples, *(sample.outcome for sample in check.samples))
+    generation = codebotler.generate(load_suite().tasks["SayGoodDay"].prompts[0])
+    (attempt,) = generation.attempts
+    yield from (generation, attempt, attempt.prompt, attempt.reply)
+
+
+def test_what_is_returned_is_shown_in_a_few_lines() -> None:
+    found = [*returned()]
+    assert {"Suite", "Task", "World", "Check", "Outcome", "Reply"} <= {type(one).__name__ for one in found}
+    assert [repr(one) for one in found if len(repr(one)) > 400] == []
+    assert {
+        "Suite('plus', 16 tasks)",
+        "Task('LunchTime', 5 prompts, 2 worlds)",
+        "Scenario(World(3 rooms, robot='start_loc'), 5 requirements)",
+        "Program(1,001 lines)",
+        "Check(1,000 problems, 5 samples)",
+        "Generation(1 attempt, 0 problems)",
+    } <= {repr(one) for one in found}
 
 
 NOTEBOOK = """

@@ -17,6 +17,16 @@ def listed(parts: Sequence[str], last: str = "and") -> str:
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
+def counted(number: int, noun: str) -> str:
+    """How many: `1 world`, `2,000 worlds`.
+
+    Args:
+        number: 0 or more.
+        noun: in the singular; its plural ends in `s`.
+    """
+    return f"{number:,} {noun}{'s' * (number != 1)}"
+
+
 def times(number: int) -> str:
     """How often: `once`, `twice`, `3 times`.
 

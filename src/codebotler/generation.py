@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
+from codebotler.english import counted
 from codebotler.models.base import Heard, Model, Reply, unheard
 from codebotler.prompts import Prompt
 
@@ -26,8 +27,8 @@ class Attempt:
     """
 
     number: int
-    prompt: Prompt
-    reply: Reply
+    prompt: Prompt = field(repr=False)
+    reply: Reply = field(repr=False)
     problems: tuple[str, ...]
 
     def data(self, model: str) -> dict[str, Any]:
@@ -59,6 +60,10 @@ class Generation:
     """
 
     attempts: tuple[Attempt, ...]
+
+    def __repr__(self) -> str:
+        attempts, problems = counted(len(self.attempts), "attempt"), counted(len(self.problems), "problem")
+        return f"Generation({attempts}, {problems})"
 
     @property
     def program(self) -> str:

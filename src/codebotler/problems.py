@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from codebotler.english import listed
+from codebotler.english import counted, listed
 from codebotler.simulator.child import PROCESSOR_TIME
 from codebotler.simulator.imagined import Fact, Plan, brief
 from codebotler.simulator.lots import Draw, Lot
@@ -58,8 +58,8 @@ class Sample:
 
     number: int
     outcome: Outcome
-    facts: tuple[Fact, ...] = ()
-    draws: tuple[Draw, ...] = ()
+    facts: tuple[Fact, ...] = field(default=(), repr=False)
+    draws: tuple[Draw, ...] = field(default=(), repr=False)
     in_vain: bool = False
 
     def is_as_in(self, lot: Lot) -> bool:
@@ -100,6 +100,9 @@ class Check:
     plan: Plan
     seed: int = 0
     strict: bool = False
+
+    def __repr__(self) -> str:
+        return f"Check({counted(len(self.problems), 'problem')}, {counted(len(self.samples), 'sample')})"
 
     @property
     def rooms(self) -> tuple[str, ...]:

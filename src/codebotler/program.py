@@ -8,7 +8,7 @@ import symtable
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from codebotler.english import listed
+from codebotler.english import counted, listed
 from codebotler.skills import SKILLS, Parameter, Skill, SkillTable
 from codebotler.syntaxtree import parse, reading
 
@@ -41,6 +41,9 @@ class Program:
     """
 
     source: str
+
+    def __repr__(self) -> str:
+        return f"Program({counted(len(self.source.splitlines()), 'line')})"
 
     def problems(self, skills: SkillTable = SKILLS) -> tuple[Problem, ...]:
         """What is certainly wrong, by line; nothing is run.

@@ -125,6 +125,9 @@ class SkillTable(Mapping[str, Skill]):
     def __hash__(self) -> int:
         return hash(self.rows)
 
+    def __repr__(self) -> str:
+        return f"SkillTable({', '.join(self)})"
+
     def with_skill(self, skill: Skill) -> SkillTable:
         """This table and one more row."""
         return SkillTable((*self.rows, skill))

@@ -82,6 +82,6 @@ class Outcome:
     """
 
     status: Status
-    trace: Trace
+    trace: Trace = field(repr=False)
     error: RunError | None = None
     line: int | None = None

@@ -21,6 +21,7 @@ from pydantic import (
 )
 
 from codebotler.badinput import Place, YamlFile
+from codebotler.english import counted
 
 Point: TypeAlias = tuple[float, float]
 
@@ -82,6 +83,9 @@ class World:
     robot: str
     about: str = ""
     may_wait_forever: bool = False
+
+    def __repr__(self) -> str:
+        return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
 
     @classmethod
     def read(cls, path: Path) -> World:

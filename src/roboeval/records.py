@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from codebotler.arguments import expect_text
 from codebotler.badinput import BadInput
+from codebotler.english import counted
 from codebotler.models.recorded import recorded_model
 from roboeval.suite import Suite, expect_suite
 
@@ -266,7 +267,7 @@ def name_of(key: Key) -> str:
 
 def how_many(count: int) -> str:
     """A number of completions: `1 completion`, `2,000 completions`."""
-    return f"{count:,} completion{'s' * (count != 1)}"
+    return counted(count, "completion")
 
 
 def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:

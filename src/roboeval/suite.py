@@ -14,6 +14,7 @@ from typing import TypeAlias
 
 from codebotler.arguments import expect_text, expect_whole
 from codebotler.badinput import BadInput, YamlFile
+from codebotler.english import counted
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS, SkillTable
 from roboeval.installed import installed_folder, installed_suites
@@ -88,6 +89,9 @@ class Suite:
 
     def __hash__(self) -> int:
         return hash(self.digest)  # tasks lie in a dictionary, which has no hash
+
+    def __repr__(self) -> str:
+        return f"Suite({self.name!r}, {counted(len(self.tasks), 'task')})"
 
     def with_worlds(self, count: int | None = None, seed: int | None = None) -> Suite:
         """The same suite with other worlds, drawn from the same descriptions.

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from codebotler.english import counted
 from codebotler.rtl import Formula
 from codebotler.world import World
 from roboeval.suitefile import Ability, Category
@@ -24,7 +25,7 @@ class Requirement:
 
     text: str
     check: str
-    formula: Formula
+    formula: Formula = field(repr=False)
     category: Category
     line: int | None = None
 
@@ -35,6 +36,9 @@ class Scenario:
 
     world: World
     require: tuple[Requirement, ...]
+
+    def __repr__(self) -> str:
+        return f"Scenario({self.world!r}, {counted(len(self.require), 'requirement')})"
 
 
 @dataclass(frozen=True)
@@ -114,6 +118,10 @@ class Task:
     borrows: bool = False
     drawn: bool = False
     phrases: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    def __repr__(self) -> str:
+        prompts, worlds = counted(len(self.prompts), "prompt"), counted(len(self.scenarios), "world")
+        return f"Task({self.name!r}, {prompts}, {worlds})"
 
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
         """The worlds and requirements by which programs are judged; none if there is no ablation."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Protocol, TypeAlias
 from urllib.parse import urlsplit
@@ -108,8 +108,8 @@ class Reply:
         finish_reason: why it ended, such as `stop` or `length`; None where the model does not say.
     """
 
-    text: str
-    program: str
+    text: str = field(repr=False)
+    program: str = field(repr=False)
     usage: Usage
     latency_s: float
     finish_reason: str | None

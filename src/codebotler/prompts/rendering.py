@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from itertools import islice
 from pathlib import Path
@@ -71,8 +71,8 @@ class Prompt:
     """
 
     instruction: str
-    messages: tuple[Message, ...]
-    text: str
+    messages: tuple[Message, ...] = field(repr=False)
+    text: str = field(repr=False)
     stop: tuple[str, ...]
     opening: str
 
