@@ -75,7 +75,7 @@ def models(folder: Path) -> dict[str, Path]:
     for name in ("recorded:careful", "recorded:hasty"):
         files[name] = folder / f"{name.partition(':')[2]}.jsonl"
         rows = recorded_completions(name, load_suite())
-        files[name].write_bytes(b"".join(to_line(row.model_dump(exclude_unset=True)) for row in rows))
+        files[name].write_bytes(b"".join(to_line(one.row) for one in rows))
     return files
 
 

@@ -15,10 +15,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from roboeval.evaluation import Evaluation
-from roboeval.records import Completion, recorded_completions, to_line
+from roboeval.records import Completion, Row, recorded_completions, to_line
 from roboeval.report.contents import Wishes, headline, sections
 from roboeval.report.reading import JudgedRun, named_apart, read_run
 from roboeval.report.writing import write_report
@@ -42,7 +41,7 @@ def timed(what: str, spent: dict[str, float]) -> Iterator[None]:
 
 
 @cache
-def verdicts() -> list[dict[str, Any]]:
+def verdicts() -> list[Row]:
     """On the recorded programs, in their order."""
     return list(evaluate(recorded(), load_suite(), workers=2))
 
@@ -76,9 +75,9 @@ def made_up(folder: Path, number: int, suite: Suite) -> Run:
                 text = index if index % 5 else 0
                 program = f"{recorded()[at].program}    # {text}\n    note{text % 7} = {text}\n"
                 usage = {"input_tokens": 1_500, "output_tokens": 120 + index}
-                row = {"task": task, "prompt": prompt, "index": index, "model": f"model-{number}"}
-                row |= {"program": program, "instruction": recorded()[at].instruction}
-                completions.write(to_line({**row, "usage": usage, "latency_s": 1.5}))
+                written = {"task": task, "prompt": prompt, "index": index, "model": f"model-{number}"}
+                written |= {"program": program, "instruction": recorded()[at].instruction}
+                completions.write(to_line({**written, "usage": usage, "latency_s": 1.5}))
                 judged.write(to_line({**rows[at], "index": index}))
                 hashes.write(hashlib.sha256(program.encode()).hexdigest() + "\n")
     return run

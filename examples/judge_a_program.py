@@ -16,7 +16,7 @@ suite = load_suite("paper")
 completion = Completion(task="SayGoodDay", prompt=0, index=0, program=PROGRAM)
 (row,) = evaluate([completion], suite)
 
-print("passed" if row["passed"] else f"failed: {row['failure']['kind']}")
+print("passed" if row["failure"] is None else f"failed: {row['failure']['kind']}")
 for scenario, verdict in zip(suite.tasks["SayGoodDay"].scenarios, row["verdicts"], strict=True):
     print(f"- {verdict['world']}: {'satisfied' if verdict['satisfied'] else 'not satisfied'}")
     for requirement in scenario.require:

@@ -3,6 +3,7 @@
 import ast
 import inspect
 import json
+import os
 import re
 import runpy
 import subprocess
@@ -13,6 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import codebotler
@@ -183,6 +185,7 @@ def returned() -> Iterator[object]:
             yield task
             for scenario in task.scenarios:
                 yield from (scenario, scenario.world, *scenario.require)
+    yield from roboeval.recorded_completions("recorded:careful", load_suite())
     yield codebotler.program_of(LONG)
     for check in (codebotler.check(LONG), codebotler.check(LONG.replace(", 1)", ")").replace("say(x)", ""))):
         yield from (check, check.plan, *check.samples, *(sample.outcome for sample in check.samples))
@@ -281,6 +284,65 @@ def test_what_is_no_text_has_no_program_and_no_prompt() -> None:
         codebotler.prompt_for(wrong)
 
 
+def test_skills_are_a_table() -> None:
+    wrong: Any = None
+    for call in (codebotler.check, codebotler.prompt_for, roboeval.load_suite):
+        function: Any = call
+        with pytest.raises(codebotler.BadInput, match=r"^the skills are None, not a SkillTable$"):
+            function("paper", skills=wrong)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"task": 3}, "the task is 3, not a text"),
+        ({"prompt": "0"}, "the prompt is '0', not a whole number"),
+        ({"index": -1}, "the index is -1, but it must be at least 0"),
+        ({"index": 10**9}, "the index is 1000000000, but it must be below 1,000,000,000"),
+        ({"program": None}, "the program is None, not a text"),
+        ({"instruction": 1}, "the instruction is 1, not a text"),
+        ({"model": 1}, "the model is 1, not a text"),
+    ],
+)
+def test_a_completion_of_what_is_none_is_refused(wrong: dict[str, Any], sentence: str) -> None:
+    right: dict[str, Any] = {"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}
+    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+        roboeval.Completion(**(right | wrong))
+
+
+def test_a_number_of_another_library_is_written_as_a_row() -> None:
+    number: Any = np.int64(2)
+    row = roboeval.Completion(task="LunchTime", prompt=number, index=number, program="").row
+    assert json.loads(json.dumps(row)) == {"task": "LunchTime", "prompt": 2, "index": 2, "program": ""}
+
+
+USES = """
+from roboeval import Completion, Row, evaluate, load_suite
+def count(rows: list[Row]) -> int:
+    return sum(row["passed"] for row in rows)
+completion = Completion(task="LunchTime", prompt=0, index=0, program="")
+print(count([*evaluate([completion], load_suite())]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "found"),
+    [
+        ("", "", "Success: no issues found"),
+        ('row["passed"]', 'row["pased"]', 'TypedDict "Row" has no key "pased"'),
+        ("prompt=0", "prompt='0'", 'incompatible type "str"; expected "int"'),
+        (", program=", ", text=", 'Unexpected keyword argument "text"'),
+    ],
+)
+def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: str, tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    (tmp_path / "uses.py").write_text(USES.replace(right, wrong) if right else USES)
+    words = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), "uses.py"]
+    env = {**os.environ, "MYPYPATH": str(ROOT / "src")}
+    ended = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert found in ended.stdout
+
+
 def test_the_name_of_a_suite_is_none() -> None:
     wrong: Any = "paper"
     sentence = "^the suite is 'paper', but it must be one that load_suite has read$"
@@ -292,6 +354,9 @@ def test_the_name_of_a_suite_is_none() -> None:
         next(roboeval.read_completions("x.jsonl", wrong))
     with pytest.raises(codebotler.BadInput, match=r"^x\.jsonl: there is no such file$"):
         next(roboeval.read_completions("x.jsonl"))
+    number: Any = 5
+    with pytest.raises(codebotler.BadInput, match=r"^the path is 5, not a text$"):
+        next(roboeval.read_completions(number))
 
 
 def test_a_suite_is_named_by_a_text_or_a_folder(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from numbers import Integral, Real
 
 from codebotler.badinput import BadInput
+from codebotler.skills import SkillTable
 
 
 def expect_text(given: object, what: str) -> None:
@@ -69,3 +70,16 @@ def expect_whole(given: object, what: str, *, least: int | None = None) -> None:
         raise BadInput(f"{what} is {given!r}, not a whole number")
     if least is not None and given < least:
         raise BadInput(f"{what} is {given}, but it must be at least {least}")
+
+
+def expect_skills(given: object) -> None:
+    """Refuse what is no table of skills.
+
+    Args:
+        given: what was given.
+
+    Raises:
+        BadInput: it is none.
+    """
+    if not isinstance(given, SkillTable):
+        raise BadInput(f"the skills are {given!r}, not a SkillTable")

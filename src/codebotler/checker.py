@@ -8,7 +8,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
-from codebotler.arguments import expect_text, expect_texts, expect_whole
+from codebotler.arguments import expect_skills, expect_text, expect_texts, expect_whole
 from codebotler.badinput import BadInput
 from codebotler.drives import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.problems import Check, Problem, Sample, failures, no_room
@@ -113,6 +113,7 @@ def check(
         expect_text(start, "the start")
     expect_whole(samples, "the number of samples", least=1)
     expect_whole(seed, "the seed")
+    expect_skills(skills)
     settings = Settings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
     plan = plan or _plan(program, rooms, start, skills)
     with nullcontext(lanes) if lanes else Lanes(1 if workers is None else workers) as open_lanes:

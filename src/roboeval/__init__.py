@@ -4,6 +4,7 @@ from __future__ import annotations
 
 __all__ = [
     "Completion",
+    "Row",
     "Suite",
     "evaluate",
     "load_suite",
@@ -14,7 +15,7 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from roboeval.records import Completion, read_completions, recorded_completions
+    from roboeval.records import Completion, Row, read_completions, recorded_completions
     from roboeval.rewards import reward
     from roboeval.suite import Suite, load_suite
     from roboeval.verdicts import evaluate
@@ -25,6 +26,7 @@ else:  # each name is imported when it is first used
         __name__,
         {
             "Completion": "records",
+            "Row": "records",
             "Suite": "suite",
             "evaluate": "verdicts",
             "load_suite": "suite",

@@ -16,7 +16,7 @@ from roboeval.likeness import Change, Fix, Lines, Passing, passing, shape, short
 from roboeval.records import Key, how_many, name_of
 from roboeval.show import GONE, reason
 from roboeval.suite import Suite
-from roboeval.tables import Row, key_of, kind_of
+from roboeval.tables import RowData, key_of, kind_of
 
 ALIKE = 0.6  # of their lines two shapes share to be of one group
 MOST_LINES = 60  # of a difference that people are shown
@@ -62,7 +62,7 @@ class Cluster:
         return sorted({prompt for _, prompt, _ in self.members})
 
 
-def trimmed(row: Row) -> Row:
+def trimmed(row: RowData) -> RowData:
     """A row with only those traces that say why it fails: the deciding world's."""
     why = row["failure"]
     deciding = None if why is None else why["world"]
@@ -73,14 +73,14 @@ def trimmed(row: Row) -> Row:
     return {**row, "verdicts": verdicts if why else []}
 
 
-def groups(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]]:
+def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[RowData]]:
     """Put failing completions together, the largest groups first.
 
     Args:
         failed: rows of those that failed, as `trimmed` leaves them.
         programs: what was judged; what is gone is not there.
     """
-    grounds: defaultdict[Ground, list[Row]] = defaultdict(list)
+    grounds: defaultdict[Ground, list[RowData]] = defaultdict(list)
     for row in failed:
         why = row["failure"]
         grounds[row["task"], why["class"], why["kind"], why["check"]].append(row)
@@ -90,7 +90,7 @@ def groups(failed: Iterable[Row], programs: Mapping[Key, str]) -> list[list[Row]
 
 
 def clusters(
-    groups: Iterable[Sequence[Row]],
+    groups: Iterable[Sequence[RowData]],
     passed: Iterable[Key],
     programs: Mapping[Key, str],
     suite: Suite,
@@ -116,16 +116,16 @@ def clusters(
 
 
 def _grouped(
-    rows: Sequence[Row], programs: Mapping[Key, str], shapes: dict[str, Lines]
-) -> Iterator[list[Row]]:
+    rows: Sequence[RowData], programs: Mapping[Key, str], shapes: dict[str, Lines]
+) -> Iterator[list[RowData]]:
     """Rows of one ground, those of similar programs together."""
-    of_shape: defaultdict[Lines, list[Row]] = defaultdict(list)
+    of_shape: defaultdict[Lines, list[RowData]] = defaultdict(list)
     for row in sorted(rows, key=key_of):
         program = programs.get(key_of(row), "")
         if program not in shapes:
             shapes[program] = shape(program)
         of_shape[shapes[program]].append(row)
-    leaders: list[tuple[Counter[str], list[Row]]] = []
+    leaders: list[tuple[Counter[str], list[RowData]]] = []
     for lines, those in sorted(of_shape.items(), key=lambda item: (-len(item[1]), key_of(item[1][0]))):
         counts = Counter(lines)
         near = next((group for leader, group in leaders if similarity(leader, counts) >= ALIKE), None)
@@ -137,7 +137,7 @@ def _grouped(
 
 
 def _cluster(
-    rows: Sequence[Row],
+    rows: Sequence[RowData],
     programs: Mapping[Key, str],
     candidates: Sequence[Passing],
     suite: Suite,

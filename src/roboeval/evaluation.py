@@ -6,10 +6,10 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 from codebotler.badinput import BadInput
-from roboeval.records import Completion, Key, how_many, name_of, read_judged
+from roboeval.records import Completion, Key, Row, how_many, name_of, read_judged
 from roboeval.run import Run, load_head
 
 
@@ -87,7 +87,7 @@ class Evaluation:
             self._written[key] = bytes.fromhex(completion.program_sha256)
             yield completion
 
-    def rows(self) -> Iterator[dict[str, Any]]:
+    def rows(self) -> Iterator[Row]:
         """Read the rows from the start; `count` and `stale` are about those read so far.
 
         Raises:

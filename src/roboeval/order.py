@@ -85,7 +85,7 @@ def found(run: Run, order: Order) -> tuple[set[Key], Used]:
     if run.completions.stat().st_size:
         for completion in _rows(run, order):
             done.add(completion.key)
-            used.add((completion.model_extra or {}).get("usage"))
+            used.add(completion.more.get("usage"))
     return done, used
 
 

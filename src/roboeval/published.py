@@ -53,7 +53,7 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
                 instruction=values.get("prompt"),
                 program=values["completion"],
             )
-            check_length(completion.model_dump(exclude_unset=True), name)
+            check_length(completion.row, name)
             yield completion
 
 

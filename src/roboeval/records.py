@@ -10,15 +10,13 @@ import os
 import sys
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, SupportsIndex, TypeAlias
+from typing import Any, BinaryIO, SupportsIndex, TypeAlias, TypedDict, cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-
-from codebotler.arguments import expect_text
+from codebotler.arguments import expect_text, expect_whole
 from codebotler.badinput import BadInput
 from codebotler.english import counted
 from codebotler.models.recorded import recorded_model
@@ -30,29 +28,71 @@ COMPLETIONS = "completions.jsonl"
 EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
 CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no folder to the disk
 
+MOST = 1_000_000_000
+REQUIRED = ("task", "prompt", "index", "program")
+FIELDS = (*REQUIRED, "instruction", "model")
+
 Key: TypeAlias = tuple[str, int, int]
 
 
-class Completion(BaseModel):
+@dataclass(frozen=True, kw_only=True)
+class Completion:
     """One row of completions.jsonl: a program that a model wrote for an instruction.
 
     Args:
         task: the task's name.
-        prompt: which phrasing, counted from 0.
-        index: which sample, counted from 0.
+        prompt: which phrasing, counted from 0, below a billion.
+        index: which sample, counted from 0, below a billion.
         program: the cleaned source; judged exactly as it stands.
         instruction: what the model was told; None where nobody recorded it.
         model: who wrote it.
+        more: what else its row says, such as `usage`.
+
+    Raises:
+        BadInput: one of them is not of its kind or range.
     """
 
-    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
-
     task: str
-    prompt: Annotated[int, Field(ge=0, lt=1_000_000_000)]
-    index: Annotated[int, Field(ge=0, lt=1_000_000_000)]
-    program: str
-    instruction: str | None = None
+    prompt: int
+    index: int
+    program: str = field(repr=False)
+    instruction: str | None = field(default=None, repr=False)
     model: str | None = None
+    more: Mapping[str, Any] = field(default_factory=dict, repr=False, hash=False)
+
+    def __post_init__(self) -> None:
+        expect_text(self.task, "the task")
+        for name, number in (("prompt", self.prompt), ("index", self.index)):
+            expect_whole(number, f"the {name}", least=0)
+            if number >= MOST:
+                raise BadInput(f"the {name} is {number}, but it must be below {MOST:,}")
+            if type(number) is not int:  # but of a library's kind, which JSON cannot write
+                object.__setattr__(self, name, int(number))
+        expect_text(self.program, "the program")
+        if self.instruction is not None:
+            expect_text(self.instruction, "the instruction")
+        if self.model is not None:
+            expect_text(self.model, "the model")
+
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> Completion:
+        """The completion that a row of completions.jsonl says.
+
+        Raises:
+            BadInput: something is missing in it, or not of its kind or range.
+        """
+        more = dict(row)
+        known = {name: more.pop(name) for name in FIELDS if name in more}
+        for name in REQUIRED:
+            if name not in known:
+                raise BadInput(f'"{name}" is missing')
+        return cls(**known, more=more)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The row of completions.jsonl that says it."""
+        known = {name: getattr(self, name) for name in FIELDS}
+        return {name: value for name, value in known.items() if value is not None} | dict(self.more)
 
     @property
     def key(self) -> Key:
@@ -63,6 +103,35 @@ class Completion(BaseModel):
     def program_sha256(self) -> str:
         """The hash of the program, half surrogate pairs included, in 64 hexadecimal digits."""
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
+
+
+class Judgement(TypedDict):
+    """What is said of a program.
+
+    Args:
+        passed: whether the program does what is required in all worlds.
+        failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
+        verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
+            `line`, `failed_checks` and `trace`.
+    """
+
+    passed: bool
+    failure: dict[str, Any] | None
+    verdicts: list[dict[str, Any]]
+
+
+class Row(Judgement):
+    """One row of an evaluation: what is said of a completion's program.
+
+    Args:
+        task: the task's name.
+        prompt: which phrasing, counted from 0.
+        index: which sample, counted from 0.
+    """
+
+    task: str
+    prompt: int
+    index: int
 
 
 # --- reading
@@ -147,6 +216,8 @@ def read_completions(
     Raises:
         BadInput: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
     """
+    if not isinstance(path, PathLike):
+        expect_text(path, "the path")
     path = Path(path)
     name = name or path
     if suite is not None:
@@ -154,12 +225,9 @@ def read_completions(
     seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
     for number, row in read_rows(path, growing=growing, name=name, example=EXAMPLE):
         try:
-            completion = Completion.model_validate(row)
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            what = "is missing" if first["type"] == "missing" else f"is wrong: {first['msg'].lower()}"
-            field = ".".join(map(str, first["loc"]))
-            raise BadInput(f'"{field}" {what}', file=name, line=number) from None
+            completion = Completion.of(row)
+        except BadInput as error:
+            raise BadInput(error.sentence, file=name, line=number) from None
         lines = seen[sys.intern(completion.task), completion.prompt]
         first_line = lines.setdefault(completion.index, number)
         if first_line != number:
@@ -187,7 +255,7 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
         raise BadInput(sentence, file=str(file), line=line)
 
 
-def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+def read_evaluations(path: Path) -> Iterator[tuple[int, Row]]:
     """Read the rows of an evaluation with the numbers of their lines.
 
     Raises:
@@ -195,17 +263,17 @@ def read_evaluations(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
     """
     try:
         for number, row in read_rows(path, limit=MAX_EVALUATION, growing=True):
-            _expect_evaluated(row, path, number)
-            yield number, row
+            yield number, _evaluated(row, path, number)
     except BadInput as error:
         if error.line is None:
             raise
         raise BadInput(f"{error.sentence}; --redo starts over", file=path, line=error.line) from None
 
 
-def _expect_evaluated(row: Mapping[str, Any], path: Path, number: int) -> None:
+def _evaluated(row: Mapping[str, Any], path: Path, number: int) -> Row:
     if not (row.keys() >= EVALUATED.keys() and all(isinstance(row[f], t) for f, t in EVALUATED.items())):
         raise BadInput("this line is no row of an evaluation", file=path, line=number)
+    return cast("Row", row)
 
 
 EVALUATED = {
@@ -219,7 +287,7 @@ EVALUATED = {
 HASH_LINE = 65  # bytes: 64 hexadecimal digits and a line end
 
 
-def read_judged(rows: Path, programs: Path) -> Iterator[tuple[int, dict[str, Any], str | None]]:
+def read_judged(rows: Path, programs: Path) -> Iterator[tuple[int, Row, str | None]]:
     """Read the rows of an evaluation with the numbers of their lines and the hashes of their programs.
 
     Args:

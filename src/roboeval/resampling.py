@@ -20,7 +20,7 @@ from rich.text import Text
 from codebotler.terminal import visible
 from roboeval.metrics import Estimate, clustered_interval
 from roboeval.records import Key
-from roboeval.tables import Row
+from roboeval.tables import RowData
 
 LIMITS = (0, 2, 4, 8, 100)
 THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
@@ -83,7 +83,7 @@ def chances(trials: Sequence[Trial], retries: int) -> Chances:
     )
 
 
-def ran(row: Row) -> bool:
+def ran(row: RowData) -> bool:
     """Whether a judged completion ended without an error in every world; one that may wait for ever may."""
     return all(
         verdict["status"] == "finished"

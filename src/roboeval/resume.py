@@ -11,7 +11,16 @@ from typing import Any
 
 from codebotler.badinput import BadInput
 from roboeval.engines import OpenEngine
-from roboeval.records import HASH_LINE, Appender, Completion, length_before, name_of, read_judged, to_line
+from roboeval.records import (
+    HASH_LINE,
+    Appender,
+    Completion,
+    Row,
+    length_before,
+    name_of,
+    read_judged,
+    to_line,
+)
 from roboeval.run import Run, evaluation_key, load_head, to_text, write_whole
 from roboeval.suite import Suite
 from roboeval.verdicts import evaluate, head
@@ -27,7 +36,7 @@ def evaluate_run(
     workers: int = 1,
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Row]:
     """Judge a run's completions, going on where an earlier evaluation stopped; yields all rows in order.
 
     Args:
@@ -78,9 +87,7 @@ def _noting(hashes: deque[str], completions: Iterator[Completion]) -> Iterator[C
         yield completion
 
 
-def _judged(
-    rows: Appender, programs: Appender, completions: Iterator[Completion]
-) -> Iterator[dict[str, Any]]:
+def _judged(rows: Appender, programs: Appender, completions: Iterator[Completion]) -> Iterator[Row]:
     """The rows that are there; afterwards both files end where to go on."""
     count = 0
     for number, row, judged in read_judged(rows.path, programs.path):

@@ -21,7 +21,7 @@ from roboeval.comparison import Comparison, PromptScores, compared, comparison_d
 from roboeval.metrics import score_by_prompt
 from roboeval.records import Key, how_many
 from roboeval.suite import Suite
-from roboeval.tables import Row, key_of
+from roboeval.tables import RowData, key_of
 
 
 @dataclass(frozen=True)
@@ -37,14 +37,14 @@ class Judged:
 
     suite: Suite
     passed: frozenset[Key]
-    failed: Mapping[Key, Row]
+    failed: Mapping[Key, RowData]
     ablated: bool = False
 
     @classmethod
-    def of(cls, rows: Iterable[Row], suite: Suite, *, ablated: bool = False) -> Self:
+    def of(cls, rows: Iterable[RowData], suite: Suite, *, ablated: bool = False) -> Self:
         """Sort the rows of an evaluation, which are read once."""
         passed: set[Key] = set()
-        failed: dict[Key, Row] = {}
+        failed: dict[Key, RowData] = {}
         for row in rows:
             if row["passed"]:
                 passed.add(key_of(row))

@@ -242,7 +242,7 @@ def _locked(descriptor: int) -> bool:
 
 
 def _line(completion: Completion) -> bytes:
-    return to_line(completion.model_dump(exclude_unset=True))
+    return to_line(completion.row)
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -22,7 +22,7 @@ from codebotler.trace import Trace
 from codebotler.tracefile import trace_from
 from roboeval.clusters import trimmed
 from roboeval.records import Key, how_many, name_of
-from roboeval.tables import Row, key_of
+from roboeval.tables import RowData, key_of
 
 BATCH = 100  # rows that a process looks through at a time
 SMALL = 20  # batches for which other processes are not worth their start
@@ -59,10 +59,10 @@ class Found:
     key: Key
     passed: bool
     worlds: tuple[tuple[int, str], ...]
-    row: Row | None
+    row: RowData | None
 
 
-def asked_of(row: Row, question: Question, formula: Formula | None) -> Found:
+def asked_of(row: RowData, question: Question, formula: Formula | None) -> Found:
     """What one row says.
 
     Args:
@@ -75,7 +75,7 @@ def asked_of(row: Row, question: Question, formula: Formula | None) -> Found:
     return Found(key_of(row), row["passed"], tuple(worlds), kept)
 
 
-def _worlds(row: Row, question: Question, formula: Formula | None) -> Iterator[tuple[int, str]]:
+def _worlds(row: RowData, question: Question, formula: Formula | None) -> Iterator[tuple[int, str]]:
     for number, verdict in enumerate(row["verdicts"], 1):
         about = verdict["world"]
         named = question.world in {None, str(number)} or about.lower() == str(question.world).lower()

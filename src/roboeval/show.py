@@ -22,7 +22,7 @@ from roboeval.records import Completion, name_of
 from roboeval.suite import Scenario, Suite
 from roboeval.tables import (
     NOT_RECORDED,
-    Row,
+    RowData,
     Selection,
     by_hand,
     key_of,
@@ -58,7 +58,7 @@ MOST_LINES, EXPLANATION = 1_000, 2_000
 
 
 def prompt_data(
-    rows: Iterable[Row],
+    rows: Iterable[RowData],
     completions: Iterable[Completion],
     suite: Suite,
     task: str,
@@ -81,7 +81,7 @@ def prompt_data(
     """
     found = Selection(task, prompt).rows(rows)
     written = of_task(completions, task)
-    programs: dict[object, list[Row]] = defaultdict(list)
+    programs: dict[object, list[RowData]] = defaultdict(list)
     for row in found:
         completion = written.get(key_of(row))
         programs[row["index"] if completion is None else completion.program].append(row)
@@ -99,7 +99,7 @@ def prompt_data(
     }
 
 
-def reason(row: Row, suite: Suite, *, ablated: bool) -> dict[str, Any]:
+def reason(row: RowData, suite: Suite, *, ablated: bool) -> dict[str, Any]:
     """Why a completion fails: the world that decided, and its error or failed check, explained.
 
     Args:
@@ -120,7 +120,7 @@ def reason(row: Row, suite: Suite, *, ablated: bool) -> dict[str, Any]:
 
 
 def completion_data(
-    row: Row, completion: Completion | None, suite: Suite, *, ablated: bool = False
+    row: RowData, completion: Completion | None, suite: Suite, *, ablated: bool = False
 ) -> dict[str, Any]:
     """One completion: what was asked, the program, and each world with every step and failed check.
 
@@ -140,7 +140,7 @@ def completion_data(
     }
 
 
-def _scenario(suite: Suite, row: Row, number: int, *, ablated: bool) -> Scenario | None:
+def _scenario(suite: Suite, row: RowData, number: int, *, ablated: bool) -> Scenario | None:
     """The scenario in which a verdict was reached; None if the suite has it no more."""
     task = suite.tasks.get(row["task"])
     scenarios = () if task is None else task.judged_in(ablated=ablated)
@@ -148,12 +148,12 @@ def _scenario(suite: Suite, row: Row, number: int, *, ablated: bool) -> Scenario
     return next((s for s in (*scenarios[number : number + 1], *scenarios) if s.world.about == about), None)
 
 
-def _trace(verdict: Row, scenario: Scenario | None) -> Trace:
+def _trace(verdict: RowData, scenario: Scenario | None) -> Trace:
     trace = trace_from(verdict["trace"], further=True)
     return trace if scenario is None else located(trace, scenario.world)
 
 
-def _world_data(verdict: Row, scenario: Scenario | None) -> dict[str, Any]:
+def _world_data(verdict: RowData, scenario: Scenario | None) -> dict[str, Any]:
     trace = _trace(verdict, scenario)
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
@@ -183,7 +183,7 @@ def _explained(check: str, scenario: Scenario | None, trace: Trace) -> dict[str,
 
 def view_data(
     part: Selection,
-    rows: Iterable[Row],
+    rows: Iterable[RowData],
     completions: Iterable[Completion],
     suite: Suite,
     *,
@@ -203,8 +203,8 @@ def view_data(
 
 
 def _one(
-    part: Selection, rows: Iterable[Row], completions: Iterable[Completion]
-) -> tuple[Row, Completion | None]:
+    part: Selection, rows: Iterable[RowData], completions: Iterable[Completion]
+) -> tuple[RowData, Completion | None]:
     row = part.rows(rows)[0]
     return row, next((completion for completion in completions if completion.key == key_of(row)), None)
 
@@ -214,7 +214,7 @@ def _one(
 
 def view(
     part: Selection,
-    rows: Iterable[Row],
+    rows: Iterable[RowData],
     completions: Iterable[Completion],
     suite: Suite,
     *,
@@ -230,7 +230,7 @@ def view(
 
 
 def prompt_view(
-    rows: Iterable[Row],
+    rows: Iterable[RowData],
     completions: Iterable[Completion],
     suite: Suite,
     task: str,
@@ -270,7 +270,7 @@ def _error_sentence(verdict: Mapping[str, Any]) -> str:
 
 
 def completion_view(
-    row: Row, completion: Completion | None, suite: Suite, *, ablated: bool = False
+    row: RowData, completion: Completion | None, suite: Suite, *, ablated: bool = False
 ) -> RenderableType:
     """What `completion_data` says, for a person."""
     data = completion_data(row, completion, suite, ablated=ablated)

@@ -12,7 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TypeAlias
 
-from codebotler.arguments import expect_text, expect_whole
+from codebotler.arguments import expect_skills, expect_text, expect_whole
 from codebotler.badinput import BadInput, YamlFile
 from codebotler.english import counted
 from codebotler.simulator.rules import Rules
@@ -145,6 +145,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     """
     name = str(name) if isinstance(name, PathLike) else name
     expect_text(name, "the suite's name")
+    expect_skills(skills)
     folder = suite_folder(name)
     suite = _read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():

@@ -20,7 +20,7 @@ from roboeval.evaluation import Scope
 from roboeval.metrics import Estimate, PromptScore, TaskScore, overall, score_by_prompt
 from roboeval.records import how_many
 from roboeval.suite import Suite
-from roboeval.tables import Row, by_hand
+from roboeval.tables import RowData, by_hand
 from roboeval.taxonomy import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, ROBOT_KINDS, TASK
 
 ALWAYS_SHOWN: Mapping[str, Sequence[str]] = {PYTHON: PYTHON_KINDS, ROBOT: ROBOT_KINDS, TASK: CATEGORIES}
@@ -87,7 +87,7 @@ class Missing:
 
 
 def summary(
-    rows: Iterable[Row],
+    rows: Iterable[RowData],
     suite: Suite,
     *,
     k: Sequence[int] = (1,),

@@ -16,7 +16,8 @@ from codebotler.terminal import visible
 from roboeval.records import Completion, Key
 from roboeval.suite import Suite
 
-Row: TypeAlias = Mapping[str, Any]
+RowData: TypeAlias = Mapping[str, Any]
+"""A row of an evaluation, or a part of one, as JSON has it."""
 
 NOT_RECORDED = "instruction not recorded"
 ALL_GONE = "the programs that were judged no longer stand in this run"
@@ -42,7 +43,7 @@ class Selection:
     def __str__(self) -> str:
         return "/".join(str(part) for part in (self.task, self.prompt, self.index) if part is not None)
 
-    def rows(self, rows: Iterable[Row]) -> list[Row]:
+    def rows(self, rows: Iterable[RowData]) -> list[RowData]:
         """The rows that it selects.
 
         Raises:
@@ -82,7 +83,7 @@ def parse_selection(text: str | None, suite: Suite) -> Selection:
 
 
 def task_data(
-    rows: Iterable[Row], completions: Iterable[Completion], suite: Suite, task: str
+    rows: Iterable[RowData], completions: Iterable[Completion], suite: Suite, task: str
 ) -> dict[str, Any]:
     """A task, prompt by prompt: how many completions passed, and how the others failed.
 
@@ -96,7 +97,7 @@ def task_data(
         BadInput: the task has no row.
     """
     written = of_task(completions, task)
-    by_prompt: dict[int, list[Row]] = defaultdict(list)
+    by_prompt: dict[int, list[RowData]] = defaultdict(list)
     for row in Selection(task).rows(rows):
         by_prompt[row["prompt"]].append(row)
     return {
@@ -114,12 +115,12 @@ def of_task(completions: Iterable[Completion], task: str) -> dict[Key, Completio
     return {completion.key: completion for completion in completions if completion.task == task}
 
 
-def key_of(row: Row) -> Key:
+def key_of(row: RowData) -> Key:
     """What no other row of an evaluation shares."""
     return row["task"], row["prompt"], row["index"]
 
 
-def prompt_head(prompt: int, rows: Sequence[Row], written: Mapping[Key, Completion]) -> dict[str, Any]:
+def prompt_head(prompt: int, rows: Sequence[RowData], written: Mapping[Key, Completion]) -> dict[str, Any]:
     """What a prompt told the model, and how many of its completions passed."""
     passed = sum(row["passed"] for row in rows)
     those = [written[key_of(row)] for row in rows if key_of(row) in written]
@@ -134,7 +135,7 @@ def prompt_head(prompt: int, rows: Sequence[Row], written: Mapping[Key, Completi
     }
 
 
-def _failure_kinds(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def _failure_kinds(rows: Sequence[RowData]) -> list[dict[str, Any]]:
     counts: Counter[tuple[str, str]] = Counter()
     examples: dict[tuple[str, str], int] = {}
     for row in rows:
@@ -148,7 +149,7 @@ def _failure_kinds(rows: Sequence[Row]) -> list[dict[str, Any]]:
     ]
 
 
-def task_view(rows: Iterable[Row], completions: Iterable[Completion], suite: Suite, task: str) -> Group:
+def task_view(rows: Iterable[RowData], completions: Iterable[Completion], suite: Suite, task: str) -> Group:
     """What `task_data` says, for a person."""
     data = task_data(rows, completions, suite, task)
     models = {model for prompt in data["prompts"] for model in prompt["models"]}

@@ -18,7 +18,7 @@ from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
 from roboeval.engines import Local, OpenEngine
-from roboeval.records import Completion, unknown
+from roboeval.records import Completion, Judgement, Row, unknown
 from roboeval.suite import Requirement, Scenario, Suite, expect_suite
 from roboeval.taxonomy import Verdict, failure
 
@@ -61,7 +61,7 @@ def evaluate(
     workers: int = 1,
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Row]:
     """Judge completions, yielding one row each in their order; equal programs of a task run once.
 
     Args:
@@ -84,7 +84,7 @@ def evaluate(
 
 def _evaluated(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
-) -> Iterator[dict[str, Any]]:
+) -> Iterator[Row]:
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -112,7 +112,7 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
         raise BadInput(f'the task "{completion.task}" has no ablation')
 
 
-def judged(suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool) -> dict[str, Any]:
+def judged(suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool) -> Judgement:
     """What is said of a program, the second of the two, in all worlds of a task, the first."""
     task, program = work
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
@@ -120,12 +120,12 @@ def judged(suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool) ->
     return judgement([judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
 
 
-def evaluation(completion: Completion, told: dict[str, Any]) -> dict[str, Any]:
+def evaluation(completion: Completion, told: Judgement) -> Row:
     """The row of an evaluation: which completion, and what is said of its program."""
     return {"task": completion.task, "prompt": completion.prompt, "index": completion.index, **told}
 
 
-def judgement(verdicts: list[Verdict]) -> dict[str, Any]:
+def judgement(verdicts: list[Verdict]) -> Judgement:
     """What the row of an evaluation says of a program."""
     why = failure(verdicts)
     return {

@@ -15,7 +15,7 @@ from roboeval.report.reading import JudgedRun, Written, scored
 from roboeval.resampling import Trial, by_prompt
 from roboeval.run import Run
 from roboeval.suite import Suite
-from roboeval.tables import Row
+from roboeval.tables import RowData
 from small_run import TASK
 
 HOSTILE = "<script>alert('x')</script>&\"$\\frac{1}$\x1b[2J\u202e\ud800\n</pre>"
@@ -76,11 +76,11 @@ def made_up(
 PROGRAM = 'def task_program():\n    say("hello")\n'
 
 
-def _accepted(row: Row) -> bool:
+def _accepted(row: RowData) -> bool:
     return bool(row["passed"] or row["failure"]["class"] == "TaskCompletionError")
 
 
-def _row(task: str, prompt: int, index: int, *, passed: bool) -> Row:
+def _row(task: str, prompt: int, index: int, *, passed: bool) -> RowData:
     name, kind = FAILURES[(index + 3 * prompt) % len(FAILURES)]
     check = None if name != "TaskCompletionError" else f"{kind.lower()}()"
     error = None if check else {"kind": kind, "message": f"{kind} it is"}

@@ -44,7 +44,7 @@ def judged(rows: list[Row], suite: Suite) -> list[Row]:
         Completion(task=row["task"], prompt=0, index=index, program=row["program"])
         for index, row in enumerate(rows)
     ]
-    return list(evaluate(completions, suite, workers=2))
+    return [{**row} for row in evaluate(completions, suite, workers=2)]
 
 
 def expected_kinds(error: str) -> set[str]:
@@ -176,6 +176,5 @@ def test_published_ablation(corpus: Path, paper: Suite, file: str) -> None:
     for completion, row in zip(
         completions, evaluate(completions, paper, ablated=True, workers=2), strict=True
     ):
-        assert completion.model_extra is not None
         ours = [verdict["satisfied"] for verdict in row["verdicts"]]
-        assert ours == completion.model_extra["ablation"], completion.key
+        assert ours == completion.more["ablation"], completion.key

@@ -30,7 +30,7 @@ from playwright.sync_api import expect, sync_playwright
 from codebotler.badinput import BadInput
 from codebotler.prompts import prompt_for
 from roboeval import inspecting
-from roboeval.records import Completion, recorded_completions
+from roboeval.records import Completion, Row, recorded_completions
 from roboeval.suite import Suite
 from roboeval.verdicts import evaluate
 from viewing import chromium
@@ -148,7 +148,7 @@ def test_what_a_log_cannot_hold_is_no_reason_to_stop() -> None:
 def test_the_loop_goes_on_while_a_program_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     went_on = threading.Event()
 
-    def slowly(*arguments: Any, **options: Any) -> Iterator[dict[str, Any]]:  # noqa: ANN401 - whatever it takes
+    def slowly(*arguments: Any, **options: Any) -> Iterator[Row]:  # noqa: ANN401 - whatever it takes
         assert went_on.wait(20), "the loop stands still"
         return evaluate(*arguments, **options)
 

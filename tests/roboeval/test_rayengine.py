@@ -23,7 +23,7 @@ from command_line import ENVIRONMENT, roboeval
 from roboeval import rayengine
 from roboeval.engines import Local
 from roboeval.rayengine import LARGEST, LOOPBACK_ONLY, OURS, Cluster, Shards, Told, call_all
-from roboeval.records import recorded_completions
+from roboeval.records import Row, recorded_completions
 from roboeval.suite import Suite
 from roboeval.verdicts import evaluate
 
@@ -230,7 +230,7 @@ def test_a_node_that_is_killed_in_the_middle_loses_nothing(nodes: Nodes, paper: 
     here = list(evaluate(completions, paper, engine=Local(2)))
     with Cluster() as cluster:
         assert cluster._cores() == 2
-        there: list[dict[str, Any]] = []
+        there: list[Row] = []
         for row in evaluate(completions, paper, engine=Same(cluster)):
             there.append(row)
             if len(there) == 20:

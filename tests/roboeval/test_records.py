@@ -28,17 +28,17 @@ def sentence_about(path: Path, line: bytes) -> str:
 @pytest.mark.parametrize(
     ("name", "value", "what"),
     [
-        ("prompt", 10**9, "input should be less than 1000000000"),
-        ("index", 10**9, "input should be less than 1000000000"),
-        ("index", 10**25, "input should be less than 1000000000"),
-        ("index", -1, "input should be greater than or equal to 0"),
-        ("index", True, "input should be a valid integer"),
-        ("index", "3", "input should be a valid integer"),
+        ("prompt", 10**9, "1000000000, but it must be below 1,000,000,000"),
+        ("index", 10**9, "1000000000, but it must be below 1,000,000,000"),
+        ("index", 10**25, f"{10**25}, but it must be below 1,000,000,000"),
+        ("index", -1, "-1, but it must be at least 0"),
+        ("index", True, "True, not a whole number"),
+        ("index", "3", "'3', not a whole number"),
     ],
 )
 def test_a_number_that_is_none_gets_a_sentence(tmp_path: Path, name: str, value: object, what: str) -> None:
     path = tmp_path / "a.jsonl"
-    assert sentence_about(path, to_line(ROW | {name: value})) == f'{path}, line 1: "{name}" is wrong: {what}'
+    assert sentence_about(path, to_line(ROW | {name: value})) == f"{path}, line 1: the {name} is {what}"
 
 
 @given(st.dictionaries(st.text(), st.text(st.characters()) | st.integers() | st.floats(allow_nan=False)))

@@ -9,12 +9,11 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.records import Completion, read_completions, read_rows, recorded_completions, to_line
+from roboeval.records import Completion, Row, read_completions, read_rows, recorded_completions, to_line
 from roboeval.resume import evaluate_run
 from roboeval.run import Run, Source, open_source, tasks_to_judge
 from roboeval.suite import Suite
@@ -34,7 +33,7 @@ def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> Run:
     return run
 
 
-def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[dict[str, Any]]:
+def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[Row]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
 
 
@@ -366,8 +365,8 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     path.write_bytes(to_line(row))
     run = Run(tmp_path / "run")
     run.keep(open_source(str(path), paper))
-    assert [c.model_dump(exclude_unset=True) for c in read_completions(run.completions)] == [row]
-    assert Completion.model_validate(row).key == ("SayGoodDay", 0, 0)
+    assert [c.row for c in read_completions(run.completions)] == [row]
+    assert Completion.of(row).key == ("SayGoodDay", 0, 0)
 
 
 def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> None:

@@ -1,6 +1,7 @@
 """What is right and wrong: errors, limits, worlds that may wait, options that cannot be judged."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.world import Room, World
-from roboeval.records import Completion
+from roboeval.records import Completion, Row
 from roboeval.suite import Scenario, Suite, load_suite
 from roboeval.taxonomy import Failure, Verdict, failure
 from roboeval.verdicts import evaluate, judge
@@ -45,7 +46,7 @@ def suite(tmp_path: Path) -> Suite:
     return load_suite(str(tmp_path))
 
 
-def judged(suite: Suite, *programs: str) -> list[dict[str, Any]]:
+def judged(suite: Suite, *programs: str) -> list[Row]:
     completions = [Completion(task="T", prompt=0, index=i, program=p) for i, p in enumerate(programs)]
     return list(evaluate(completions, suite, workers=2))
 
@@ -189,15 +190,15 @@ OURS = Completion(task="Visit", prompt=0, index=0, program="")
 @pytest.mark.parametrize(
     ("wrong", "sentence"),
     [
-        (OURS.model_copy(update={"task": "Vist"}), 'has no task "Vist"; its tasks are '),
-        (OURS.model_copy(update={"prompt": 9}), "/9/0: the task has prompts 0 to "),
-        (OURS.model_dump(), "a completion is of the type dict; make it a Completion"),
+        (replace(OURS, task="Vist"), 'has no task "Vist"; its tasks are '),
+        (replace(OURS, prompt=9), "/9/0: the task has prompts 0 to "),
+        (OURS.row, "a completion is of the type dict; make it a Completion"),
     ],
 )
 def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: object, sentence: str) -> None:
     task = next(iter(paper.tasks))
     if isinstance(wrong, Completion) and wrong.task == OURS.task:
-        wrong = wrong.model_copy(update={"task": task})
+        wrong = replace(wrong, task=task)
     completion: Any = wrong
     with pytest.raises(BadInput, match=re.escape(sentence)):
         list(evaluate([completion], paper))
@@ -207,6 +208,6 @@ def test_evaluating_takes_workers_and_an_ablation(paper: Suite) -> None:
     with pytest.raises(BadInput, match="the number of workers is 0, but it must be at least 1"):
         evaluate([], paper, workers=0)
     task = next(task.name for task in paper.tasks.values() if task.ablation is None)
-    completion = OURS.model_copy(update={"task": task})
+    completion = replace(OURS, task=task)
     with pytest.raises(BadInput, match=f'the task "{task}" has no ablation'):
         list(evaluate([completion], paper, ablated=True))

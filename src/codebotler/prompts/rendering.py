@@ -13,7 +13,7 @@ from pathlib import Path
 from string import Template
 from typing import Literal, TypeAlias
 
-from codebotler.arguments import expect_text, expect_texts
+from codebotler.arguments import expect_skills, expect_text, expect_texts
 from codebotler.program import TASK
 from codebotler.skills import SKILLS, Skill, SkillTable
 from codebotler.syntaxtree import parse
@@ -130,10 +130,11 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
         skills: what a program may call.
 
     Raises:
-        BadInput: the instruction is no text, or the rooms are no list of texts.
+        BadInput: the instruction is no text, the rooms are no list of texts, or the skills no table of them.
     """
     expect_text(instruction, "the instruction")
     expect_texts(rooms, "the rooms")
+    expect_skills(skills)
     about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
     wish = "\n\n".join(filter(None, (instruction.strip(), about_rooms)))
     stubs = [_stub(skill) for skill in skills.values()]

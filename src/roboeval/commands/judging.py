@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
@@ -32,7 +32,7 @@ from roboeval.terminal import fail, note, print_json, print_rich, watched
 if TYPE_CHECKING:
     from roboeval.engines import OpenEngine
     from roboeval.evaluation import Scope
-    from roboeval.records import Key
+    from roboeval.records import Key, Row
     from roboeval.suite import Suite
 
 
@@ -210,7 +210,7 @@ class Tally:
         self.count = 0
         self.first_failed: tuple[str, ...] = ()
 
-    def of(self, rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    def of(self, rows: Iterable[Row]) -> Iterator[Row]:
         """Pass rows on."""
         for row in rows:
             self.count += 1
@@ -234,7 +234,7 @@ class Tally:
 
 
 def print_summary(
-    rows: Iterable[dict[str, Any]],
+    rows: Iterable[Row],
     suite: Suite,
     scope: Scope,
     *,

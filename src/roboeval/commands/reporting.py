@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
@@ -28,7 +28,7 @@ from roboeval.terminal import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
     from roboeval.evaluation import Evaluation
-    from roboeval.records import Key
+    from roboeval.records import Key, Row
     from roboeval.report.reading import JudgedRun
     from roboeval.reversals import Judged
     from roboeval.suite import Suite
@@ -239,7 +239,7 @@ def judged_run(
 
     ended: dict[Key, tuple[bool, bool]] = {}
 
-    def noted(rows: Iterable[dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    def noted(rows: Iterable[Row]) -> Iterator[Row]:
         for row in rows:
             ended[key_of(row)] = ran(row), bool(row["passed"])
             yield row

@@ -18,7 +18,7 @@ from roboeval.resampling import Prompt
 from roboeval.reversals import Judged
 from roboeval.run import load_head
 from roboeval.suite import Suite
-from roboeval.tables import Row
+from roboeval.tables import RowData
 
 MOST = 10**12  # tokens or seconds; a request of which more is told was not counted
 LONGEST_NAME = 100
@@ -68,7 +68,7 @@ class JudgedRun:
     model: str | None
     about: Mapping[str, Any]
     head: Mapping[str, Any]
-    rows: tuple[Row, ...]
+    rows: tuple[RowData, ...]
     written: Mapping[Key, Written]
     scores: tuple[TaskScore, ...]
     total: int
@@ -93,12 +93,12 @@ class JudgedRun:
         return {key[:2]: w.instruction for key, w in self.written.items() if w.instruction is not None}
 
     @property
-    def failed(self) -> list[Row]:
+    def failed(self) -> list[RowData]:
         """The rows that failed."""
         return [row for row in self.rows if not row["passed"]]
 
 
-def read_run(evaluation: Evaluation, rows: Iterable[Row], suite: Suite) -> JudgedRun:
+def read_run(evaluation: Evaluation, rows: Iterable[RowData], suite: Suite) -> JudgedRun:
     """Read a judged run.
 
     Args:
@@ -140,7 +140,7 @@ def _readable(name: str) -> str:
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 30]}…{name[-29:]}"
 
 
-def scored(rows: Iterable[Row], suite: Suite) -> tuple[TaskScore, ...]:
+def scored(rows: Iterable[RowData], suite: Suite) -> tuple[TaskScore, ...]:
     """The scores of tasks, in the order of the suite."""
     scores = score_by_prompt((row["task"], row["prompt"], row["passed"]) for row in rows)
     by_name = {score.task: score for score in scores}
@@ -148,8 +148,7 @@ def scored(rows: Iterable[Row], suite: Suite) -> tuple[TaskScore, ...]:
 
 
 def _written(completion: Completion) -> Written:
-    more = completion.model_extra or {}
-    usage = more.get("usage")
+    usage = completion.more.get("usage")
     usage = usage if isinstance(usage, dict) else {}
     instruction = completion.instruction
     return Written(
@@ -157,7 +156,7 @@ def _written(completion: Completion) -> Written:
         instruction=None if instruction is None else sys.intern(instruction),
         input_tokens=_whole(usage.get("input_tokens")),
         output_tokens=_whole(usage.get("output_tokens")),
-        seconds=_number(more.get("latency_s")),
+        seconds=_number(completion.more.get("latency_s")),
     )
 
 

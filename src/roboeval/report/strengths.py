@@ -10,7 +10,7 @@ from roboeval.certainty import by_formula
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
 from roboeval.suite import Suite
-from roboeval.tables import Row
+from roboeval.tables import RowData
 from roboeval.taxonomy import PYTHON, ROBOT, TASK
 
 REPORTS = "report-back"
@@ -82,7 +82,7 @@ def coming_back_sheet(runs: Sequence[JudgedRun], suite: Suite) -> Sheet | None:
     return found if back and rows else None
 
 
-def _coming_back(rows: Sequence[Row], run: JudgedRun, suite: Suite) -> list[Cell]:
+def _coming_back(rows: Sequence[RowData], run: JudgedRun, suite: Suite) -> list[Cell]:
     tasks = {row["task"] for row in rows}
     values = [value for task, values in run.by_task.items() if task in tasks for value in values]
     failed = [row for row in rows if not row["passed"]]
@@ -109,7 +109,7 @@ def coming_back_said(table: Sheet) -> list[str]:
     ]
 
 
-def never_returned(row: Row, suite: Suite) -> bool:
+def never_returned(row: RowData, suite: Suite) -> bool:
     """Whether, in the world that decided, the robot left the room where it started and never went back.
 
     Args:

@@ -13,13 +13,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
 from roboeval.records import EVALUATED, HASH_LINE, MAX_EVALUATION, MAX_ROW, Completion, Key, name_of
 from roboeval.run import Run, load_head
-from roboeval.tables import Row, key_of
+from roboeval.tables import RowData, key_of
 from roboeval.web.seen import Entry, Judged, Seen, Written
 from roboeval.web.tail import Change, Tail
 
@@ -105,7 +103,7 @@ class FollowedRun:
             pass
         return seen
 
-    def row(self, entry: Entry) -> Row | None:
+    def row(self, entry: Entry) -> RowData | None:
         """The row of an evaluation again, with all its traces; None if there is none yet.
 
         Raises:
@@ -116,7 +114,7 @@ class FollowedRun:
         row = self._again(self._rows, entry.judged.at, entry.judged.size)
         if _judged(row, 0, 0) is None or key_of(row) != entry.key:
             raise BadInput("was written anew meanwhile; reload the page", file=self._rows.path.name)
-        found: Row = row
+        found: RowData = row
         return found
 
     def completion(self, entry: Entry) -> Completion | None:
@@ -128,10 +126,9 @@ class FollowedRun:
         if entry.written is None:
             return None
         row = self._again(self._completions, entry.written.at, entry.written.size)
-        with suppress(ValidationError):
-            completion = Completion.model_validate(row)
-            if completion.key == entry.key:
-                return completion
+        completion = _completion(row)
+        if completion is not None and completion.key == entry.key:
+            return completion
         raise BadInput("was written anew meanwhile; reload the page", file=self._completions.path.name)
 
     # --- reading on
@@ -184,14 +181,13 @@ class FollowedRun:
             self._take_row(row, at, line)
 
     def _take_completion(self, row: object, at: int, line: bytes) -> None:
-        try:
-            completion = Completion.model_validate(row)
-        except ValidationError:
+        completion = _completion(row)
+        if completion is None:
             raise BadInput(
                 "this line is no completion; correct or remove it",
                 file=self._completions.path.name,
                 line=self._completions.number,
-            ) from None
+            )
         key = _interned(completion.key)
         if key in self._written:
             raise BadInput(
@@ -253,6 +249,13 @@ def _is_same(written: Written | None, judged: bytes | None) -> bool:
 
 def _interned(key: Key) -> Key:
     return sys.intern(key[0]), key[1], key[2]
+
+
+def _completion(row: object) -> Completion | None:
+    """The completion that a line says; None if it is none."""
+    with suppress(BadInput):
+        return Completion.of(row) if isinstance(row, dict) else None
+    return None
 
 
 def _judged(row: Any, at: int, size: int) -> tuple[Key, Judged] | None:  # noqa: ANN401 - JSON has no types

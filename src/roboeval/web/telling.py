@@ -205,10 +205,9 @@ def completion_told(run: FollowedRun, seen: Seen, entry: Entry, suite: Suite | N
     completion, row = run.completion(entry), run.row(entry)
     keep = {"evaluation": seen.key, "stale": entry.stale, "note": GONE if entry.stale else None}
     if row is None:
-        known = (
-            None if completion is None else completion.model_dump(include={"model", "instruction", "program"})
-        )
-        return {**entry_data(entry), **(known or {}), **keep, "worlds": []}
+        names = () if completion is None else ("model", "instruction", "program")
+        known = {name: getattr(completion, name) for name in names}
+        return {**entry_data(entry), **known, **keep, "worlds": []}
     judged_by = suite or unknown_suite(str(seen.head.get("suite")))
     ablated = bool(seen.key and seen.key.endswith(ABLATED))
     try:

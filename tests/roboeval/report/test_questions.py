@@ -298,13 +298,13 @@ def test_where_it_comes_from() -> None:
 def test_what_completions_say_of_their_cost() -> None:
     data = {"task": "T", "prompt": 0, "index": 0, "program": "x", "latency_s": 1.5}
     usage = {"input_tokens": 3, "output_tokens": True}
-    read = _written(Completion.model_validate({**data, "usage": usage}))
+    read = _written(Completion.of({**data, "usage": usage}))
     assert (read.input_tokens, read.output_tokens, read.seconds) == (3, None, 1.5)
-    assert _written(Completion.model_validate({**data, "usage": 3, "latency_s": "x"})).seconds is None
+    assert _written(Completion.of({**data, "usage": 3, "latency_s": "x"})).seconds is None
 
 
 @pytest.mark.parametrize("much", [10**400, 10**13, float("inf"), float("nan"), -1])
 def test_what_nobody_can_have_counted(much: float) -> None:
     data = {"task": "T", "prompt": 0, "index": 0, "program": "x", "latency_s": much}
-    read = _written(Completion.model_validate({**data, "usage": {"input_tokens": much, "output_tokens": 1}}))
+    read = _written(Completion.of({**data, "usage": {"input_tokens": much, "output_tokens": 1}}))
     assert (read.input_tokens, read.output_tokens, read.seconds) == (None, 1, None)
