@@ -73,6 +73,13 @@ def test_help_imports_nothing_that_a_command_works_with(package: str, arguments:
         assert "pydantic" not in imported
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_is_run_as_its_command(package: str) -> None:
+    words = [sys.executable, "-m", package, "--version"]
+    ended = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert ended.stdout == f"{package} {import_module(package).__version__}\n"
+
+
 @pytest.mark.parametrize(("package", "name"), NAMES)
 def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -> None:
     """A module of the same name would take its place as soon as anybody imports the module."""

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from codebotler import __version__
+
 __all__ = [
     "Completion",
     "Row",
     "Suite",
+    "__version__",
     "evaluate",
     "load_suite",
     "read_completions",
