@@ -92,7 +92,8 @@ def check(
         program: its source, which need not even parse.
         rooms: the names of the rooms, in order, as a world file writes them; without them they are taken from
             the program.
-        start: the room in which the robot starts; without it `start_loc` if that is a room, or the first one.
+        start: the room in which the robot starts, one of `rooms` where there are any; without it `start_loc`
+            if that is a room, or the first one.
         samples: how many worlds to imagine, from 1.
         seed: from which they are drawn: the same ones on every machine.
         strict: whether to draw also what the program takes for granted.
@@ -104,7 +105,8 @@ def check(
         plan: the rooms and the start, in the place of those two, for who knows more of them.
 
     Raises:
-        BadInput: the name of a room is no regular expression, or an argument is not of its kind or range.
+        BadInput: the name of a room is no regular expression, the robot starts in none of the rooms, or an
+            argument is not of its kind or range.
         EngineError: no isolated process could be started.
     """
     expect_text(program, "the program")
@@ -252,7 +254,9 @@ def _plan(program: str, rooms: Sequence[str] | None, start: str | None, skills: 
             _expect_regex(room)
         names = tuple(dict.fromkeys(rooms)) or (start or START,)
         start = start or (START if START in names else names[0])
-        return Plan(names if start in names else (*names, start), start)
+        if start not in names:
+            raise BadInput(f'the robot starts in "{start}", but the rooms are: {", ".join(names)}')
+        return Plan(names, start)
     start = start or START
     named = [room for room in named_rooms(program, skills) if room != start]
     if len(named) < len(SOME_ROOMS) and lists_rooms(program):

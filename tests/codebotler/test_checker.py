@@ -315,6 +315,10 @@ def test_where_the_robot_starts(lanes: Lanes) -> None:
     assert said(("lab", "hall")) == "lab"
     assert said(("lab", "hall"), "hall") == "hall"
     assert said(()) == "start_loc"
+    assert said((), "hall") == "hall"
+    assert check(source, start="hall", lanes=lanes).plan.start == "hall"
+    with pytest.raises(BadInput, match=r'^the robot starts in "hal", but the rooms are: lab, hall$'):
+        said(("lab", "hall"), "hal")
 
 
 def test_a_room_that_is_no_regex_is_refused(lanes: Lanes) -> None:
