@@ -1,5 +1,6 @@
 """One more skill is one row of the table and one behaviour; everything else follows from them."""
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from codebotler.skills import SKILLS, Parameter, Recording, RosAction, Skill, Sk
 from codebotler.trace import Event, Option, Outcome, RunError, Status
 from codebotler.tracefile import outcome_yaml, read_outcome
 from codebotler.world import Person, Room, World
+from roboeval.suite import SUITES, load_suite
 
 TABLE = SKILLS.with_skill(
     Skill(
@@ -132,6 +134,20 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others(tmp_
     path = tmp_path / "outcome.yaml"
     path.write_text(outcome_yaml(outcome, table))
     assert read_outcome(path, table) == outcome
+
+
+def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> None:
+    shutil.copytree(SUITES / "plus", tmp_path / "plus")
+    task = tmp_path / "plus" / "tasks" / "SayGoodDay.yaml"
+    task.write_text(
+        task.read_text().replace(
+            "rtl: not tr.Exists(goto", 'rtl: not tr.Exists(wave("bob")) and not tr.Exists(goto', 1
+        )
+    )
+    with pytest.raises(BadInput, match="wave"):
+        load_suite(tmp_path / "plus")
+    loaded = load_suite(tmp_path / "plus", skills=TABLE)
+    assert loaded.with_worlds(40).with_own_worlds() == loaded
 
 
 def test_models_are_told_of_it() -> None:

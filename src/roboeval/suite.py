@@ -74,6 +74,7 @@ class Suite:
         folder: where it was read from.
         worlds: how many worlds a task has at least, where they are drawn; None if they are written by hand.
         seed: from which they are drawn.
+        skills: what can stand in its formulas.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Suite:
     folder: Path | None = None
     worlds: int | None = None
     seed: int | None = None
+    skills: SkillTable = SKILLS
 
     def __hash__(self) -> int:
         return hash(self.digest)  # tasks lie in a dictionary, which has no hash
@@ -109,11 +111,14 @@ class Suite:
             expect_whole(count, "the number of worlds", least=1)
         if seed is not None:
             expect_whole(seed, "the seed")
-        return _read_suite(self.folder, SKILLS, count or self.worlds, self.seed if seed is None else seed)
+        seed = self.seed if seed is None else seed
+        return _read_suite(self.folder, self.skills, count or self.worlds, seed)
 
     def with_own_worlds(self) -> Suite:
         """The same suite as it is read where nobody asks for other worlds."""
-        return self if self.worlds is None or self.folder is None else _read_suite(self.folder, SKILLS)
+        if self.worlds is None or self.folder is None:
+            return self
+        return _read_suite(self.folder, self.skills)
 
     def task(self, name: str) -> Task:
         """A task by name.
@@ -238,6 +243,7 @@ def _suite_of(
         folder=folder,
         worlds=lot.count if drawn else None,
         seed=lot.seed if drawn else None,
+        skills=skills,
     )
 
 
