@@ -11,7 +11,6 @@ from typing import Any
 import polars as pl
 
 from codebotler.badinput import BadInput
-from codebotler.replacing import expect_replaceable
 from roboeval.records import Completion, Key
 from roboeval.run import write_whole
 
@@ -38,6 +37,10 @@ COLUMNS: Mapping[str, type[pl.DataType]] = {
     "events": pl.Int64,
 }
 """The columns and their types; `passed` and the failure are the completion's, what follows is the world's."""
+
+
+BEGINNINGS = (",".join(COLUMNS).encode(), b"PAR1")
+"""What a file of such a table begins with, by its format."""
 
 
 def table(rows: Iterable[Mapping[str, Any]], completions: Iterable[Completion]) -> pl.DataFrame:
@@ -108,14 +111,13 @@ def write(frame: pl.DataFrame, path: Path, kind: str) -> None:
         kind: csv or parquet.
 
     Raises:
-        BadInput: there is no such format or folder, or the file holds something else than a table of ours.
+        BadInput: there is no such format or folder.
         OSError: the file cannot be written; then what stood there stays.
     """
     if kind not in FORMATS:
         raise BadInput(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
     if not path.parent.is_dir():
         raise BadInput("there is no such folder", file=path.parent)
-    expect_replaceable(path, ",".join(COLUMNS).encode(), b"PAR1")
     content = io.BytesIO()
     if kind == "csv":
         _harmless(frame).write_csv(content)

@@ -160,19 +160,21 @@ def export(
 ) -> None:
     """Write a run's verdicts as one flat table."""
     from codebotler.badinput import BadInput
-    from roboeval.export import kind_of, table, write
+    from codebotler.replacing import expect_replaceable
+    from roboeval.export import BEGINNINGS, kind_of, table, write
     from roboeval.run import Run, evaluation_key
 
     kind = format or kind_of(out)
     judged_by = as_judged(run, load(suite), ablated=ablation)
     evaluation = open_evaluation(run, judged_by, suite, ablated=ablation)
+    path = out or Run(run).rows(evaluation_key(judged_by, ablated=ablation)).with_suffix(f".{kind}")
+    expect_replaceable(path, *BEGINNINGS)
     frame = table(watched(evaluation.rows(), "reading", evaluation.scope.total), evaluation.judged())
     again = command("evaluate", run, *options_of(evaluation, judged_by), suite=suite, ablated=ablation)
     if (complaint := evaluation.complaint()) is not None:
         raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
     if (unfinished := evaluation.unfinished()) is not None:
         note(f"{unfinished}, and only these are in the table; `{again}` goes on")
-    path = out or Run(run).rows(evaluation_key(judged_by, ablated=ablation)).with_suffix(f".{kind}")
     write(frame, path, kind)
     note(f"the table is in {path}")
 
