@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import islice
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
@@ -20,6 +19,7 @@ from codebotler.badinput import BadInput
 from codebotler.simulator.distinct import MOST_AHEAD, Done
 from codebotler.simulator.engine import NO_SECCOMP
 from codebotler.simulator.lane import EngineError, Lane
+from roboeval.rayaddress import LOCAL, expect_cluster, is_here_only, named_address, outside
 
 LOG = logging.getLogger("roboeval.ray")
 Key = TypeVar("Key")
@@ -35,18 +35,20 @@ class Cluster:
     """The cores of a Ray cluster; use as a context manager.
 
     The cluster is the one that RAY_ADDRESS names, or else the one that this machine is part of. Where there
-    is none, one is started on this machine, which is reached by nobody else, and ended again.
+    is none, or RAY_ADDRESS is "local", one is started on this machine, which is reached by nobody else, and
+    ended again.
 
     Args:
         workers: how many shards are under way at the same time; twice the cores of the cluster by default.
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Raises:
-        BadInput: Ray is not installed, or there is no cluster at the address.
+        BadInput: Ray is not installed, or no cluster answers at the address.
     """
 
     def __init__(self, workers: int | None = None, *, require_isolation: bool = False) -> None:
         self._ray = _imported()
+        expect_cluster()
         self._workers, self._required = workers, require_isolation
         self._warned = False
 
@@ -225,7 +227,7 @@ def own_lane() -> Lane:
 def _imported() -> Any:  # noqa: ANN401 - the extra has no types here
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # else it calls home
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # its warning about accelerators
-    if _is_here_only():
+    if is_here_only():
         if "ray" in sys.modules and os.environ.get(LOOPBACK_ONLY) != "0":
             raise BadInput(f"Ray would let other machines in: set {LOOPBACK_ONLY}=0 before it is imported")
         os.environ.setdefault(LOOPBACK_ONLY, "0")
@@ -241,27 +243,20 @@ LOOPBACK_ONLY = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 there. Else Ray takes this machine's address in the network for 127.0.0.1, and waits for ever."""
 
 
-def _is_here_only() -> bool:
-    """Whether the cluster is one that only this machine reaches, or one that is yet to be started."""
-    if address := os.environ.get("RAY_ADDRESS"):
-        return address.removeprefix("ray://").startswith(("127.", "localhost:", "[::1]"))
-    here = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108 - Ray's own
-    return not here.exists()
-
-
 def _connect(ray: Any) -> None:  # noqa: ANN401 - a module without types
     quiet = {"logging_level": logging.ERROR, "log_to_driver": False}
-    address = os.environ.get("RAY_ADDRESS")
+    address = named_address()
     try:
-        ray.init(address="auto", **quiet)
+        if address != LOCAL:
+            ray.init(address="auto", **quiet)
+            return
     except ConnectionError:
-        if address:
-            or_locked = "or it wants its token in RAY_AUTH_TOKEN, with RAY_AUTH_MODE=token"
-            raise BadInput(f"RAY_ADDRESS: there is no Ray cluster at {address}, {or_locked}") from None
-        try:
-            ray.init(address="local", include_dashboard=False, **quiet)
-        except OSError as error:  # such as a folder in RAY_TMPDIR whose name is too long for sockets
-            raise BadInput(f"Ray cannot be started here: {error}") from None
+        if address:  # it answered before
+            raise outside(address) from None
+    try:
+        ray.init(address="local", include_dashboard=False, **quiet)
+    except OSError as error:  # such as a folder in RAY_TMPDIR whose name is too long for sockets
+        raise BadInput(f"Ray cannot be started here: {error}") from None
 
 
 def _fetched(ray: Any, reference: Any) -> Told:  # noqa: ANN401 - a module without types

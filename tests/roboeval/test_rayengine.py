@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -22,6 +25,7 @@ from codebotler.simulator.lane import Lane
 from command_line import ENVIRONMENT, roboeval
 from roboeval import rayengine
 from roboeval.engines import Local
+from roboeval.rayaddress import PING_PATIENCE_S
 from roboeval.rayengine import LARGEST, LOOPBACK_ONLY, OURS, Cluster, Shards, Told, call_all
 from roboeval.records import Row, recorded_completions
 from roboeval.suite import Suite
@@ -92,13 +96,13 @@ print(ray.is_initialized())
 """
 
 
-def alone(folder: str) -> subprocess.CompletedProcess[str]:
+def alone(folder: str, address: str = "") -> subprocess.CompletedProcess[str]:
     environment = {
         name: value for name, value in os.environ.items() if name not in {"RAY_ADDRESS", LOOPBACK_ONLY}
     }
     return subprocess.run(
         [sys.executable, "-c", ALONE],
-        env={**environment, "RAY_TMPDIR": folder},
+        env={**environment, "RAY_TMPDIR": folder, "RAY_ADDRESS": address},
         capture_output=True,
         text=True,
         check=False,
@@ -117,10 +121,38 @@ def test_where_ray_cannot_start_there_is_a_sentence(tmp_path: Path) -> None:
     assert "BadInput: Ray cannot be started here: " in ended.stderr.splitlines()[-1]
 
 
-def test_a_cluster_is_started_where_there_is_none_and_only_this_machine_reaches_it() -> None:
+@pytest.mark.parametrize("address", ["", "local"])
+def test_a_cluster_is_started_where_there_is_none_and_only_this_machine_reaches_it(address: str) -> None:
     with TemporaryDirectory() as folder:  # whose name is short: there are sockets in it
-        ended = alone(folder)
+        ended = alone(folder, address)
     assert ended.stdout.splitlines() == ["[1, 2, 1]", "['127.0.0.1']", "{'127.0.0.1'}", "False"], ended
+
+
+def test_without_a_cluster_at_the_address_the_command_ends_soon_and_leaves_nothing(tmp_path: Path) -> None:
+    with socket.create_server((HERE, 0)) as server:
+        port = server.getsockname()[1]
+    started = time.monotonic()
+    for address in (f"{HERE}:{port}", "nonsense", f"ray://{HERE}:10001", f"http://{HERE}:8265"):
+        ended = roboeval(
+            *("evaluate", "recorded:hasty", "--out", "far", "--engine", "ray"),
+            cwd=tmp_path,
+            environment={**ENVIRONMENT, **os.environ, "RAY_ADDRESS": address},
+        )
+        assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1), ended
+        assert ended.err.startswith("roboeval: RAY_ADDRESS: ")
+        assert not list(tmp_path.iterdir())
+    assert time.monotonic() - started < 60
+
+
+def test_a_server_that_is_no_cluster_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    with ThreadingHTTPServer((HERE, 0), BaseHTTPRequestHandler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        monkeypatch.setenv("RAY_ADDRESS", f"{HERE}:{server.server_port}")
+        started = time.monotonic()
+        with pytest.raises(BadInput, match=r"does not answer as a Ray cluster"):
+            Cluster()
+        assert time.monotonic() - started < 2 * PING_PATIENCE_S
+        server.shutdown()
 
 
 # --- on a cluster
@@ -168,6 +200,18 @@ def test_the_command_writes_the_same_bytes(nodes: Nodes, tmp_path: Path) -> None
     for name in ("paper.jsonl", "paper.sha256", "paper.json"):
         there, here = (tmp_path / run / "evaluations" / name for run in ("far", "local"))
         assert there.read_bytes() == here.read_bytes()
+
+
+def test_a_cluster_that_wants_its_token_says_so(nodes: Nodes, tmp_path: Path) -> None:
+    for token in ({"RAY_AUTH_TOKEN": "f" * 64}, {"RAY_AUTH_MODE": "disabled"}):
+        ended = roboeval(
+            *("evaluate", "recorded:hasty", "--out", "far", "--engine", "ray"),
+            cwd=tmp_path,
+            environment={**environment(nodes), **token},
+        )
+        assert (ended.status, ended.out) == (2, "")
+        assert re.fullmatch(r"roboeval: RAY_ADDRESS: .* wants its token: set RAY_AUTH_MODE=.*\n", ended.err)
+        assert not list(tmp_path.iterdir())
 
 
 def test_checks_are_the_same(nodes: Nodes, tmp_path: Path) -> None:
