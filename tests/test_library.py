@@ -252,6 +252,7 @@ def test_rooms_that_are_no_names_are_refused(rooms: object, sentence: str) -> No
     ("wrong", "sentence"),
     [
         ({"samples": 0}, "the number of samples is 0, but it must be at least 1"),
+        ({"samples": 10**9}, "the number of samples is 1000000000, but it must be at most 10,000"),
         ({"samples": "5"}, "the number of samples is '5', not a whole number"),
         ({"seed": None}, "the seed is None, not a whole number"),
         ({"workers": -1}, "the number of workers is -1, but it must be at least 1"),

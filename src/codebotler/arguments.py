@@ -55,13 +55,14 @@ def expect_number(given: object, what: str) -> None:
         raise BadInput(f"{what} is {given!r}, not a number")
 
 
-def expect_whole(given: object, what: str, *, least: int | None = None) -> None:
-    """Refuse what is no whole number, or too small a one.
+def expect_whole(given: object, what: str, *, least: int | None = None, most: int | None = None) -> None:
+    """Refuse what is no whole number, or too small or too large a one.
 
     Args:
         given: what was given.
         what: what it is to be, in words.
         least: the smallest number that will do.
+        most: the largest number that will do.
 
     Raises:
         BadInput: it is none.
@@ -70,6 +71,8 @@ def expect_whole(given: object, what: str, *, least: int | None = None) -> None:
         raise BadInput(f"{what} is {given!r}, not a whole number")
     if least is not None and given < least:
         raise BadInput(f"{what} is {given}, but it must be at least {least}")
+    if most is not None and not given <= most:
+        raise BadInput(f"{what} is {given}, but it must be at most {most:,}")
 
 
 def expect_skills(given: object) -> None:

@@ -38,6 +38,9 @@ __all__ = [
 ]
 
 SAMPLES = 5
+MOST_SAMPLES = 10_000
+"""Of one check, which holds all of its runs."""
+
 MORE = 20
 """Worlds that are drawn in addition where the program waits in vain in all that were drawn before."""
 
@@ -56,12 +59,15 @@ class Settings:
     """How programs are checked.
 
     Args:
-        samples: how many worlds to imagine, from 1.
+        samples: how many worlds to imagine, 1 to 10,000.
         seed: from which they are drawn: the same ones on every machine.
         strict: whether to draw also what the program takes for granted.
         rules: how a run is simulated.
         skills: what the program may call.
         behaviours: what each skill does; those of the eight skills by default.
+
+    Raises:
+        BadInput: a number is none, or out of its range.
     """
 
     samples: int = SAMPLES
@@ -70,6 +76,10 @@ class Settings:
     rules: Rules = AS_WRITTEN
     skills: SkillTable = SKILLS
     behaviours: Mapping[str, Behaviour] | None = None
+
+    def __post_init__(self) -> None:
+        expect_whole(self.samples, "the number of samples", least=1, most=MOST_SAMPLES)
+        expect_whole(self.seed, "the seed")
 
 
 def check(
@@ -94,7 +104,7 @@ def check(
             the program.
         start: the room in which the robot starts, one of `rooms` where there are any; without it `start_loc`
             if that is a room, or the first one.
-        samples: how many worlds to imagine, from 1.
+        samples: how many worlds to imagine, 1 to 10,000.
         seed: from which they are drawn: the same ones on every machine.
         strict: whether to draw also what the program takes for granted.
         skills: what the program may call.
@@ -113,8 +123,6 @@ def check(
     expect_texts(rooms or (), "the rooms")
     if start is not None:
         expect_text(start, "the start")
-    expect_whole(samples, "the number of samples", least=1)
-    expect_whole(seed, "the seed")
     expect_skills(skills)
     settings = Settings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
     plan = plan or _plan(program, rooms, start, skills)

@@ -44,7 +44,7 @@ def roboeval(
     Args:
         suite: the name of a suite that ships with the package, or its folder.
         tasks: some tasks only.
-        worlds: how many worlds to draw, for a suite whose worlds are drawn.
+        worlds: how many worlds to draw, 1 to 10,000, for a suite whose worlds are drawn.
         seed: from which to draw them.
     """
     our, drawn = Settings(), _suite(suite, worlds, seed)

@@ -51,13 +51,14 @@ def reward(
         task: its name.
         prompt: which phrasing the programs were written for, counted from 0; all have the same worlds.
         programs: their sources, which need not even parse; equal ones are judged once.
-        worlds: how many worlds to draw, for a suite whose worlds are drawn; as many as it says by default.
+        worlds: how many worlds to draw, 1 to 10,000, for a suite whose worlds are drawn; as many as it says
+            by default.
         seed: from which to draw them; that of the suite by default.
         suite: a suite, or the name or folder of one.
 
     Raises:
-        BadInput: there is no such suite, task or prompt, its worlds are written by hand, or a program is
-            no text.
+        BadInput: there is no such suite, task or prompt, its worlds are written by hand or too many, or
+            a program is no text.
         EngineError: no isolated process could be started.
     """
     expect_texts(programs, "the programs")

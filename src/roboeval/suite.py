@@ -18,7 +18,7 @@ from codebotler.english import counted
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS, SkillTable
 from roboeval.installed import installed_folder, installed_suites
-from roboeval.suitefile import SuiteFile
+from roboeval.suitefile import MOST_WORLDS, SuiteFile
 from roboeval.task import Accepted, Check, Fact, Requirement, Scenario, Task
 from roboeval.taskfile import Lot, read_task
 
@@ -99,16 +99,16 @@ class Suite:
         """The same suite with other worlds, drawn from the same descriptions.
 
         Args:
-            count: how many a task; as many as now by default.
+            count: how many a task, 1 to 10,000; as many as now by default.
             seed: from which to draw them; the same as now by default.
 
         Raises:
-            BadInput: its worlds are written by hand, or a number is none.
+            BadInput: its worlds are written by hand, or a number is none or out of its range.
         """
         if self.worlds is None or self.folder is None:
             raise BadInput(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
         if count is not None:
-            expect_whole(count, "the number of worlds", least=1)
+            expect_whole(count, "the number of worlds", least=1, most=MOST_WORLDS)
         if seed is not None:
             expect_whole(seed, "the seed")
         seed = self.seed if seed is None else seed

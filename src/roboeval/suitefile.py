@@ -10,6 +10,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.world import AnswerFile, Name, PersonFile, Text, WorldFile
 
+MOST_WORLDS = 10_000
+"""Of one task; those of a whole suite then take a gigabyte of memory, and minutes to be drawn."""
+
 Category = Literal[
     "SayAtLocation",
     "AskAtLocation",
@@ -199,6 +202,6 @@ class SuiteFile(_Form):
     version: Annotated[int, Field(strict=True, ge=0)]
     about: Text = ""
     instructions: Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]*$")] | None = None
-    worlds: Annotated[int, Field(strict=True, ge=1, le=100_000)] = 30
+    worlds: Annotated[int, Field(strict=True, ge=1, le=MOST_WORLDS)] = 30
     seed: Annotated[int, Field(strict=True, ge=0)] = 1
     rules: RulesFile = RulesFile()

@@ -240,6 +240,7 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
         (["--worlds", "7"], 'the worlds of the suite "paper" are written by hand'),
         (["--seed", "7"], 'the worlds of the suite "paper" are written by hand'),
         (["--suite", "plus", "--worlds", "0"], "invalid value for '--worlds': "),
+        (["--suite", "plus", "--worlds", "1000000000"], "invalid value for '--worlds': "),
         (["--suite", "plus", "--ablation"], "none of CountSavory, "),
         (["--suite", "nonsense"], 'there is no suite "nonsense"'),
         (["--tasks", "SayGoodDay,Nonsense"], 'the suite "paper" has no task "Nonsense"'),

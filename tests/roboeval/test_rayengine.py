@@ -166,6 +166,7 @@ class Nodes:
         self._cluster = cluster_utils.Cluster(initialize_head=True, head_node_args=head)
         self._nodes = [self._cluster.add_node(num_cpus=1, node_ip_address=HERE) for _ in range(2)]
         self.address = str(self._cluster.address)
+        self.port_of_a_node = self._nodes[0].node_manager_port
 
     def kill(self) -> None:
         """Kill a node with all that belongs to it, as a machine that loses its power."""
@@ -212,6 +213,12 @@ def test_a_cluster_that_wants_its_token_says_so(nodes: Nodes, tmp_path: Path) ->
         assert (ended.status, ended.out) == (2, "")
         assert re.fullmatch(r"roboeval: RAY_ADDRESS: .* wants its token: set RAY_AUTH_MODE=.*\n", ended.err)
         assert not list(tmp_path.iterdir())
+
+
+def test_what_is_of_ray_and_no_head_is_not_waited_for(nodes: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RAY_ADDRESS", f"{HERE}:{nodes.port_of_a_node}")
+    with pytest.raises(BadInput, match=r"does not answer as a Ray cluster"):
+        Cluster()
 
 
 def test_checks_are_the_same(nodes: Nodes, tmp_path: Path) -> None:

@@ -164,6 +164,8 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
         reward("SayGoodDay", 0, [RIGHT], worlds=3)
     with pytest.raises(BadInput, match="the number of worlds is 0, but it must be at least 1"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=0)
+    with pytest.raises(BadInput, match="the number of worlds is 1000000000, but it must be at most 10,000"):
+        reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=10**9)
     wrong: Any = "7"
     with pytest.raises(BadInput, match="the seed is '7', not a whole number"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", seed=wrong)

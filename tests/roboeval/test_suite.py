@@ -134,6 +134,10 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, s
             'line 3: "ticks" is 1000000001, but it should be less than or equal to 1000000000',
         ),
         (
+            SUITE + "worlds: 10001\n",
+            'line 3: "worlds" is 10001, but it should be less than or equal to 10000',
+        ),
+        (
             SUITE + "rules: {clock_starts: 5}\n",
             'line 3: "clock_starts" is 5, but it should be a time from 1970',
         ),

@@ -8,8 +8,10 @@ import pytest
 
 from codebotler.badinput import BadInput
 from roboeval.expression import ExpressionError, PersonFact, each_of, parsed, value
+from roboeval.mutation.worlds import worlds_of
 from roboeval.pairwise import covering, met, pairs, spread
 from roboeval.suite import _suite_of, load_suite
+from roboeval.suitefile import MOST_WORLDS
 
 SUITE = "name: mine\nversion: 1\nabout: my tasks\nworlds: 12\nseed: 3\n"
 TASK = """\
@@ -102,6 +104,15 @@ def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:
     for seed in range(30):
         mine.with_worlds(seed=seed)
     assert 0 < _suite_of.cache_info().currsize < 12
+
+
+def test_more_worlds_than_fit_into_memory_are_not_drawn(tmp_path: Path) -> None:
+    mine, most = load_suite(suite(tmp_path)), MOST_WORLDS
+    sentence = f"the number of worlds is {most + 1}, but it must be at most {most:,}"
+    with pytest.raises(BadInput, match=sentence):
+        mine.with_worlds(most + 1)
+    with pytest.raises(BadInput, match=sentence):
+        worlds_of(mine, mine.tasks["Tea"], most + 1, 1)
 
 
 def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:

@@ -49,7 +49,8 @@ def evaluate(
     redo: Annotated[bool, typer.Option("--redo", help="Start over.")] = False,
     workers: WorkersOption = None,
     worlds: Annotated[
-        int | None, typer.Option(min=1, help="Draw so many worlds a task, where the suite draws them.")
+        int | None,
+        typer.Option(min=1, max=10_000, help="Draw so many worlds a task, where the suite draws them."),
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")

@@ -35,7 +35,8 @@ def mutate(
         ),
     ] = None,
     worlds: Annotated[
-        int | None, typer.Option(min=1, help="Try them in so many generated worlds, if the suite makes any.")
+        int | None,
+        typer.Option(min=1, max=10_000, help="Try them in so many generated worlds, if the suite makes any."),
     ] = None,
     seed: Annotated[
         int, typer.Option(min=0, help="From which mutants are drawn, and worlds are generated.")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from codebotler.arguments import expect_whole
 from codebotler.badinput import BadInput
 from roboeval.suite import Scenario, Suite, Task
+from roboeval.suitefile import MOST_WORLDS
 
 COUNT = 200
 """How many worlds a suite makes for mutants, if nobody says another number."""
@@ -15,12 +17,14 @@ def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[S
     Args:
         suite: of the task.
         task: the task.
-        count: how many worlds to make; by default 200, or those that are written out where all are.
+        count: how many to make, 1 to 10,000; by default 200, or those that are written out where all are.
         seed: from which they are made; never the one of the suite's own worlds.
 
     Raises:
-        BadInput: worlds are to be made, and all of the suite's are written out.
+        BadInput: worlds are to be made, and all of the suite's are written out; or they are too many.
     """
+    if count is not None:
+        expect_whole(count, "the number of worlds", least=1, most=MOST_WORLDS)
     if suite.further is not None:
         return suite.further(task, count or COUNT, seed + 1 + (suite.seed or 0))
     if count is not None:

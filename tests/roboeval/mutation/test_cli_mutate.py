@@ -163,6 +163,7 @@ def test_a_mutant_on_the_list_is_not_shown_again(small: Path) -> None:
             ("SayGoodDay", "--worlds", "200"),
             'the worlds of the suite "paper" are written out, and no further',
         ),
+        (("SayGoodDay", "--suite", "plus", "--worlds", "1000000000"), "invalid value for '--worlds': "),
         (("SayGoodDay", "--also", "no.jsonl"), "no.jsonl: there is no such file or folder; name a run"),
         (("SayGoodDay", "--out", ""), "nothing is named; name a folder"),
         (("SayGoodDay", "--suite", "nowhere"), 'there is no suite "nowhere"'),
