@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from codebotler.badinput import BadInput
+from codebotler.terminal import busy
 
 LOCAL = "local"
 """In RAY_ADDRESS, a cluster that is started here, also where this machine is part of one."""
@@ -17,7 +18,7 @@ LOCAL = "local"
 ADDRESS = re.compile(r"(?P<host>\[[^\[\]\s/]+\]|[^:\[\]\s/]+):(?P<port>[0-9]{1,5})", re.ASCII)
 LAST_PORT = 65535
 PATIENCE_S = 5  # until something must have taken a connection
-PING_PATIENCE_S = 15  # until a cluster must have answered Ray, which starts in a process of its own before
+PING_PATIENCE_S = 40  # until a cluster must have answered Ray, which a busy machine must load before
 
 OR_LOCAL = f"or set RAY_ADDRESS={LOCAL} to use the cores of this machine"
 START = f"start its head with `ray start --head`, {OR_LOCAL}"
@@ -49,7 +50,8 @@ def expect_cluster() -> None:
         return
     if address:
         expect_listener(address)
-    answer = ping()
+    with busy("asking the Ray cluster"):
+        answer = ping()
     if answer == SILENT:
         raise BadInput(_silence(address))
     if answer == LOCKED and address:

@@ -43,7 +43,8 @@ def roboeval(
         cwd=cwd,
         env=dict(environment),
     )
-    err = re.sub(r"^[a-z]+: [\d,]+( of [\d,]+)?(, .*)?\n", "", ended.stderr, flags=re.MULTILINE)
+    how_far = r"^(?:[a-z]+: [\d,]+( of [\d,]+)?(, .*)?|[\w ]+ \.\.\.)\n"
+    err = re.sub(how_far, "", ended.stderr, flags=re.MULTILINE)
     return Ended(ended.returncode, ended.stdout, err)
 
 
