@@ -345,7 +345,8 @@ print(count([*evaluate([completion], load_suite())]))
 def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: str, tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     (tmp_path / "uses.py").write_text(USES.replace(right, wrong) if right else USES)
-    words = [sys.executable, "-m", "mypy", "--strict", "--cache-dir", str(tmp_path), "uses.py"]
+    ours = ("--strict", "--follow-imports", "silent", "--cache-dir", str(tmp_path))
+    words = [sys.executable, "-m", "mypy", *ours, "uses.py"]
     env = {**os.environ, "MYPYPATH": str(ROOT / "src")}
     ended = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
     assert found in ended.stdout

@@ -54,7 +54,10 @@ LESS = {
         ("codebotler serve ", "codebotler serve --help "),
     ],
     "benchmark-pages.md": [("--num-completions 3", "--num-completions 1 --tasks LunchTime --no-report")],
-    "evaluate-your-model.md": [("--num-completions 50", "--num-completions 1 --tasks LunchTime")],
+    "evaluate-your-model.md": [
+        ("--num-completions 3\n", "--num-completions 3 --no-report\n"),
+        ("--num-completions 50", "--num-completions 1 --tasks LunchTime"),
+    ],
     "index.md": [("recorded:hasty", "recorded:hasty --tasks LunchBreak")],
     "report.md": [
         ("--out runs/hasty-4\n", "--out runs/hasty-4 --no-report\n"),

@@ -13,6 +13,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain, count
+from operator import getitem
 from typing import Any, TypeAlias, assert_never
 
 from codebotler.cachedproperty import cached_property
@@ -127,9 +128,10 @@ class Reasoner:
         if self._driving is not None:
             readings.append(self._driving)
         # Events that no automaton tells apart are one letter of their product.
-        alphabet: dict[tuple[int, ...], Event] = {}
-        for event, *letters_of_event in zip(self.events, *(letters for _, letters in readings), strict=True):
-            alphabet.setdefault(tuple(letters_of_event), event)
+        of_events = [*zip(*(letters for _, letters in readings), strict=True)]
+        alphabet = dict(zip(of_events, self.events, strict=False))
+        # The first of those that are alike.
+        alphabet.update(zip(reversed(of_events), reversed(self.events), strict=False))
         return _path([automaton for automaton, _ in readings], alphabet)
 
     def _reading(self, formula: Formula) -> tuple[Automaton, tuple[int, ...]]:
@@ -166,22 +168,25 @@ def _path(automata: Sequence[Automaton], alphabet: Mapping[tuple[int, ...], Even
     """Events that lead all automata to acceptance, found by going first where acceptance is nearest."""
     start = (0,) * len(automata)
     came: dict[States, tuple[States, Event] | None] = {start: None}
-    tables = [(automaton.rows, automaton.distances) for automaton in automata]
+    tables = [automaton.rows for automaton in automata]
+    nearness = [automaton.distances for automaton in automata]
+    if None in map(getitem, nearness, start):
+        return None
     steps = count()
     heap = [(0, 0, start)]
     while heap:
         _, _, state = heapq.heappop(heap)
-        if all(distances[s] == 0 for (_, distances), s in zip(tables, state, strict=True)):
+        if not any(map(getitem, nearness, state)):
             return tuple(reversed([*_back(state, came)]))
-        here = [rows[s] for (rows, _), s in zip(tables, state, strict=True)]
+        here = [*map(getitem, tables, state)]
         for letter, event in alphabet.items():
-            after = tuple(row[one] for row, one in zip(here, letter, strict=True))
+            after = (*map(getitem, here, letter),)
             if after in came:
                 continue
             came[after] = state, event
-            far = [distances[s] for (_, distances), s in zip(tables, after, strict=True)]
+            far = [*map(getitem, nearness, after)]
             if None not in far:
-                heapq.heappush(heap, (sum(d for d in far if d is not None), next(steps), after))
+                heapq.heappush(heap, (sum(filter(None, far)), next(steps), after))
         if len(came) > MOST_VISITED:
             raise Undecided
     return None

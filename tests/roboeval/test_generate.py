@@ -374,7 +374,10 @@ def asked_of(log: Path, pid: int, suite: Suite) -> set[tuple[str, int, int]]:
         for task in suite.tasks.values()
         for number, instruction in enumerate(task.prompts)
     }
-    notes = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+    noted = log.read_bytes() if log.exists() else b""
+    if noted and not noted.endswith(b"\n"):  # a kill tears a line where a page of memory ends
+        os.truncate(log, noted.rfind(b"\n") + 1)
+    notes = [json.loads(line) for line in noted.splitlines(keepends=True) if line.endswith(b"\n")]
     return {(*prompts[told], index) for what, told, index, by in notes if what == "asked" and by == pid}
 
 

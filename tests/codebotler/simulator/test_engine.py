@@ -661,7 +661,8 @@ def task_program():
     except RecursionError as error: say(str(error))
     {end}
 '''
-print(run(program, World((Room("a"),), "a")))
+outcome = run(program, World((Room("a"),), "a"))
+print(outcome, outcome.trace)
 """
 
 
