@@ -1,13 +1,21 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
-# installed (this folder, or a wheel), VENV where. `make fuzz` runs FUZZ_EXAMPLES random programs, drawn with
-# FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always the same.
-# `make test-transformers` tests models and detectors that run on this machine; it makes an environment with torch of
-# its own, since nothing else needs so much. `make test-pyrobosim` tests the robot in pyrobosim in one, too; `make
-# test-inspect` and `make test-ray` test the benchmark in Inspect and on a Ray cluster, and share one. `make
-# test-faults` asks a server that fails one request in ten. `make test-ros1` tests robots on ROS 1, for which the
-# system's Python must have rospy (`codebotler robots` says what is missing). `make test-browser` tests the page in
-# Chromium, and with a robot on ROS 1; SHOTS names a folder for its screenshots. `make pictures` makes those of the
-# guide anew, with figures of a report. `make docs` makes the documentation as a site, in build/site.
+# installed (this folder, or a wheel), VENV where.
+#
+#   make test       what to run before each commit; TESTS names files or folders to run instead of all
+#   make test-all   that, and everything below
+#     test-suites          the tasks of both suites as data: linted, and judged on programs with known verdicts
+#     test-guide           README, guides and examples: every command on them runs, and prints what they say
+#     test-ros1            robots on ROS 1, for which the system's Python must have rospy (`codebotler robots` tells)
+#     test-browser         the page in Chromium, also with a robot on ROS 1; SHOTS names a folder for screenshots
+#     test-faulty-server   4,000 completions of a server that fails one request in ten
+#     test-transformers    models and detectors on this machine, in an environment of its own, with torch
+#     test-pyrobosim       the robot in pyrobosim, in an environment of its own
+#     test-inspect, -ray   the benchmark in Inspect and on a Ray cluster, which share an environment
+#
+# `make faults` tries 60 deliberate faults, which the tests must notice. `make fuzz` runs FUZZ_EXAMPLES random
+# programs, drawn with FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always
+# the same. `make pictures` makes the screenshots of the guide anew, with figures of a report. `make docs` makes the
+# documentation as a site, in build/site.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -27,8 +35,13 @@ from the supply room.
 SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
-.PHONY: demo serve docs test test-ros1 test-browser pictures test-transformers test-pyrobosim test-inspect test-ray \
-	test-faults fuzz lint bench clean
+# What `make test` leaves to a target of its own, since it takes long or needs more than is installed.
+APART = tests/browser tests/guide tests/ros1 tests/roboeval/suites tests/codebotler/models/test_local.py \
+	tests/codebotler/perception/test_zeroshot.py tests/codebotler/robots/test_pyrobosim.py \
+	tests/roboeval/test_inspecting.py tests/roboeval/test_rayengine.py
+
+.PHONY: demo serve docs test test-all test-suites test-guide test-ros1 test-browser pictures test-transformers \
+	test-pyrobosim test-inspect test-ray test-faulty-server faults fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -47,11 +60,16 @@ serve: $(VENV)/installed
 	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler serve --world examples/office.yaml --speed 5
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 3 --dist loadfile --ignore tests/ros1 --ignore tests/browser \
-		--ignore tests/codebotler/models/test_local.py \
-		--ignore tests/codebotler/perception/test_zeroshot.py \
-		--ignore tests/codebotler/robots/test_pyrobosim.py \
-		--ignore tests/roboeval/test_inspecting.py --ignore tests/roboeval/test_rayengine.py $(TESTS)
+	$(BIN)/python -m pytest --numprocesses 3 --dist worksteal $(addprefix --ignore ,$(APART)) $(TESTS)
+
+test-all: test test-suites test-guide test-ros1 test-browser test-faulty-server test-transformers test-pyrobosim \
+	test-inspect test-ray
+
+test-suites: $(VENV)/tested
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/roboeval/suites
+
+test-guide: $(VENV)/tested
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/guide
 
 test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
@@ -80,8 +98,11 @@ test-inspect: $(EXTRAS_VENV)/tested
 test-ray: $(EXTRAS_VENV)/tested
 	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/roboeval/test_rayengine.py
 
-test-faults: $(VENV)/tested
+test-faulty-server: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m
+
+faults: $(VENV)/tested
+	$(BIN)/python tests/faults/run.py
 
 fuzz: $(VENV)/tested
 	@seed=$${FUZZ_SEED:-$$(od -An -N4 -tu4 /dev/urandom | tr -d ' ')}; \

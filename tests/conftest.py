@@ -9,6 +9,7 @@ from typing import TypeVar
 import pytest
 from hypothesis import HealthCheck, settings
 
+import lanes
 from roboeval.suite import Suite, load_suite
 
 # A busy machine is no fault of what is tested; and CI tries the same examples each time.
@@ -61,6 +62,14 @@ def runtime(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_RUNTIME_DIR", str(folder))
         yield folder
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared_lanes() -> Iterator[None]:
+    """One engine for all tests but those of the engine itself."""
+    with lanes.shared():
+        yield
+    lanes.end_all()
 
 
 @pytest.fixture(scope="session")

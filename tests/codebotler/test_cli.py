@@ -3,13 +3,16 @@
 import json
 import os
 import re
-import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+import command_line
 from codebotler.cli import app, obey
+from codebotler.terminal import busy
+from command_line import Ended, command
 
 GOOD = """def task_program():
     go_to("kitchen")
@@ -27,30 +30,13 @@ BAD = """def task_program():
 WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
 
 
-def codebotler(*arguments: str | Path, given: str | None = None) -> tuple[int, str, str]:
-    ended = subprocess.run(
-        [sys.executable, "-m", "codebotler.cli", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        input=given,
-        env={**{name: value for name, value in os.environ.items() if name != "COLUMNS"}, "NO_COLOR": "1"},
-    )
-    return ended.returncode, ended.stdout, ended.stderr
+def codebotler(*arguments: str | Path, given: str = "") -> Ended:
+    wide = {name: value for name, value in os.environ.items() if name != "COLUMNS"} | {"NO_COLOR": "1"}
+    return command("codebotler", *arguments, given=given, environment=wide)
 
 
-def without_progress(told: str) -> str:
-    """What was said beside how long it takes, which is told after a while on a slow machine."""
-    return told.removeprefix("checking ...\n")
-
-
-def refused(*arguments: str | Path, given: str | None = None) -> str:
-    """The one sentence with which a command refuses; nothing but it is printed."""
-    status, out, err = codebotler(*arguments, given=given)
-    assert (status, out) == (2, "")
-    assert err.startswith("codebotler: ")
-    assert err.count("\n") == 1
-    return err.removeprefix("codebotler: ").rstrip("\n")
+def refused(*arguments: str | Path, given: str = "") -> str:
+    return command_line.refused(*arguments, name="codebotler", given=given)
 
 
 @pytest.fixture
@@ -63,7 +49,7 @@ def files(tmp_path: Path) -> Path:
 @pytest.mark.parametrize("arguments", [(), ("--help",)])
 def test_help_lists_the_commands(arguments: tuple[str, ...]) -> None:
     status, out, err = codebotler(*arguments)
-    assert (status, without_progress(err)) == (0, "")
+    assert (status, err) == (0, "")
     assert out.startswith("Usage: codebotler [OPTIONS] COMMAND [ARGS]...\n")
     assert re.search(r"^  check +Look for problems", out, re.MULTILINE)
 
@@ -81,7 +67,7 @@ def test_what_is_no_command_is_one_sentence() -> None:
 
 def test_an_accepted_program(files: Path) -> None:
     status, out, err = codebotler("check", files / "good.py", "--world", files / "world.yaml")
-    assert (status, without_progress(err)) == (0, "")
+    assert (status, err) == (0, "")
     first, ran, *rest = out.split("\n")
     assert first == f"accepted: no problem in {files / 'good.py'}"
     assert ran == "run in 5 imagined worlds"
@@ -96,7 +82,7 @@ def test_an_accepted_program(files: Path) -> None:
 
 def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
     status, out, err = codebotler("check", files / "bad.py", "--world", files / "world.yaml")
-    assert (status, without_progress(err)) == (1, "")
+    assert (status, err) == (1, "")
     assert out.startswith(f"rejected: 2 problems in {files / 'bad.py'}\nit does the same in every world\n")
     assert (
         'line 2: GoToInvalidLocation: there is no room "kitchn"; the closest is "kitchen"\n'
@@ -108,10 +94,13 @@ def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
     assert '"kitchn"  failed: there is no such room' in out
 
 
-def test_check_that_takes_long_says_that_it_goes_on(tmp_path: Path) -> None:
-    (tmp_path / "hangs.py").write_text("def task_program():\n    sum(range(10**12))\n", encoding="utf-8")
-    status, _, err = codebotler("check", tmp_path / "hangs.py")
-    assert (status, err) == (1, "checking ...\n")
+def test_what_takes_long_says_that_it_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("codebotler.terminal.QUIET_S", 0.0)
+    with busy("checking"):
+        time.sleep(0.05)
+    assert capsys.readouterr().err == "checking ...\n"
 
 
 def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
@@ -125,7 +114,7 @@ def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
 def test_json_for_machines(files: Path) -> None:
     arguments = ("check", files / "bad.py", "--json", "--seed", "3", "--samples", "4")
     status, out, err = codebotler(*arguments)
-    assert (status, without_progress(err)) == (1, "")
+    assert (status, err) == (1, "")
     data = json.loads(out)
     assert (data["accepted"], data["rooms_are_guessed"], data["seed"]) == (False, True, 3)
     assert [(p["kind"], p["line"]) for p in data["problems"]] == [("NameError", 3)]

@@ -2,15 +2,13 @@
 
 import json
 import os
-import re
 import shlex
-import subprocess
 import sys
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
+from command_line import Ended, command, process
 from roboeval.suite import Suite
 from server import Fault, Request, Server
 
@@ -18,32 +16,17 @@ KEY = "sk-verysecret0123456789abcdefghijkl"
 LOST = "```python\ndef task_program():\n    go_to('the moon')\n```\n"
 FINE = "```python\ndef task_program():\n    go_to('kitchen')\n```\n"
 LIMIT = 1 << 30  # bytes of a file, of which most take no room
+CODEBOTLER = shlex.join([sys.executable, "-m", "codebotler.cli"])
 WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
 
 
-class Ended(NamedTuple):
-    """How a command ended."""
-
-    status: int
-    out: str
-    err: str
-
-
-def codebotler(*arguments: str, cwd: Path | None = None, before: str = "", after: str = "") -> Ended:
-    """Run a command, with something of bash before and after it."""
-    program = shlex.join([sys.executable, "-m", "codebotler.cli"])
-    ended = subprocess.run(
-        ["bash", "-c", f"{before} {program} {shlex.join(arguments)} {after.replace('codebotler', program)}"],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=cwd,
-        env={**os.environ, "OPENAI_API_KEY": KEY, "COLUMNS": "100"},
-    )
-    told = re.sub(
-        r"^(asking|checking).* \.\.\.\n", "", ended.stderr, flags=re.MULTILINE
-    )  # where it took long
-    return Ended(ended.returncode, ended.stdout, told)
+def codebotler(*arguments: str | Path, cwd: Path | None = None, before: str = "", after: str = "") -> Ended:
+    """Run a command, in a process of its own where something of bash stands before or after it."""
+    variables = {**os.environ, "OPENAI_API_KEY": KEY, "COLUMNS": "100"}
+    if before or after:
+        name, words = "codebotler", arguments
+        return process(name, *words, cwd=cwd, before=before, after=after, environment=variables)
+    return command("codebotler", *arguments, cwd=cwd, environment=variables)
 
 
 def instruction(suite: Suite) -> str:
@@ -67,7 +50,7 @@ def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, p
     assert (alone.status, alone.err) == (0, "")
     compile(alone.out, "program", "exec")
     assert alone.out.startswith("def task_program():\n")
-    piped = codebotler("generate", instruction(paper), after=f"| codebotler check - --world {world}")
+    piped = codebotler("generate", instruction(paper), after=f"| {CODEBOTLER} check - --world {world}")
     assert (piped.status, piped.err) == (0, "")
     assert piped.out.startswith("accepted: no problem in the program")
 

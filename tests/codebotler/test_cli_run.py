@@ -20,6 +20,8 @@ from mcap.reader import make_reader
 from codebotler.badinput import BadInput
 from codebotler.home import home
 from codebotler.models.recorded import recorded_model
+from command_line import Ended, command
+from forked import Forked
 from processes import are_gone, children_of
 from roboeval.suite import Suite
 
@@ -48,7 +50,17 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def command(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -> subprocess.Popen[str]:
+def variables(folder: Path) -> dict[str, str]:
+    return {**os.environ, "CODEBOTLER_HOME": str(folder / "home"), "COLUMNS": "100", "NO_COLOR": "1"}
+
+
+Process = Forked | subprocess.Popen[str]
+
+
+def started(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -> Process:
+    """A command in a process of its own, to which signals can be sent."""
+    if not wrapper:
+        return Forked("codebotler", *arguments, cwd=folder, environment=variables(folder))
     return subprocess.Popen(
         [*wrapper, sys.executable, "-m", "codebotler.cli", *map(str, arguments)],
         cwd=folder,
@@ -56,17 +68,15 @@ def command(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "CODEBOTLER_HOME": str(folder / "home"), "COLUMNS": "100", "NO_COLOR": "1"},
+        env=variables(folder),
     )
 
 
-def ended(folder: Path, *arguments: str | Path, given: str = "") -> tuple[int, str, str]:
-    process = command(folder, *arguments)
-    out, err = process.communicate(given, timeout=60)
-    return process.returncode, out, err
+def ended(folder: Path, *arguments: str | Path, given: str = "") -> Ended:
+    return command("codebotler", *arguments, cwd=folder, given=given, environment=variables(folder))
 
 
-def run(folder: Path, *arguments: str | Path, given: str = "") -> tuple[int, str, str]:
+def run(folder: Path, *arguments: str | Path, given: str = "") -> Ended:
     return ended(folder, "run", *arguments, "--world", "world.yaml", "--speed", "0", given=given)
 
 
@@ -179,7 +189,7 @@ def test_simulated_robot_needs_a_world(folder: Path) -> None:
 
 
 def test_feedback_comes_while_the_robot_drives(folder: Path) -> None:
-    process = command(folder, "run", "good.py", "--yes", "--world", "world.yaml", "--speed", "5")
+    process = started(folder, "run", "good.py", "--yes", "--world", "world.yaml", "--speed", "5")
     with stopping(process):
         read_until(process, "at (")
         assert process.poll() is None
@@ -191,7 +201,7 @@ def test_feedback_comes_while_the_robot_drives(folder: Path) -> None:
 
 
 @contextlib.contextmanager
-def stopping(process: subprocess.Popen[str]) -> Iterator[None]:
+def stopping(process: Process) -> Iterator[None]:
     try:
         yield
     finally:
@@ -199,7 +209,7 @@ def stopping(process: subprocess.Popen[str]) -> Iterator[None]:
         process.communicate()
 
 
-def read_until(process: subprocess.Popen[str], text: str) -> str:
+def read_until(process: Process, text: str) -> str:
     assert process.stdout is not None
     lines = ""
     watchdog = threading.Timer(30, process.kill)
@@ -214,10 +224,10 @@ def read_until(process: subprocess.Popen[str], text: str) -> str:
     raise AssertionError(lines)
 
 
-def driving(folder: Path, *wrapper: str) -> subprocess.Popen[str]:
+def driving(folder: Path, *wrapper: str) -> Process:
     """A tool whose robot is on its way."""
     arguments = ("far.py", "--yes", "--despite-problems", "--world", "world.yaml", "--speed", "1")
-    process = command(folder, "run", *arguments, wrapper=wrapper)
+    process = started(folder, "run", *arguments, wrapper=wrapper)
     read_until(process, "at (")
     return process
 
@@ -254,7 +264,7 @@ def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
 
 
 def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
-    process = command(folder, "run", "good.py", "--world", "world.yaml")
+    process = started(folder, "run", "good.py", "--world", "world.yaml")
     with stopping(process):
         assert process.stderr is not None
         said = ""
@@ -317,7 +327,7 @@ def test_home_that_is_no_folder_is_said(folder: Path, what: str) -> None:
 
 def test_home_that_cannot_be_made_is_said(folder: Path) -> None:
     words = ("run", "good.py", "--yes", "--world", "world.yaml")
-    process = command(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
+    process = started(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
     _, err = process.communicate("", timeout=60)
     assert process.returncode == 2
     assert err.startswith("codebotler: /sys/home/robots: this cannot be made (")
@@ -350,7 +360,7 @@ def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
 @pytest.mark.parametrize(("closed", "status"), [("0<&-", 1), ("1>&-", 0), ("2>&-", 0), ("0<&- 1>&- 2>&-", 1)])
 def test_closed_stream_leads_nowhere(folder: Path, closed: str, status: int) -> None:
     arguments = ("run", "good.py", "--world", "world.yaml", "--speed", "0")
-    process = command(folder, *arguments, wrapper=("sh", "-c", f'exec "$0" "$@" {closed}'))
+    process = started(folder, *arguments, wrapper=("sh", "-c", f'exec "$0" "$@" {closed}'))
     _, err = process.communicate("y\n", timeout=60)
     assert process.returncode == status
     assert "Traceback" not in err

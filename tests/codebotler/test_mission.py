@@ -665,6 +665,6 @@ def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
 def no_threads_are_left() -> Iterator[None]:
     yield
     for thread in threading.enumerate():
-        if thread is not threading.main_thread() and not thread.name.startswith("pytest"):
+        if thread is not threading.main_thread() and not thread.name.startswith(("pytest", "starter")):
             thread.join(10)
             assert not thread.is_alive(), thread

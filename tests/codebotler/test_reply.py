@@ -10,11 +10,7 @@ from codebotler.reply import program_of
 from codebotler.skills import SkillTable
 
 RECORDED = [
-    pytest.param(reply.program, reply.fails, id=f"{name}-{number}")
-    for name in NAMES
-    for number, reply in enumerate(
-        r for them in recorded_model(f"recorded:{name}").replies.values() for r in them
-    )
+    reply for name in NAMES for them in recorded_model(f"recorded:{name}").replies.values() for reply in them
 ]
 UNPARSABLE = {"SyntaxError", "IndentationError"}
 
@@ -38,21 +34,14 @@ def fenced(code: str, info: str = "python", marks: str = "```") -> str:
     return f"{marks}{info}\n{code}{marks}\n"
 
 
-@pytest.mark.parametrize(("program", "fails"), RECORDED)
-def test_recorded_programs_stay_as_they_are(program: str, fails: str | None) -> None:
-    once = source(program)
-    assert source(once) == once
-    if fails not in UNPARSABLE:
-        assert once.strip("\n") == program.strip("\n")
-
-
-@pytest.mark.parametrize(("program", "fails"), RECORDED)
-def test_recorded_programs_survive_chat(program: str, fails: str | None) -> None:
-    if fails not in UNPARSABLE:
-        assert source(f"Sure! Here it is:\n\n{fenced(program)}\nIt goes there.\n") == source(program)
-        assert source(f"Sure, here it is:\n\n{program}\nThis program goes there and talks.\n") == source(
-            program
-        )
+def test_recorded_programs_stay_as_they_are_alone_and_in_chat() -> None:
+    for reply in RECORDED:
+        program, once = reply.program, source(reply.program)
+        assert source(once) == once
+        if reply.fails not in UNPARSABLE:
+            assert once.strip("\n") == program.strip("\n")
+            assert source(f"Sure! Here it is:\n\n{fenced(program)}\nIt goes there.\n") == once
+            assert source(f"Sure, here it is:\n\n{program}\nThis program goes there and talks.\n") == once
 
 
 @pytest.mark.parametrize(
@@ -316,7 +305,7 @@ def test_cut_off_stays_cut_off(reply: str) -> None:
         assert [p.kind for p in program.problems()] == ["SyntaxError"]
 
 
-@given(st.sampled_from([str(p.values[0]) for p in RECORDED if p.values[1] is None]), st.integers(0, 2000))
+@given(st.sampled_from([r.program for r in RECORDED if r.fails is None]), st.integers(0, 2000))
 def test_nothing_is_lost_wherever_a_program_is_cut(program: str, at: int) -> None:
     cut = program[:at]
     if "def task_program" in cut:

@@ -16,4 +16,4 @@ def serving(runs: Path, *arguments: str | Path) -> PageServer:
     """
     home = runs.with_name(f"{runs.name}-served")
     home.mkdir()
-    return PageServer(home, *map(str, arguments), serve=("roboeval.cli", "serve", str(runs)))
+    return PageServer(home, *map(str, arguments), serve=("roboeval", "serve", str(runs)))

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from command_line import ENVIRONMENT, Ended, refused, roboeval
+from forked import Forked
 
 GREETS = 'def task_program():\n    say("good day")\n'
 
@@ -396,14 +397,8 @@ SLOW = "def task_program():\n    for i in range(150000): pass\n# {}\n"
 def test_ctrl_c_ends_in_one_true_sentence(tmp_path: Path, arguments: list[str], sentence: str) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(i, SLOW.format(i)) for i in range(400)))
     assert roboeval("import", "a.jsonl", "--out", "kept", cwd=tmp_path).status == 0
-    process = subprocess.Popen(
-        [sys.executable, "-m", "roboeval.cli", "evaluate", "--workers", "1", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=tmp_path,
-        env=ENVIRONMENT,
-    )
+    words = ("evaluate", "--workers", "1", *arguments)
+    process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
     assert process.stderr is not None
     said = process.stderr.readline()
     assert said.startswith("judging: ")

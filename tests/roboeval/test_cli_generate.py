@@ -4,8 +4,6 @@ import json
 import re
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from collections import Counter
 from pathlib import Path
@@ -13,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from command_line import ENVIRONMENT, refused, roboeval
+from forked import Forked
 from server import Fault, Server
 
 KEY = "sk-verysecret0123456789abcdefghijkl"
@@ -54,13 +53,7 @@ def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
 
 def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
     words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--out", "run", "--workers", "1"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "roboeval.cli", *words],
-        cwd=tmp_path,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
     checks = tmp_path / "run" / "checks" / "paper.jsonl"
     while process.poll() is None and not (checks.exists() and checks.stat().st_size):
         time.sleep(0.005)
@@ -209,9 +202,7 @@ def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_pat
     with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
         words = served(server.url, "--num-completions", "20", "--concurrency", "4", "--seed", "0")
         for kill in range(times):
-            with subprocess.Popen(
-                [sys.executable, "-m", "roboeval.cli", *words], cwd=tmp_path, stderr=subprocess.DEVNULL
-            ) as process:
+            with Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT) as process:
                 while len(server.requests) < 15 * (kill + 1) + 4 * kill and process.poll() is None:
                     time.sleep(0.005)
                 time.sleep(0.03 * kill)
@@ -233,12 +224,7 @@ def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_pat
 def test_control_c_says_what_is_kept(tmp_path: Path) -> None:
     with Server(delay=0.1, fault=lambda _: Fault.SLOW) as server:
         words = served(server.url, "--concurrency", "4")
-        process = subprocess.Popen(
-            [sys.executable, "-m", "roboeval.cli", *words],
-            cwd=tmp_path,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        process = Forked("roboeval", *words, cwd=tmp_path, environment=ENVIRONMENT)
         while len(server.requests) < 10 and process.poll() is None:
             time.sleep(0.005)
         process.send_signal(signal.SIGINT)

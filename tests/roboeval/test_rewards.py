@@ -128,6 +128,14 @@ def uncollected() -> Iterator[None]:
     gc.enable()
 
 
+def interrupt(asked: int) -> None:
+    """Interrupt this process once it waits for so many programs."""
+    while len(REWARDS._running) < asked:
+        time.sleep(0.01)
+    time.sleep(0.1)
+    os.kill(os.getpid(), signal.SIGINT)
+
+
 @pytest.mark.usefixtures("uncollected")
 def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
     lanes = warm()
@@ -145,9 +153,11 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
     with ThreadPoolExecutor(1) as beside:
         other = beside.submit(reward, "SayGoodDay", 0, waited_for)
         assert asked.wait(patience)
-        threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        beside_it = threading.Thread(target=interrupt, args=(len(waited_for) + 1_000,))
+        beside_it.start()
         with pytest.raises(KeyboardInterrupt):
             reward("SayGoodDay", 0, [*waited_for, *distinct(1_000, "given up")])
+        beside_it.join()
         gate.set()
         assert other.result() == [1.0] * 8  # the other thread asks again for what was taken from it
     assert not REWARDS._running

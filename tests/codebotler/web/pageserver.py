@@ -1,4 +1,4 @@
-"""The page as a user starts it: a process of its own, on a free port."""
+"""The page as a user starts it: in a process of its own, on a free port."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +15,8 @@ from types import TracebackType
 from typing import Any, Self
 from urllib.parse import unquote_plus
 
+from forked import PAGE, Forked
+
 WORLD = """about: a small house
 robot: hall
 rooms: [hall, kitchen, study]
@@ -24,7 +24,7 @@ objects: {kitchen: [mug]}
 people: {study: [{name: ann, answers: ["yes"]}]}
 """
 
-SERVE = ("codebotler.cli", "serve", "--world", "world.yaml")
+SERVE = ("codebotler", "serve", "--world", "world.yaml")
 
 
 @dataclass(frozen=True)
@@ -61,15 +61,11 @@ class PageServer:
     ) -> None:
         self.home = folder / "home"
         (folder / "world.yaml").write_text(world)
-        command = [sys.executable, "-m", *serve, "--port", "0"]
+        name, *words = *serve, "--port", "0", *arguments
+        variables = {**os.environ, "CODEBOTLER_HOME": str(self.home), "NO_PROXY": "*"}
         self._said = folder / "said.txt"
         with self._said.open("w") as file:
-            self._process = subprocess.Popen(
-                [*command, *arguments],
-                cwd=folder,
-                stderr=file,
-                env={**os.environ, "CODEBOTLER_HOME": str(self.home), "NO_PROXY": "*"},
-            )
+            self._process = Forked(name, *words, cwd=folder, environment=variables, stderr=file, preload=PAGE)
         while (link := re.search(r"http://\S+:(\d+)/(?:\?token=(\S+))?\n", self.said)) is None:
             assert self._process.poll() is None, self.said
             time.sleep(0.02)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 SHOWS = {
     "api_client.py": "problems: []\n",
     "is_in_room_server.py": "usage: is_in_room_server.py",

@@ -24,7 +24,7 @@ from codebotler.mission import State
 from codebotler.missionview import WORDS
 from server import Server
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = {path.name: path for path in (ROOT / "README.md", *sorted(DOCS.glob("*.md")))}
 
@@ -130,6 +130,17 @@ def blocks(page: str) -> list[Block]:
     return [Block(f["language"], f["text"], f["why"] or "", f["test"] or "") for f in found]
 
 
+def reading(page: str) -> pytest.MarkDecorator:
+    """Let one process follow a page, and those that it goes on from, for all tests."""
+    return pytest.mark.xdist_group(JOURNEY[0] if page in JOURNEY else page)
+
+
+def followed_for(is_meant: Callable[[Block], bool]) -> list[object]:
+    """The pages that have such a block and are followed."""
+    pages = [page for page in FOLLOWED if any(map(is_meant, blocks(page)))]
+    return [pytest.param(page, marks=reading(page)) for page in pages]
+
+
 @dataclass
 class Reader:
     """Somebody who follows a page to the letter, in a folder of their own."""
@@ -196,7 +207,7 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str
         yield follow
 
 
-@pytest.mark.parametrize("page", [page for page in FOLLOWED if any(b.language == "sh" for b in blocks(page))])
+@pytest.mark.parametrize("page", followed_for(lambda block: block.language == "sh"))
 def test_what_a_page_has_written_into_the_root_is_left_alone(
     followed: Callable[[str], Reader], page: str, tmp_path: Path
 ) -> None:
@@ -256,7 +267,7 @@ def is_printed(told: str, printed: str) -> bool:
     return re.search(re.escape(told).replace(r"\.\.\.", ".*?"), printed) is not None
 
 
-@pytest.mark.parametrize("page", [page for page in FOLLOWED if any(b.language in CODE for b in blocks(page))])
+@pytest.mark.parametrize("page", followed_for(lambda block: block.language in CODE))
 def test_every_block_of_a_page_runs(followed: Callable[[str], Reader], page: str) -> None:
     followed(page)
 
@@ -295,9 +306,7 @@ SHOWN_ELSEWHERE = {  # texts that no command of their page prints, and the tests
 }
 
 
-@pytest.mark.parametrize(
-    "page", [page for page in FOLLOWED if any(b.language == "text" for b in blocks(page))]
-)
+@pytest.mark.parametrize("page", followed_for(lambda block: block.language == "text"))
 def test_what_a_page_says_is_printed_is_printed(followed: Callable[[str], Reader], page: str) -> None:
     elsewhere = tuple(SHOWN_ELSEWHERE.get(page, []))
     told = [block.text for block in blocks(page) if block.language == "text"]
@@ -307,6 +316,7 @@ def test_what_a_page_says_is_printed_is_printed(followed: Callable[[str], Reader
             assert any(is_printed(text, printed) for printed in followed(page).printed), text
 
 
+@reading("robots.md")
 def test_every_command_about_robots_does_what_it_should(followed: Callable[[str], Reader]) -> None:
     reader = followed("robots.md")
     kinds, tea, *_, shown, code = reader.printed
@@ -317,6 +327,7 @@ def test_every_command_about_robots_does_what_it_should(followed: Callable[[str]
     assert code.splitlines()[-1] == "done"
 
 
+@reading("index.md")
 def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reader]) -> None:
     folder = followed("index.md").folder / "runs" / "hasty"
     (listed,) = (b.text for b in blocks("index.md") if b.text.startswith("runs/hasty/"))
@@ -326,6 +337,7 @@ def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reade
     assert {"completions.jsonl", "evaluations/paper.jsonl"} <= made
 
 
+@reading("write-a-task.md")
 def test_a_task_that_is_written_by_the_guide_is_a_package_in_the_end(
     followed: Callable[[str], Reader],
 ) -> None:
@@ -350,6 +362,7 @@ def test_states_and_events_of_missions_are_documented() -> None:
     assert set(re.findall(r"`(\w+)`", rows["event"])) == set(WORDS)
 
 
+@reading("report.md")
 def test_every_number_of_a_report_is_explained(followed: Callable[[str], Reader]) -> None:
     report = followed("report.md").folder / "report"
     page = (DOCS / "report.md").read_text()

@@ -1,0 +1,117 @@
+"""Lanes that tests share: to start the processes of one costs more than most tests do."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from typing import TypeVar
+
+import pytest
+
+from codebotler.simulator.conversation import Robot
+from codebotler.simulator.lane import EngineError, Lane
+from codebotler.simulator.zygote import Zygote
+from codebotler.trace import Outcome
+
+Started = TypeVar("Started")
+IDLE: list[SharedLane] = []
+STARTER = [ThreadPoolExecutor(1, "starter")]  # processes of an engine end with the thread that started them
+
+
+class SharedLane(Lane):
+    """A lane that waits for its next user when it is closed, unless it was stopped in the middle of a run."""
+
+    def __init__(self) -> None:
+        self.is_running = self.is_leaving = False
+        super().__init__()
+        start = self._preparer.start
+        self._preparer.start = lambda: lasting(start)
+
+    def run(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
+        """Run a program."""
+        self._expect_a_user()
+        self.is_running = True
+        outcome = super().run(source, new_robot)
+        self.is_running = False
+        return outcome
+
+    def run_live(self, source: str, robot: Robot) -> Outcome:
+        """Run a program on a robot."""
+        self._expect_a_user()
+        self.is_running = True
+        outcome = super().run_live(source, robot)
+        self.is_running = False
+        return outcome
+
+    def stop(self) -> None:
+        """End what is running, if anything is, and with it the lane."""
+        self.is_leaving = True
+        if self.is_running:
+            super().stop()
+
+    def close(self) -> None:
+        """Wait for the next user; one that was stopped, or whose last run has failed, ends."""
+        if self.is_running:
+            super().close()
+        elif self not in IDLE:
+            IDLE.append(self)
+
+    def end(self) -> None:
+        """End it."""
+        super().close()
+
+    def _zygote(self, role: str) -> Zygote:
+        if role in self._zygotes:
+            return self._zygotes[role]
+        return lasting(partial(super()._zygote, role))
+
+    def _expect_a_user(self) -> None:
+        if self.is_leaving:
+            raise EngineError("the engine was stopped")
+
+
+def lane() -> Lane:
+    """One that waits, or else a new one."""
+    if not IDLE:
+        return lasting(SharedLane)
+    found = IDLE.pop()
+    found.is_leaving = False
+    return found
+
+
+def lasting(start: Callable[[], Started]) -> Started:
+    """Start something on a thread that lasts as long as this process."""
+    is_there = threading.current_thread().name.startswith("starter")
+    return start() if is_there else STARTER[0].submit(start).result()
+
+
+@contextmanager
+def shared() -> Iterator[None]:
+    """Let whoever starts a lane be given one of these."""
+    with pytest.MonkeyPatch.context() as patch:
+        for user in ("codebotler.simulator.engine", "codebotler.mission"):
+            patch.setattr(f"{user}.Lane", lane)
+        yield
+
+
+def end_all() -> None:
+    """End those that wait."""
+    while IDLE:
+        IDLE.pop().end()
+
+
+atexit.register(end_all)
+
+
+def begin_anew() -> None:
+    """Forget those of the process that has forked this one."""
+    IDLE.clear()
+    STARTER[0] = ThreadPoolExecutor(1, "starter")
+
+
+os.register_at_fork(after_in_child=begin_anew)
