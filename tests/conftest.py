@@ -4,12 +4,13 @@ import os
 import signal
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 import lanes
+import messages
 from roboeval.suite import Suite, load_suite
 
 # A busy machine is no fault of what is tested; and CI tries the same examples each time.
@@ -24,13 +25,33 @@ settings.load_profile("unhurried")
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--no-skips", action="store_true", help="A test that is skipped has failed.")
+    parser.addoption("--messages", help="The file that gets every sentence that an error has said.")
     parser.addoption("--shots", help="The folder that gets the screenshots of tests in a browser.")
 
 
-def pytest_configure() -> None:
+SAID: messages.Said = {}
+
+
+def pytest_configure(config: pytest.Config) -> None:
     """Let Ctrl-C be what it is on a terminal, also for what tests start: jobs in the background ignore it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+    if config.getoption("--messages"):
+        messages.collect(SAID)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:  # noqa: ANN401 - xdist has no types
+    """Take over what was said in a process that has run a part of the tests."""
+    SAID.update(getattr(node, "workeroutput", {}).get("messages", {}))
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    file = session.config.getoption("--messages")
+    if file and hasattr(session.config, "workeroutput"):
+        session.config.workeroutput["messages"] = SAID
+    elif file:
+        Path(file).write_text(messages.written(SAID), encoding="utf-8")
 
 
 @pytest.hookimpl(wrapper=True)
