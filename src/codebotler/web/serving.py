@@ -73,6 +73,7 @@ def serve(
         guard = Guard(app, place.rules(access, port))
         settings = uvicorn.Config(
             guard,
+            log_config=None,  # what it logs is noted like all else
             log_level=logging.WARNING,
             access_log=False,
             proxy_headers=False,
