@@ -47,6 +47,7 @@ HOST = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
 
 MOST_PORT = 65_535
 CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+NO_CONTROL = "there is no such page, and no address of ours has control characters"
 SCRIPT = re.compile(rb"<script(?=[\s>])")
 Headers: TypeAlias = Mapping[str, str]
 
@@ -90,7 +91,7 @@ class Guard:
     Args:
         app: what is behind it.
         rules: whom it lets in.
-        has_page: whether there is a page at a path, to which a link with a token may lead.
+        has_page: whether anything is at a path, such as a page to which a link with a token may lead.
     """
 
     def __init__(self, app: ASGIApp, rules: Rules, has_page: Callable[[str], bool]) -> None:
@@ -105,7 +106,7 @@ class Guard:
             name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
         }
         try:
-            _expect_path(scope["path"])
+            self._expect_path(scope["path"])
             self._expect_host(scope)
             self._expect_origin(scope, headers)
             token = _given_token(scope)
@@ -124,6 +125,13 @@ class Guard:
             await self._app(scope, body.receive, body.unless_too_large(_with_headers(send)))
         else:
             await self._app(scope, receive, send)
+
+    # --- where to
+
+    def _expect_path(self, path: str) -> None:
+        """Control characters stand in names that people gave, which pages look up, and nowhere else."""
+        if CONTROL.search(path) and not self._has_page(path):
+            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
 
     # --- from where
 
@@ -178,6 +186,8 @@ class Guard:
             raise RefusedError(HTTPStatus.UNAUTHORIZED, "this is not the token")
         rest = [(name, value) for name, value in _query(scope) if name != "token"]
         path = "/" + scope["path"].strip("/")  # two slashes would begin the name of another host
+        if CONTROL.search(path):
+            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
         if not self._has_page(path):
             raise RefusedError(HTTPStatus.NOT_FOUND, "there is no such page")
         where = quote(path) + (f"?{urlencode(rest)}" if rest else "")
@@ -186,11 +196,6 @@ class Guard:
             cookie = f"{self._rules.cookie}={self._rules.access.cookie(role)}"
             headers["set-cookie"] = f"{cookie}; Path=/; HttpOnly; SameSite=Strict"
         await _answer(send, HTTPStatus.SEE_OTHER, headers)
-
-
-def _expect_path(path: str) -> None:
-    if CONTROL.search(path):
-        raise RefusedError(HTTPStatus.BAD_REQUEST, "an address has no control characters")
 
 
 def _host(scope: Scope) -> str:

@@ -124,7 +124,7 @@ def test_a_name_of_any_letters_is_found(server: PageServer) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["..", "%2e%2e", "..%2fserved", "%2e%2e%2fruns%2fhasty", "%2fetc", "none", "hasty%2f"]
+    "name", ["..", "%2e%2e", "..%2fserved", "%2e%2e%2fruns%2fhasty", "%2fetc", "none", "hasty%00", "hasty%2f"]
 )
 def test_names_that_lead_elsewhere_are_no_runs(server: PageServer, name: str) -> None:
     for path in (f"/api/runs/{name}", f"/api/runs/{name}/completions"):
