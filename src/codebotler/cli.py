@@ -35,7 +35,7 @@ from codebotler.terminal import (
     drop_output,
     flush_output,
     note,
-    note_all,
+    noting_all,
     open_streams,
     print_text,
     system_sentence,
@@ -421,8 +421,8 @@ def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' 
 
 def main() -> None:
     """Run the command line."""
-    note_all()
-    obey(app, "codebotler")
+    with noting_all():
+        obey(app, "codebotler")
 
 
 if __name__ == "__main__":

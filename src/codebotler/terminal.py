@@ -37,12 +37,23 @@ def open_streams() -> None:
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-def note_all() -> None:
-    """Let what Python and libraries say in this process be notes: logs, warnings and tracebacks."""
+@contextmanager
+def noting_all() -> Iterator[None]:
+    """While a command runs: what Python and libraries say is a note, be it a log, a warning or a traceback.
+
+    An error that nobody foresaw ends it with status 1.
+    """
+    before = logging.lastResort, warnings.showwarning, threading.excepthook
     logging.lastResort = _Notes(logging.WARNING)
     warnings.showwarning = _note_warning
-    sys.excepthook = lambda _kind, error, _trace: _note_error(error)
     threading.excepthook = lambda args: _note_error(args.exc_value)
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is told
+        _note_error(error)
+        raise SystemExit(1) from None
+    finally:
+        logging.lastResort, warnings.showwarning, threading.excepthook = before
 
 
 class _Notes(logging.Handler):

@@ -8,7 +8,7 @@ import typer
 
 from codebotler import __version__
 from codebotler.cli import obey
-from codebotler.terminal import note_all, print_text
+from codebotler.terminal import noting_all, print_text
 from roboeval.commands.catalogue import tasks
 from roboeval.commands.finding import find
 from roboeval.commands.generating import generate, run
@@ -54,8 +54,8 @@ app.command("import")(import_)
 
 def main() -> None:
     """Run the command line."""
-    note_all()
-    obey(app, "roboeval")
+    with noting_all():
+        obey(app, "roboeval")
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,16 @@ def busy(text: str) -> None:
         terminal.note(text)
 
 
+def fail(text: str) -> None:
+    raise ValueError(text)
+
+
+def fail_in_a_thread(text: str) -> None:
+    thread = threading.Thread(target=fail, args=(text,))
+    thread.start()
+    thread.join()
+
+
 WAYS: dict[str, Callable[[str], object]] = {
     "a text": terminal.print_text,
     "a program": terminal.print_source,
@@ -71,7 +82,8 @@ WAYS: dict[str, Callable[[str], object]] = {
     "a file's name": lambda text: refuse(FileNotFoundError(2, "No such file", text)),
     "a log": lambda text: logging.getLogger("anybody").warning(text),
     "a warning": lambda text: warnings.warn(text, stacklevel=1),
-    "a bug": lambda text: sys.excepthook(ValueError, ValueError(text), None),
+    "a bug": fail,
+    "a bug in a thread": fail_in_a_thread,
 }
 
 
@@ -80,8 +92,6 @@ WAYS: dict[str, Callable[[str], object]] = {
 def test_a_terminal_obeys_nothing_that_others_wrote(
     way: str, *, is_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for owner, name in ((logging, "lastResort"), (sys, "excepthook"), (threading, "excepthook")):
-        monkeypatch.setattr(owner, name, None)
     monkeypatch.setattr(logging.root, "handlers", [])
     monkeypatch.setattr(sys, "argv", ["codebotler"])
     monkeypatch.setattr(sys, "stdin", io.StringIO())
@@ -89,10 +99,11 @@ def test_a_terminal_obeys_nothing_that_others_wrote(
     monkeypatch.setenv("COLUMNS", "200")
     for stream in (sys.stdout, sys.stderr):
         monkeypatch.setattr(stream, "isatty", lambda: is_terminal)
-    with warnings.catch_warnings():
+    ends = pytest.raises(SystemExit) if way == "a bug" else nullcontext()
+    with warnings.catch_warnings(), ends:
         warnings.simplefilter("always")
-        terminal.note_all()
-        WAYS[way](EVIL)
+        with terminal.noting_all():
+            WAYS[way](EVIL)
     out = "".join(capsys.readouterr())
     if way == "a program" and not is_terminal:
         assert out == EVIL + "\n"
