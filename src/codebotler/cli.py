@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import os
 import sys
 from pathlib import Path
@@ -31,7 +30,16 @@ from codebotler.options import (
     TopPOption,
     WorldOption,
 )
-from codebotler.terminal import FULL, system_sentence
+from codebotler.terminal import (
+    FULL,
+    drop_output,
+    flush_output,
+    note,
+    noting_all,
+    open_streams,
+    print_text,
+    system_sentence,
+)
 
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
@@ -63,10 +71,10 @@ def codebotler(
 ) -> None:
     """Robot programs from plain words: checked before a robot moves."""
     if version:
-        print(f"codebotler {__version__}")
+        print_text(f"codebotler {__version__}")
         raise typer.Exit
     if context.invoked_subcommand is None:
-        print(context.get_help())
+        print_text(context.get_help())
 
 
 @app.command()
@@ -330,18 +338,17 @@ def virtual_robot(
     from contextlib import suppress
 
     from codebotler.robots.virtual import VirtualRobot
-    from codebotler.terminal import visible
     from codebotler.world import World
 
     def show(line: str) -> None:
         with suppress(OSError):  # the robot goes on where nobody reads any more
-            print(visible(line), flush=True)
+            print_text(line)
 
     robot = VirtualRobot(World.read(world), speed=speed, port=port, python=ros_python, told=show)
     try:
         started = robot.start()
         what = "a ROS master was started" if started else "joined the ROS master"
-        print(f"{what} at {robot.address}; the robot is ready, Ctrl-C ends it", file=sys.stderr)
+        note(f"{what} at {robot.address}; the robot is ready, Ctrl-C ends it")
         robot.wait()
     finally:
         robot.stop()
@@ -357,39 +364,30 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
         name: how a user calls it.
     """
     if sys.platform == "win32":
-        print(f"{name}: {ON_WINDOWS}", file=sys.stderr)
+        note(f"{name}: {ON_WINDOWS}")
         raise SystemExit(1)
-    _open_what_is_closed()
+    open_streams()
     if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
         del os.environ["COLUMNS"]
-    if isinstance(sys.stdout, io.TextIOWrapper):  # what a terminal cannot show must not end a command
-        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         status = app(standalone_mode=False, prog_name=name)
-        sys.stdout.flush()
+        flush_output()
     except KeyboardInterrupt:
         status = STOPPED
     except BrokenPipeError:  # whoever read the results has read enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        drop_output()
         status = 1
     except Exception as error:
         ending = _ending(error)
         if ending is None:
             raise
         status, sentence = ending
-        print(f"{name}: {sentence}", file=sys.stderr)
+        note(f"{name}: {sentence}")
         if isinstance(error, OSError) and error.filename is None:  # what is left of the output
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            drop_output()
     if status == STOPPED:
-        print(f"{name}: stopped", file=sys.stderr)
+        note(f"{name}: stopped")
     raise SystemExit(status if isinstance(status, int) else 0)
-
-
-def _open_what_is_closed() -> None:
-    """Let standard streams that somebody closed lead nowhere, so that no file of ours takes their place."""
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
 def _ending(error: Exception) -> tuple[int, str] | None:
@@ -423,7 +421,8 @@ def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' 
 
 def main() -> None:
     """Run the command line."""
-    obey(app, "codebotler")
+    with noting_all():
+        obey(app, "codebotler")
 
 
 if __name__ == "__main__":

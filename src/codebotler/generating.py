@@ -18,7 +18,7 @@ from codebotler.prompts import Prompt
 from codebotler.replacing import expect_replaceable
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.imagined import Plan
-from codebotler.terminal import busy, note, print_text, visible
+from codebotler.terminal import busy, note, print_source, visible
 from codebotler.world import World
 
 
@@ -55,7 +55,7 @@ def write(
             note_down = recording.enter_context(recorder(record, asked.name))
             plan = None if world is None else Plan.of(world)
             made = generated(asked, prompt, plan=plan, retries=retries, repair=repair, note_down=note_down)
-        print_text(made.program)
+        print_source(made.program)
     return not made.problems
 
 
@@ -163,9 +163,9 @@ def show(prompt: Prompt, model: str) -> None:
     """
     kind = kind_of(model)
     if kind == "completions":
-        print_text(prompt.text)
+        print_source(prompt.text)
     else:
-        print_text("\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages))
+        print_source("\n\n".join(f"--- {message.role}\n{message.text}" for message in prompt.messages))
     if kind == "hf":
         note(
             f"these are the messages that {model} gets if its tokenizer has a chat template; "

@@ -7,7 +7,7 @@ from datetime import datetime
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -18,7 +18,7 @@ from codebotler.pasted import mission_command
 from codebotler.robots.base import Readiness
 from codebotler.skills import SKILLS
 from codebotler.storyboard import grid
-from codebotler.terminal import shortened, visible
+from codebotler.terminal import console, shortened, visible
 
 VERBS: Mapping[str, str] = {
     "goto": "drives to",
@@ -51,7 +51,7 @@ class Watcher:
     """
 
     def __init__(self, summary: Summary) -> None:
-        self._console = Console(highlight=False)
+        self._console = console(highlight=False)
         self._is_half = False
         self._console.print()
         self._console.print(Text.assemble(("running", "bold"), f" on the robot {summary.robot}"))

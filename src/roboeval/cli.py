@@ -8,6 +8,7 @@ import typer
 
 from codebotler import __version__
 from codebotler.cli import obey
+from codebotler.terminal import noting_all, print_text
 from roboeval.commands.catalogue import tasks
 from roboeval.commands.finding import find
 from roboeval.commands.generating import generate, run
@@ -30,10 +31,10 @@ def roboeval(
 ) -> None:
     """How good are language models at writing programs for service robots?"""
     if version:
-        print(f"roboeval {__version__}")
+        print_text(f"roboeval {__version__}")
         raise typer.Exit
     if context.invoked_subcommand is None:
-        print(context.get_help())
+        print_text(context.get_help())
 
 
 app.command()(generate)
@@ -53,7 +54,8 @@ app.command("import")(import_)
 
 def main() -> None:
     """Run the command line."""
-    obey(app, "roboeval")
+    with noting_all():
+        obey(app, "roboeval")
 
 
 if __name__ == "__main__":

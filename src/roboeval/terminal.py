@@ -8,9 +8,9 @@ from datetime import timedelta
 from time import monotonic
 from typing import NoReturn, TypeVar
 
-from codebotler.terminal import QUIET_S, note, print_json, print_rich
+from codebotler.terminal import QUIET_S, note, print_json, print_rich, print_text, progress
 
-__all__ = ["fail", "metered", "note", "print_json", "print_rich", "watched"]
+__all__ = ["fail", "metered", "note", "print_json", "print_rich", "print_text", "watched"]
 
 Item = TypeVar("Item")
 
@@ -32,10 +32,8 @@ def metered(doing: str, total: int | None = None, done: int = 0) -> Iterator[Cal
         total: how much there is to do; None where nobody knows.
         done: how much of it was done before.
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
     columns = (
         TextColumn(doing),
         BarColumn(),
@@ -46,13 +44,13 @@ def metered(doing: str, total: int | None = None, done: int = 0) -> Iterator[Cal
     of_all = "" if total is None else f" of {total:,}"
     before, started = done, monotonic()
     next_line = started + QUIET_S
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        job = progress.add_task(doing, total=total, completed=done, more="")
+    with progress(*columns) as shown:
+        job = shown.add_task(doing, total=total, completed=done, more="")
 
         def tell(done: int, more: str) -> None:
             nonlocal next_line
-            progress.update(job, completed=done, more=more)
-            if not console.is_terminal and monotonic() >= next_line:
+            shown.update(job, completed=done, more=more)
+            if shown.disable and monotonic() >= next_line:
                 left = _left(done - before, total and total - done, monotonic() - started)
                 note(", ".join(filter(None, (f"{doing}: {done:,}{of_all}", more, left))))
                 next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)

@@ -31,7 +31,17 @@ from pydantic_ai.settings import ModelSettings
 
 from codebotler.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
-from codebotler.models.faults import brief, broken_off, fault, late, refused, retry_after, unreachable
+from codebotler.models.bounded import bound, limit_of
+from codebotler.models.faults import (
+    brief,
+    broken_off,
+    fault,
+    late,
+    refused,
+    retry_after,
+    told_before,
+    unreachable,
+)
 from codebotler.models.keys import blank_is_unset, key_in
 from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.prompts import Message, Prompt, Shown
@@ -61,7 +71,7 @@ class Chat:
         if provider == "openai" and settings.base_url is not None:
             name = f"{OWN_SERVER}:{model}"
         self.name, self.settings = name, settings
-        self.spoken = _spoken(name, settings.base_url)
+        self.spoken = _spoken(name, settings)
         asked = ModelSettings(
             max_tokens=settings.max_tokens,
             timeout=settings.timeout,
@@ -94,7 +104,7 @@ class Chat:
         except ModelError:
             raise
         except Exception as error:  # noqa: BLE001 - libraries of many providers, each with errors of its own
-            raise self._told(error) from None
+            raise (told_before(error) or self._told(error)) from None
         text = without_keys(response.text or "")
         program = await program_in(text)
         return Reply(text, program, _usage(response), time.monotonic() - start, response.finish_reason)
@@ -177,7 +187,7 @@ def _usage(response: ModelResponse) -> Usage:
     return Usage(told.input_tokens, told.output_tokens)
 
 
-def _spoken(name: str, base_url: str | None) -> Spoken:
+def _spoken(name: str, settings: Settings) -> Spoken:
     provider = name.partition(":")[0]
     try:
         made = infer_provider_class(provider)
@@ -190,7 +200,9 @@ def _spoken(name: str, base_url: str | None) -> Spoken:
         key_in(variable)
     try:
         with blank_is_unset(variables):
-            return infer_model(name, lambda wanted: _provider(wanted, base_url))
+            return infer_model(
+                name, lambda wanted: _bounded(_provider(wanted, settings.base_url), name, settings)
+            )
     except BadInput:
         raise
     except ImportError as error:
@@ -214,6 +226,18 @@ def _provider(name: str, base_url: str | None) -> Provider[object]:
             f'the provider "{name}" takes no base URL; for a server of your own name {OWN_SERVER}:MODEL'
         )
     return made(base_url=base_url)
+
+
+def _bounded(provider: Provider[object], name: str, settings: Settings) -> Provider[object]:
+    """A provider whose own client takes no endless reply, and neither does one that takes its place."""
+    first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - nothing else tells
+    if first is None or make is None:  # what talks to it is no client of HTTP, or one that a library keeps
+        return provider
+
+    limit = limit_of(settings.max_tokens)
+    bound(first, name, limit)
+    provider._http_client_factory = lambda: bound(make(), name, limit)  # noqa: SLF001
+    return provider
 
 
 def _unknown(provider: str) -> str:

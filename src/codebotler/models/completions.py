@@ -11,7 +11,8 @@ from openai.types import Completion
 
 from codebotler.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
-from codebotler.models.faults import broken_off, fault, late, refused, retry_after, unreachable
+from codebotler.models.bounded import bound, limit_of
+from codebotler.models.faults import broken_off, fault, late, refused, retry_after, told_before, unreachable
 from codebotler.models.keys import key_in
 from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.prompts import Prompt
@@ -40,7 +41,11 @@ class Completions:
             )
         self.model, self.settings = model, settings
         self.client = openai.AsyncOpenAI(
-            api_key=key or NO_KEY, base_url=settings.base_url, timeout=settings.timeout, max_retries=0
+            api_key=key or NO_KEY,
+            base_url=settings.base_url,
+            timeout=settings.timeout,
+            max_retries=0,
+            http_client=bound(openai.DefaultAsyncHttpxClient(), self.name, limit_of(settings.max_tokens)),
         )
         guard_logs()
 
@@ -62,7 +67,7 @@ class Completions:
         except TimeoutError:
             raise late(self.name, self.settings.timeout) from None
         except openai.OpenAIError as error:
-            raise self._told(error) from None
+            raise (told_before(error) or self._told(error)) from None
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             raise fault(self.name, f"the server sent no valid JSON ({error})", may_pass=True) from None
         if finish_reason is None:

@@ -45,6 +45,11 @@ def unreachable(name: str, error: Exception, url: str | None) -> ModelError | No
     return ModelError(f"{name}: no connection to {where} ({brief(failed)}); {mend}", may_pass=True)
 
 
+def told_before(error: Exception) -> ModelError | None:
+    """The error that was raised while a reply was read, which a library may have wrapped in its own."""
+    return next((cause for cause in _causes(error) if isinstance(cause, ModelError)), None)
+
+
 NO_CONNECTION = "ConnectError"  # of httpx, whichever of its versions a provider's library has
 
 

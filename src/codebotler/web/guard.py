@@ -6,12 +6,12 @@ import ipaddress
 import json
 import re
 import secrets
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
 from typing import Any, TypeAlias
-from urllib.parse import parse_qsl, urlencode, urlsplit
+from urllib.parse import parse_qsl, quote, urlencode
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -42,6 +42,12 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), geolocation=(), payment=(), usb=(), microphone=(self)",
 }
+HOST = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
+"""A name or an address, and perhaps a port: any, since a tunnel or a proxy in front has one of its own."""
+
+MOST_PORT = 65_535
+CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+NO_CONTROL = "there is no such page, and no address of ours has control characters"
 SCRIPT = re.compile(rb"<script(?=[\s>])")
 Headers: TypeAlias = Mapping[str, str]
 
@@ -85,10 +91,11 @@ class Guard:
     Args:
         app: what is behind it.
         rules: whom it lets in.
+        has_page: whether anything is at a path, such as a page to which a link with a token may lead.
     """
 
-    def __init__(self, app: ASGIApp, rules: Rules) -> None:
-        self._app, self._rules = app, rules
+    def __init__(self, app: ASGIApp, rules: Rules, has_page: Callable[[str], bool]) -> None:
+        self._app, self._rules, self._has_page = app, rules, has_page
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Let a request through, or refuse it."""
@@ -99,7 +106,8 @@ class Guard:
             name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
         }
         try:
-            self._expect_host(headers)
+            self._expect_path(scope["path"])
+            self._expect_host(scope)
             self._expect_origin(scope, headers)
             token = _given_token(scope)
             if token is not None and scope["type"] == "http":
@@ -118,11 +126,18 @@ class Guard:
         else:
             await self._app(scope, receive, send)
 
+    # --- where to
+
+    def _expect_path(self, path: str) -> None:
+        """Control characters stand in names that people gave, which pages look up, and nowhere else."""
+        if CONTROL.search(path) and not self._has_page(path):
+            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
+
     # --- from where
 
-    def _expect_host(self, headers: Headers) -> None:
+    def _expect_host(self, scope: Scope) -> None:
         """A page of somebody else's whose name leads here (DNS rebinding) calls us by that name."""
-        name = _host(f"//{headers.get('host', '')}")
+        name = _host(scope)
         if name in self._rules.hosts or (self._rules.any_address and _is_address(name)):
             return
         raise RefusedError(
@@ -170,24 +185,28 @@ class Guard:
         if role is None and self._rules.access.operator is not None:
             raise RefusedError(HTTPStatus.UNAUTHORIZED, "this is not the token")
         rest = [(name, value) for name, value in _query(scope) if name != "token"]
-        path = "/" + scope["path"].lstrip("/\\")  # two slashes would begin the name of another host
-        where = path + (f"?{urlencode(rest)}" if rest else "")
-        headers = {
-            **HEADERS,
-            "location": where.encode("ascii", "replace").decode(),
-            "cache-control": "no-store",
-        }
+        path = "/" + scope["path"].strip("/")  # two slashes would begin the name of another host
+        if CONTROL.search(path):
+            raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
+        if not self._has_page(path):
+            raise RefusedError(HTTPStatus.NOT_FOUND, "there is no such page")
+        where = quote(path) + (f"?{urlencode(rest)}" if rest else "")
+        headers = {**HEADERS, "location": where, "cache-control": "no-store"}
         if role is not None:
             cookie = f"{self._rules.cookie}={self._rules.access.cookie(role)}"
             headers["set-cookie"] = f"{cookie}; Path=/; HttpOnly; SameSite=Strict"
         await _answer(send, HTTPStatus.SEE_OTHER, headers)
 
 
-def _host(url: str) -> str:
-    try:
-        return (urlsplit(url).hostname or "").rstrip(".")
-    except ValueError:
-        return ""
+def _host(scope: Scope) -> str:
+    """The name by which we are called."""
+    told = [value.decode("latin-1").lower() for name, value in scope["headers"] if name.lower() == b"host"]
+    found = HOST.fullmatch(told[0]) if len(told) == 1 else None
+    if found is None or not 0 < int(found[3] or 80) <= MOST_PORT:
+        raise RefusedError(
+            HTTPStatus.BAD_REQUEST, "the header Host must stand there once, with a name and a port"
+        )
+    return found[1] or found[2]
 
 
 def _is_address(name: str) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import socket
 import threading
+from collections.abc import Sequence
 from contextlib import nullcontext
 from functools import partial
 from http import HTTPStatus
@@ -19,7 +20,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
-from starlette.routing import Match, Mount
+from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp
 
 from codebotler import __version__
@@ -67,12 +68,14 @@ def serve(
     """
     with place.listening() as bound, desk or nullcontext():
         port = bound.getsockname()[1]
-        app: ASGIApp = application(desk, further, runs)
+        pages = application(desk, further, runs)
+        app: ASGIApp = pages
         if desk and alone_for is not None:
             app = Presence(app, alone_for, partial(desk.stop_soon, LEAVING, only_moving=True))
-        guard = Guard(app, place.rules(access, port))
+        guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
+            log_config=None,  # what it logs is noted like all else
             log_level=logging.WARNING,
             access_log=False,
             proxy_headers=False,
@@ -171,13 +174,17 @@ def _not_found(app: FastAPI, request: Request, _error: Exception) -> Response:
 
 def _methods(app: FastAPI, request: Request) -> list[str]:
     """The methods that the API takes at an address; none where it has no such address."""
-    scope = {**request.scope, "root_path": "", "app_root_path": ""}
-    routes = [route for route in app.routes if not isinstance(route, Mount)]
+    return [method for method in METHODS if _is_taken(app.routes, method, request.scope["path"])]
 
-    def is_taken(method: str) -> bool:
-        return any(route.matches({**scope, "method": method})[0] is Match.FULL for route in routes)
 
-    return list(filter(is_taken, METHODS))
+def _has_page(app: FastAPI, path: str) -> bool:
+    """Whether something answers at a path, of the pages or of what is beside them."""
+    return _is_taken([*app.routes, *nicegui.app.routes], "GET", path)
+
+
+def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
+    scope = {"type": "http", "method": method, "path": path, "headers": []}
+    return any(route.matches(scope)[0] is Match.FULL for route in routes if not isinstance(route, Mount))
 
 
 class _Server(uvicorn.Server):

@@ -9,7 +9,7 @@ import typer
 
 from roboeval.commands.completing import task_names
 from roboeval.commands.options import JsonOption, SuiteOption, command, cores, load
-from roboeval.terminal import fail, note, print_json, print_rich, watched
+from roboeval.terminal import fail, note, print_json, print_rich, print_text, watched
 
 if TYPE_CHECKING:
     from roboeval.suite import Suite
@@ -72,6 +72,6 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
     linted = (lint(one, tried(one, suite, workers=cores())) for one in wanted)
     findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
-    print(render(findings, accepted=accepted))
+    print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)

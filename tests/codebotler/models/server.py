@@ -5,10 +5,12 @@
 
 import asyncio
 import contextlib
+import gzip
 import json
 import sys
 import threading
 import time
+import zlib
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
@@ -20,6 +22,7 @@ TASK = "def task_program():\n"
 CHUNK = 24  # characters of a streamed piece
 DRIP = 0.2  # seconds between two pieces that come for ever
 HUGE = 1_000_000
+UNPACKED = 20_000_000
 PAGE = "<html><body>This is a proxy. Please log in.</body></html>"
 
 
@@ -46,6 +49,11 @@ class Fault(Enum):
     WITHOUT_CODE = auto()
     HUGE = auto()
     DRIP = auto()
+    UNPACKS = auto()
+    UNPACKS_AS_ERROR = auto()
+    ENDLESS = auto()
+    PACKED_TWICE = auto()
+    NO_GZIP = auto()
 
 
 REFUSALS: dict[Fault | None, tuple[int, str, str | None]] = {
@@ -60,6 +68,14 @@ REFUSALS: dict[Fault | None, tuple[int, str, str | None]] = {
 BODIES: dict[Fault | None, tuple[bytes, str]] = {
     Fault.NOTHING: (b"", "text/event-stream"),
     Fault.WRONG_TYPE: (PAGE.encode(), "text/html"),
+}
+BOMB = gzip.compress(b" " * UNPACKED, 1)
+PACKED: dict[Fault | None, tuple[int, bytes, str]] = {
+    Fault.UNPACKS: (200, BOMB, "gzip"),
+    Fault.UNPACKS_AS_ERROR: (400, BOMB, "gzip"),
+    Fault.PACKED_TWICE: (200, gzip.compress(BOMB), "gzip, gzip"),
+    Fault.ENDLESS: (200, b"data: " * 100_000, "identity"),
+    Fault.NO_GZIP: (200, b"no gzip", "gzip"),
 }
 
 
@@ -109,6 +125,8 @@ class Server:
     delay: float = 30.0
     pause: float = 0.0
     counts: bool = True
+    packs: bool = False
+    """Whether streams are packed, each event so that it can be unpacked at once."""
     faults: deque[Fault | None] = field(default_factory=deque)
     """How it misbehaves at the next requests."""
     requests: list[Request] = field(default_factory=list)
@@ -192,6 +210,9 @@ class _Answer:
             return False
         if self.fault in REFUSALS:
             return self._refused(*REFUSALS[self.fault])
+        if self.fault in PACKED:
+            status, body, coding = PACKED[self.fault]
+            return self._body(status, body, "text/event-stream", f"Content-Encoding: {coding}\r\n")
         if self.fault in BODIES:
             return self._body(200, *BODIES[self.fault])
         await asyncio.sleep(self.server.delay if self.fault is Fault.SLOW else self.server.pause)
@@ -228,9 +249,13 @@ class _Answer:
         self.writer.write(f"HTTP/1.1 {status} X\r\nContent-Type: {kind}\r\n{echo}{extra}\r\n".encode())
 
     async def _streamed(self) -> bool:
-        self._head(200, "text/event-stream", "Transfer-Encoding: chunked\r\n")
+        packer = zlib.compressobj(wbits=zlib.MAX_WBITS | 16)
+        coding = "Content-Encoding: gzip\r\n" if self.server.packs else ""
+        self._head(200, "text/event-stream", f"Transfer-Encoding: chunked\r\n{coding}")
         async for event in self._events():
             data = f"data: {event}\n\n".encode()
+            if self.server.packs:
+                data = packer.compress(data) + packer.flush(zlib.Z_SYNC_FLUSH)
             self.writer.write(b"%x\r\n%s\r\n" % (len(data), data))
             await self.writer.drain()
         if self.fault is Fault.CUT:

@@ -8,7 +8,7 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -17,7 +17,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from codebotler.web.access import TRIES, WINDOW, Access, Role, TooManyTriesError
-from codebotler.web.guard import MOST_BYTES, Guard, Rules, _is_same
+from codebotler.web.guard import LOOPBACK, MOST_BYTES, Guard, Rules, _is_same
 from codebotler.web.place import Place
 from pageserver import PageServer
 
@@ -67,9 +67,45 @@ def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -
     assert socket(server, cookie=cookie.partition(";")[0], origin=origin(server)) == 101
 
 
-def test_the_link_leads_to_no_other_host(server: PageServer) -> None:
-    answer = server.ask("GET", f"//example.org/?token={server.token}")
-    assert re.match("/[^/]", answer.headers["location"])
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("//example.org/", 404),
+        ("/%09/example.org", 400),
+        ("/%09//example.org", 400),
+        ("/%5C/example.org", 404),
+        ("/%5Cexample.org", 404),
+        ("//%5Cexample.org", 404),
+        ("/%2Fexample.org", 404),
+        ("/nothing", 404),
+        ("/%0d%0aX", 400),
+        ("/%0d%0aX:%20y", 400),
+        ("/a%00b", 400),
+        ("/%7f", 400),
+        ("/missions/a%0d%0ab", 400),
+        ("/%C2%85", 400),
+    ],
+)
+def test_the_link_leads_to_pages_of_ours_only(server: PageServer, path: str, status: int) -> None:
+    answer = server.ask("GET", f"{path}?token={server.token}")
+    assert (answer.status, "location" in answer.headers) == (status, False)
+
+
+@pytest.mark.parametrize(
+    ("path", "leads"),
+    [("/", "/"), ("//missions/", "/missions"), ("/missions/a%20b%5Cc", "/missions/a%20b%5Cc")],
+)
+def test_the_link_of_a_page_opens_it(server: PageServer, path: str, leads: str) -> None:
+    answer = server.ask("GET", f"{path}?token={server.token}")
+    assert (answer.status, answer.headers["location"]) == (303, leads)
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [("/a%00b", 400), ("/static/a%00b", 400), ("/%0d%0aX", 400), ("/api/missions/a%00b", 404)],
+)
+def test_only_names_have_control_characters(server: PageServer, path: str, status: int) -> None:
+    assert server.call("GET", path).status == status
 
 
 def test_wrong_tokens_and_cookies_open_nothing(server: PageServer) -> None:
@@ -189,14 +225,49 @@ def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) 
 # --- other pages
 
 
-@pytest.mark.parametrize(
-    "host", ["evil.example", "localhost.evil.example", "10.0.0.1", "", "localhost:@evil"]
-)
+@pytest.mark.parametrize("host", ["evil.example", "localhost.evil.example", "10.0.0.1", "localhost.:80"])
 def test_only_our_own_names_are_answered_to(server: PageServer, host: str) -> None:
     """A page whose name was made to lead here (DNS rebinding) still calls us by that name."""
     cookie = server.cookie
     assert server.ask("GET", "/api/robot", host=host, cookie=cookie).status == 421
     assert server.ask("GET", f"/?token={server.token}", host=host).status == 421
+
+
+@pytest.mark.parametrize(
+    ("hosts", "status"),
+    [
+        (["localhost"], 200),
+        (["LocalHost:8080"], 200),
+        (["127.0.0.1:80"], 200),
+        (["[::1]:8080"], 200),
+        (["robot.local:443"], 200),
+        (["[::2]"], 421),
+        (["evil.example"], 421),
+        (["localhost.evil.example:80"], 421),
+        ([], 400),
+        ([""], 400),
+        (["localhost", "localhost"], 400),
+        (["localhost", "evil.example"], 400),
+        (["evil.example", "localhost"], 400),
+        (["evil.example:80@localhost:8080"], 400),
+        (["user@localhost"], 400),
+        (["localhost:@evil.example"], 400),
+        (["localhost/evil.example"], 400),
+        (["localhost?x"], 400),
+        (["localhost#x"], 400),
+        (["localhost, evil.example"], 400),
+        (["localhost "], 400),
+        (["localhost:"], 400),
+        (["localhost:http"], 400),
+        (["localhost:0"], 400),
+        (["localhost:65536"], 400),
+        (["::1"], 400),
+        (["[localhost]"], 400),
+        (["localh\xf6st"], 400),
+    ],
+)
+def test_a_host_is_named_once_and_exactly(hosts: list[str], status: int) -> None:
+    assert passed("/api/robot", "an operator's", hosts) == status
 
 
 def test_websockets_are_only_opened_under_our_own_names(server: PageServer) -> None:
@@ -329,7 +400,9 @@ def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
 
     headers = [(b"host", b"localhost"), (b"authorization", b"Bearer an operator's")]
     scope = {"type": "http", "method": "POST", "path": "/api/check", "scheme": "http", "headers": headers}
-    asyncio.run(Guard(behind, Rules(Access("an operator's", "a face's")))(scope, receive, send))
+    asyncio.run(
+        Guard(behind, Rules(Access("an operator's", "a face's")), set().__contains__)(scope, receive, send)
+    )
     assert [message["type"] for message in passed] == ["http.request", "http.request", "http.disconnect"]
 
 
@@ -351,7 +424,7 @@ def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) 
 # --- roles
 
 
-def role_at(path: str, token: str) -> int:
+def passed(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
     """The status that the guard alone gives to who shows a token; 200 if it lets them through."""
     sent: list[Message] = []
 
@@ -365,9 +438,11 @@ def role_at(path: str, token: str) -> int:
     async def receive() -> Message:
         return {"type": "http.request", "body": b""}
 
-    headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
+    named = [(b"host", host.encode("latin-1")) for host in hosts]
+    headers = [*named, (b"authorization", f"Bearer {token}".encode())]
     scope = {"type": "http", "method": "POST", "path": path, "scheme": "http", "headers": headers}
-    guard = Guard(behind, Rules(Access("an operator's", "a face's")))
+    rules = Rules(Access("an operator's", "a face's"), LOOPBACK | {"robot.local"})
+    guard = Guard(behind, rules, set().__contains__)
     asyncio.run(guard(scope, receive, send))
     return int(sent[0]["status"])
 
@@ -376,10 +451,10 @@ def role_at(path: str, token: str) -> int:
     "path", ["/", "/missions", "/api", "/api/missions", "/api/stop", "/faces", "/api/faces"]
 )
 def test_a_face_cannot_run_programs(path: str) -> None:
-    assert role_at(path, "a face's") == 403
-    assert role_at(path, "an operator's") == 200
-    assert role_at("/face", "a face's") == 200
-    assert role_at("/api/face/said", "a face's") == 200
+    assert passed(path, "a face's") == 403
+    assert passed(path, "an operator's") == 200
+    assert passed("/face", "a face's") == 200
+    assert passed("/api/face/said", "a face's") == 200
 
 
 # --- places

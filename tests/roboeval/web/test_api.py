@@ -242,10 +242,32 @@ def test_a_face_cannot_see_runs(path: str) -> None:
         sent.clear()
         headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
         scope = {"type": "http", "method": "GET", "path": path, "scheme": "http", "headers": headers}
-        asyncio.run(Guard(behind, Rules(Access("an operator's", "a face's")))(scope, receive, send))
+        asyncio.run(
+            Guard(behind, Rules(Access("an operator's", "a face's")), set().__contains__)(
+                scope, receive, send
+            )
+        )
         return int(sent[0]["status"])
 
     assert (status("a face's"), status("an operator's")) == (403, 200)
+
+
+@pytest.mark.parametrize(
+    ("path", "status"),
+    [
+        ("/", 303),
+        ("/runs/hasty", 303),
+        ("/side-by-side", 303),
+        ("/%09/example.org", 400),
+        ("/runs/%0d%0aX", 400),
+        ("/a%00b", 400),
+        ("/runs/hasty%00", 400),
+        ("/%5C/example.org", 404),
+        ("//example.org", 404),
+    ],
+)
+def test_links_with_a_token_lead_to_pages(server: PageServer, path: str, status: int) -> None:
+    assert server.ask("GET", f"{path}?token={server.token}").status == status
 
 
 def test_the_api_is_described(server: PageServer) -> None:
