@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, settings
 
 import lanes
 import messages
+from codebotler.simulator.lane import Lane
 from roboeval.suite import Suite, load_suite
 
 # A busy machine is no fault of what is tested; and CI tries the same examples each time.
@@ -86,11 +87,18 @@ def runtime(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 
 @pytest.fixture(scope="session", autouse=True)
-def shared_lanes() -> Iterator[None]:
-    """One engine for all tests but those of the engine itself."""
+def engine() -> Iterator[None]:
+    """One engine for all tests."""
     with lanes.shared():
         yield
     lanes.end_all()
+
+
+@pytest.fixture(autouse=True)
+def engine_of_its_own(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let tests of the engine itself start its processes as users do."""
+    if request.path.parent.name == "simulator":
+        monkeypatch.setattr("codebotler.simulator.engine.Lane", Lane)
 
 
 @pytest.fixture(scope="session")

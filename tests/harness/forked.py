@@ -99,7 +99,7 @@ class Forked:
         with ThreadPoolExecutor(2) as pool:
             streams = [None if one is None or one.closed else one for one in (self.stdout, self.stderr)]
             texts = [pool.submit(one.read) if one else None for one in streams]
-            with suppress(BrokenPipeError), self.stdin:
+            with suppress(BrokenPipeError, ValueError), self.stdin:  # it may have gone, or been asked before
                 self.stdin.write(given)
             try:
                 self.wait(timeout)
@@ -197,6 +197,8 @@ def become(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
     sys.stdout = os.fdopen(1, "w", encoding="utf-8")
     sys.stderr = os.fdopen(2, "w", encoding="utf-8", errors="backslashreplace", buffering=1)
     sys.argv = list(request["words"])
+    more = (request["cwd"], *request["env"].get("PYTHONPATH", "").split(os.pathsep))
+    sys.path[:0] = [folder for folder in more if folder and folder not in sys.path]
 
 
 if __name__ == "__main__":

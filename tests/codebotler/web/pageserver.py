@@ -100,9 +100,9 @@ class PageServer:
 
     def end(self, number: int = signal.SIGTERM) -> int:
         """End it, and give its status."""
-        if self._process.poll() is None:
-            self._process.send_signal(number)
-        return self._process.wait(20)
+        self._process.send_signal(number)
+        self._process.communicate(timeout=20)
+        return self._process.wait()
 
     def ask(self, method: str, path: str, body: object = None, **headers: str) -> Answer:
         """Send a request as it stands; without a token, unless a header has one."""
