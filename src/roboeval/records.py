@@ -112,7 +112,8 @@ class Judgement(TypedDict):
         passed: whether the program does what is required in all worlds.
         failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
         verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
-            `line`, `failed_checks` and `trace`.
+            `line`, `failed_checks` and `trace`; where the trace is too long for a row, it ends early, and
+            `cut` says how many `events` more there are, and the `sha256` of the JSON of all of it.
     """
 
     passed: bool
@@ -367,8 +368,8 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
 # --- writing
 
 
-def to_line(row: Mapping[str, Any]) -> bytes:
-    """A row as a line of JSON, in UTF-8."""
+def to_line(row: object) -> bytes:
+    """A row, or a part of one, as a line of JSON, in UTF-8."""
     # Half of a surrogate pair, which UTF-8 cannot hold, becomes an escape, which JSON reads.
     return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 

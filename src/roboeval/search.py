@@ -54,12 +54,14 @@ class Found:
         passed: whether it passed.
         worlds: numbers, from 1, and names of the worlds in which it does what is looked for.
         row: of a completion that failed and does it somewhere, as `trimmed` leaves it.
+        undecided: those of the worlds in which nobody knows, since the trace was too long to be kept.
     """
 
     key: Key
     passed: bool
     worlds: tuple[tuple[int, str], ...]
     row: RowData | None
+    undecided: tuple[tuple[int, str], ...] = ()
 
 
 def asked_of(row: RowData, question: Question, formula: Formula | None) -> Found:
@@ -70,17 +72,23 @@ def asked_of(row: RowData, question: Question, formula: Formula | None) -> Found
         question: what is looked for.
         formula: its formula, parsed.
     """
-    worlds = [] if question.task not in {None, row["task"]} else list(_worlds(row, question, formula))
+    worlds, undecided = [], []
+    for number, verdict in _asked(row, question):
+        if formula is not None and "cut" in verdict:
+            undecided.append((number, verdict["world"]))
+        elif formula is None or _holds(formula, verdict["trace"]) != question.negated:
+            worlds.append((number, verdict["world"]))
     kept = trimmed(row) if worlds and not row["passed"] else None
-    return Found(key_of(row), row["passed"], tuple(worlds), kept)
+    return Found(key_of(row), row["passed"], tuple(worlds), kept, tuple(undecided))
 
 
-def _worlds(row: RowData, question: Question, formula: Formula | None) -> Iterator[tuple[int, str]]:
+def _asked(row: RowData, question: Question) -> Iterator[tuple[int, RowData]]:
+    """The verdicts that a question is about, counted from 1."""
+    if question.task not in {None, row["task"]}:
+        return
     for number, verdict in enumerate(row["verdicts"], 1):
-        about = verdict["world"]
-        named = question.world in {None, str(number)} or about.lower() == str(question.world).lower()
-        if named and (formula is None or _holds(formula, verdict["trace"]) != question.negated):
-            yield number, about
+        if question.world in {None, str(number)} or verdict["world"].lower() == str(question.world).lower():
+            yield number, verdict
 
 
 def _holds(formula: Formula, data: Iterable[object]) -> bool:
