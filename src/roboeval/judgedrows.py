@@ -19,7 +19,7 @@ MAX_EVALUATION = 1_000_000_000  # of a row that was written before rows were bou
 HASH_LINE = 65  # bytes: 64 hexadecimal digits and a line end
 NO_ROW = "this line is no row of an evaluation"
 STATUSES = frozenset(map(str, Status))
-KINDS = SKILLS.recordings.keys()
+KINDS = frozenset(SKILLS.recordings)
 
 Form = Mapping[str, tuple[type, ...]]
 ROW: Form = {
@@ -113,16 +113,17 @@ def row_of(data: object) -> Row:
 
 
 def _expect_verdict(data: object) -> None:
-    further = isinstance(data, dict) and "cut" in data
-    verdict = _expect(data, VERDICT_CUT if further else VERDICT, "verdict")
-    if further:
+    is_cut = isinstance(data, dict) and "cut" in data
+    verdict = _expect(data, VERDICT_CUT if is_cut else VERDICT, "verdict")
+    if is_cut:
         _expect(verdict["cut"], CUT, "cut")
     if verdict["error"] is not None:
         _expect(verdict["error"], ERROR, "error")
-    if verdict["status"] not in STATUSES or not all(type(name) is str for name in verdict["failed_checks"]):
+    checks = verdict["failed_checks"]
+    if verdict["status"] not in STATUSES or (checks and {*map(type, checks)} != {str}):
         raise BadInput(NO_ROW)
     try:
-        unknown = {*map(itemgetter(0), verdict["trace"])} - KINDS
+        unknown = {*map(itemgetter(0), verdict["trace"])}.difference(KINDS)
     except (TypeError, LookupError):
         raise BadInput(NO_ROW) from None
     if unknown:
@@ -135,8 +136,9 @@ def _expect(data: object, form: Form, what: str) -> dict[str, Any]:
     if data.keys() != form.keys():
         unknown = sorted(data.keys() - form.keys())
         raise BadInput(f'{NO_ROW}: "{unknown[0]}" is no part of a {what}' if unknown else NO_ROW)
-    if not all(type(data[name]) in types for name, types in form.items()):
-        raise BadInput(NO_ROW)
+    for name, types in form.items():
+        if type(data[name]) not in types:
+            raise BadInput(NO_ROW)
     return data
 
 
