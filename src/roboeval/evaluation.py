@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from codebotler.badinput import BadInput
-from roboeval.records import Completion, Key, Row, how_many, name_of, read_judged
+from roboeval.judgedrows import Seal, read_judged
+from roboeval.records import Completion, Key, Row, how_many, name_of
 from roboeval.run import Run, load_head
 
 
@@ -91,11 +92,13 @@ class Evaluation:
         """Read the rows from the start; `count` and `stale` are about those read so far.
 
         Raises:
-            BadInput: a line is no row of an evaluation.
+            BadInput: a line is no row of an evaluation, or, once all were read, they are others than those
+                of the finished evaluation.
         """
         self.stale.clear()
         self.count = 0
-        for _, row, judged in read_judged(self.run.rows(self.key), self.run.programs(self.key)):
+        path, programs = self.run.rows(self.key), self.run.programs(self.key)
+        for _, row, judged in read_judged(path, programs, self.head):
             self._see((row["task"], row["prompt"], row["index"]), judged)
             yield row
 
@@ -104,18 +107,31 @@ class Evaluation:
 
         Args:
             reader: gets the lines of all whole rows, and says for each in turn of which completion it is.
+
+        Raises:
+            BadInput: as `rows` does.
         """
         self.stale.clear()
         self.count = 0
         programs = self.run.programs(self.key)
         hashes = programs.read_text(errors="replace").split("\n")[:-1] if programs.exists() else []
-        for number, read in enumerate(reader(self._lines())):
-            self._see(read.key, hashes[number] if number < len(hashes) else None)
-            yield read
+        path, seal = self.run.rows(self.key), Seal()
+        try:
+            for number, read in enumerate(reader(self._lines(seal))):
+                self._see(read.key, hashes[number] if number < len(hashes) else None)
+                yield read
+        except BadInput as error:
+            if error.line is None or error.file is not None:
+                raise
+            raise BadInput(f"{error.sentence}; --redo starts over", file=path, line=error.line) from None
+        seal.check(self.head, path)
 
-    def _lines(self) -> Iterator[bytes]:
+    def _lines(self, seal: Seal) -> Iterator[bytes]:
         with self.run.rows(self.key).open("rb") as file:
-            yield from (line for line in file if line.endswith(b"\n") and line.strip())
+            for line in file:
+                seal.add(line)
+                if line.endswith(b"\n") and line.strip():
+                    yield line
 
     def _see(self, key: Key, judged: str | None) -> None:
         written = self._written.get(key)

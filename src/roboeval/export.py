@@ -84,7 +84,7 @@ def _records(
             _storable(error["message"]),
             verdict["line"],
             _storable("; ".join(verdict["failed_checks"]) or None),
-            len(verdict["trace"]),
+            len(verdict["trace"]) + verdict.get("cut", {"events": 0})["events"],
         )
 
 

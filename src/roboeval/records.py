@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import io
 import json
 import os
 import sys
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from os import PathLike
 from pathlib import Path
-from typing import Any, BinaryIO, SupportsIndex, TypeAlias, TypedDict, cast
+from typing import Any, BinaryIO, SupportsIndex, TypeAlias, TypedDict
 
 from codebotler.arguments import expect_text, expect_whole
 from codebotler.badinput import BadInput
@@ -23,7 +22,6 @@ from codebotler.models.recorded import recorded_model
 from roboeval.suite import Suite, expect_suite
 
 MAX_ROW = 5_000_000
-MAX_EVALUATION = 1_000_000_000  # of our own rows: a trace may be a million characters in each of many worlds
 COMPLETIONS = "completions.jsonl"
 EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
 CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no folder to the disk
@@ -112,7 +110,8 @@ class Judgement(TypedDict):
         passed: whether the program does what is required in all worlds.
         failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
         verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
-            `line`, `failed_checks` and `trace`.
+            `line`, `failed_checks` and `trace`; where the trace is too long for a row, it ends early, and
+            `cut` says how many `events` more there are, and the `sha256` of the JSON of all of it.
     """
 
     passed: bool
@@ -144,6 +143,7 @@ def read_rows(
     growing: bool = False,
     name: Path | str | None = None,
     example: str | None = None,
+    see: Callable[[bytes], None] = lambda _: None,
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Read a file of JSON lines: the line's number, counted from 1, and its object.
 
@@ -154,6 +154,7 @@ def read_rows(
             and is passed over.
         name: what sentences call the file; its path by default.
         example: a row, for who does not know what one looks like.
+        see: gets every line as it stands there.
 
     Raises:
         BadInput: the file is missing, or a line is too long or no JSON object.
@@ -171,6 +172,7 @@ def read_rows(
             line = file.readline(limit + 1)
             if not line:
                 return
+            see(line)
             if len(line) > limit:
                 raise BadInput(f"this row is longer than {limit:,} bytes", file=name, line=number)
             if line.strip():
@@ -255,56 +257,6 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
         raise BadInput(sentence, file=str(file), line=line)
 
 
-def read_evaluations(path: Path) -> Iterator[tuple[int, Row]]:
-    """Read the rows of an evaluation with the numbers of their lines.
-
-    Raises:
-        BadInput: the file is missing, or a line is no row of an evaluation.
-    """
-    try:
-        for number, row in read_rows(path, limit=MAX_EVALUATION, growing=True):
-            yield number, _evaluated(row, path, number)
-    except BadInput as error:
-        if error.line is None:
-            raise
-        raise BadInput(f"{error.sentence}; --redo starts over", file=path, line=error.line) from None
-
-
-def _evaluated(row: Mapping[str, Any], path: Path, number: int) -> Row:
-    if not (row.keys() >= EVALUATED.keys() and all(isinstance(row[f], t) for f, t in EVALUATED.items())):
-        raise BadInput("this line is no row of an evaluation", file=path, line=number)
-    return cast("Row", row)
-
-
-EVALUATED = {
-    "task": str,
-    "prompt": int,
-    "index": int,
-    "passed": bool,
-    "failure": dict | None,
-    "verdicts": list,
-}
-HASH_LINE = 65  # bytes: 64 hexadecimal digits and a line end
-
-
-def read_judged(rows: Path, programs: Path) -> Iterator[tuple[int, Row, str | None]]:
-    """Read the rows of an evaluation with the numbers of their lines and the hashes of their programs.
-
-    Args:
-        rows: the file of the rows.
-        programs: the file that holds, for each row in order, the hash of the program that it judges.
-
-    Raises:
-        BadInput: the rows are missing, or a line is no row of an evaluation.
-    """
-    hashes = programs.open("rb") if programs.exists() else io.BytesIO()
-    with hashes:
-        for number, row in read_evaluations(rows):
-            line = hashes.read(HASH_LINE)
-            whole = len(line) == HASH_LINE
-            yield number, row, line.decode(errors="replace").rstrip("\n") if whole else None
-
-
 def unknown(key: Key, suite: Suite) -> str | None:
     """What is wrong with a completion's task or prompt; None if the suite knows both.
 
@@ -367,8 +319,8 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
 # --- writing
 
 
-def to_line(row: Mapping[str, Any]) -> bytes:
-    """A row as a line of JSON, in UTF-8."""
+def to_line(row: object) -> bytes:
+    """A row, or a part of one, as a line of JSON, in UTF-8."""
     # Half of a surrogate pair, which UTF-8 cannot hold, becomes an escape, which JSON reads.
     return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
 

@@ -5,22 +5,15 @@ from __future__ import annotations
 import contextlib
 import json
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator, Mapping
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 from codebotler.badinput import BadInput
 from roboeval.engines import OpenEngine
-from roboeval.records import (
-    HASH_LINE,
-    Appender,
-    Completion,
-    Row,
-    length_before,
-    name_of,
-    read_judged,
-    to_line,
-)
+from roboeval.judgedrows import HASH_LINE, Seal, is_sealed, read_judged
+from roboeval.records import Appender, Completion, Row, length_before, name_of, to_line
 from roboeval.run import Run, evaluation_key, load_head, to_text, write_whole
 from roboeval.suite import Suite
 from roboeval.verdicts import evaluate, head
@@ -59,16 +52,19 @@ def evaluate_run(
             for path in (run.rows(key), run.programs(key), run.head(key)):
                 path.unlink(missing_ok=True)
         about = {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
-        _go_on_or_refuse(run.head(key), about, run.rows(key))
+        was = _go_on_or_refuse(run.head(key), about, run.rows(key))
         with (
             contextlib.closing(Appender(run.programs(key))) as programs,
             contextlib.closing(Appender(run.rows(key))) as rows,
         ):
             completions = run.source(suite).of(tasks)
-            yield from _judged(rows, programs, completions)
+            seal = yield from _judged(rows, programs, completions, was)
+            left = [*islice(completions, 1)]
+            if is_sealed(was) and (left or seal.is_broken(was)):
+                write_whole(run.head(key), to_text(about))
             hashes: deque[str] = deque()
             for row in evaluate(
-                _noting(hashes, completions),
+                _noting(hashes, chain(left, completions)),
                 suite,
                 ablated=ablated,
                 workers=workers,
@@ -77,8 +73,14 @@ def evaluate_run(
             ):
                 # The hash comes first: a crash in between leaves one too many, and no row without one.
                 programs.append(f"{hashes.popleft()}\n".encode())
-                rows.append(to_line(row))
+                rows.append(line := to_line(row))
+                seal.add(line)
                 yield row
+            finished = {**about, **seal.data()}
+            if finished != was:
+                programs.sync()
+                rows.sync()
+                write_whole(run.head(key), to_text(finished))
 
 
 def _noting(hashes: deque[str], completions: Iterator[Completion]) -> Iterator[Completion]:
@@ -87,12 +89,15 @@ def _noting(hashes: deque[str], completions: Iterator[Completion]) -> Iterator[C
         yield completion
 
 
-def _judged(rows: Appender, programs: Appender, completions: Iterator[Completion]) -> Iterator[Row]:
-    """The rows that are there; afterwards both files end where to go on."""
-    count = 0
-    for number, row, judged in read_judged(rows.path, programs.path):
+def _judged(
+    rows: Appender, programs: Appender, completions: Iterator[Completion], was: Mapping[str, Any]
+) -> Generator[Row, None, Seal]:
+    """The rows that are there, and their seal; afterwards both files end where to go on."""
+    count, seal = 0, Seal()
+    for number, row, judged in read_judged(rows.path, programs.path, was, seal):
         if judged is None:  # the machine lost its power before the hash was on the disk
             rows.cut(length_before(rows.path, number))
+            seal = Seal.of(rows.path)
             break
         found = row["task"], row["prompt"], row["index"]
         completion = next(completions, None)
@@ -112,16 +117,18 @@ def _judged(rows: Appender, programs: Appender, completions: Iterator[Completion
         count += 1
         yield row
     programs.cut(HASH_LINE * count)
+    return seal
 
 
-def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> None:
+def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> dict[str, Any]:
+    """What KEY.json says, if what is there was judged alike."""
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise BadInput(
                 "is missing, so that nobody knows by what the rows were judged; --redo starts over", file=path
             )
         write_whole(path, to_text(about))
-        return
+        return about
     was = load_head(path)
     changed = [name for name in about if was.get(name) != about[name]]
     if changed:
@@ -129,6 +136,7 @@ def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> None:
         then, now = _brief(name, was.get(name)), _brief(name, about[name])
         what = f"{CALLED.get(name, name)} ({then}, now {now})"
         raise BadInput(f"was judged with another {what}; --redo starts over", file=path)
+    return was
 
 
 CALLED = {

@@ -21,6 +21,7 @@ from codebotler.terminal import visible
 from codebotler.trace import Trace
 from codebotler.tracefile import trace_from
 from roboeval.clusters import trimmed
+from roboeval.judgedrows import NO_ROW, row_of
 from roboeval.records import Key, how_many, name_of
 from roboeval.tables import RowData, key_of
 
@@ -54,12 +55,14 @@ class Found:
         passed: whether it passed.
         worlds: numbers, from 1, and names of the worlds in which it does what is looked for.
         row: of a completion that failed and does it somewhere, as `trimmed` leaves it.
+        undecided: those of the worlds in which nobody knows, since the trace was too long to be kept.
     """
 
     key: Key
     passed: bool
     worlds: tuple[tuple[int, str], ...]
     row: RowData | None
+    undecided: tuple[tuple[int, str], ...] = ()
 
 
 def asked_of(row: RowData, question: Question, formula: Formula | None) -> Found:
@@ -70,17 +73,23 @@ def asked_of(row: RowData, question: Question, formula: Formula | None) -> Found
         question: what is looked for.
         formula: its formula, parsed.
     """
-    worlds = [] if question.task not in {None, row["task"]} else list(_worlds(row, question, formula))
+    worlds, undecided = [], []
+    for number, verdict in _asked(row, question):
+        if formula is not None and "cut" in verdict:
+            undecided.append((number, verdict["world"]))
+        elif formula is None or _holds(formula, verdict["trace"]) != question.negated:
+            worlds.append((number, verdict["world"]))
     kept = trimmed(row) if worlds and not row["passed"] else None
-    return Found(key_of(row), row["passed"], tuple(worlds), kept)
+    return Found(key_of(row), row["passed"], tuple(worlds), kept, tuple(undecided))
 
 
-def _worlds(row: RowData, question: Question, formula: Formula | None) -> Iterator[tuple[int, str]]:
+def _asked(row: RowData, question: Question) -> Iterator[tuple[int, RowData]]:
+    """The verdicts that a question is about, counted from 1."""
+    if question.task not in {None, row["task"]}:
+        return
     for number, verdict in enumerate(row["verdicts"], 1):
-        about = verdict["world"]
-        named = question.world in {None, str(number)} or about.lower() == str(question.world).lower()
-        if named and (formula is None or _holds(formula, verdict["trace"]) != question.negated):
-            yield number, about
+        if question.world in {None, str(number)} or verdict["world"].lower() == str(question.world).lower():
+            yield number, verdict
 
 
 def _holds(formula: Formula, data: Iterable[object]) -> bool:
@@ -110,22 +119,22 @@ def search(rows: Iterable[bytes], question: Question, *, workers: int = 1) -> It
 
     Raises:
         RtlSyntaxError: the formula is none.
-        BadInput: a line is no row of an evaluation.
+        BadInput: a line is no row of an evaluation; its `line` says which, counted from 1.
     """
     formula = None if question.formula is None else parse(question.formula)
     lines = iter(rows)
     first = list(islice(lines, BATCH * SMALL))
     if workers == 1 or len(first) < BATCH * SMALL:
-        for line in chain(first, lines):
-            yield _looked(line, question, formula)
+        for number, line in enumerate(chain(first, lines), 1):
+            yield _looked(number, line, question, formula)
         return
     # Other processes are started anew: this one may have threads, which a fork would break.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context) as pool:
         waiting: deque[Future[list[Found]]] = deque()
         batches = _batches(chain(first, lines))
-        for batch in batches:
-            waiting.append(pool.submit(look_through, batch, question))
+        for count, batch in enumerate(batches):
+            waiting.append(pool.submit(look_through, count * BATCH + 1, batch, question))
             if len(waiting) > 4 * workers:
                 yield from waiting.popleft().result()
         while waiting:
@@ -137,19 +146,19 @@ def _batches(lines: Iterator[bytes]) -> Iterator[list[bytes]]:
         yield batch
 
 
-def look_through(lines: list[bytes], question: Question) -> list[Found]:
-    """What some rows say; the work of one process."""
+def look_through(start: int, lines: list[bytes], question: Question) -> list[Found]:
+    """What some rows say, of which the first has a number; the work of one process."""
     formula = None if question.formula is None else parse(question.formula)
-    return [_looked(line, question, formula) for line in lines]
+    return [_looked(number, line, question, formula) for number, line in enumerate(lines, start)]
 
 
-def _looked(line: bytes, question: Question, formula: Formula | None) -> Found:
+def _looked(number: int, line: bytes, question: Question, formula: Formula | None) -> Found:
     try:
-        return asked_of(json.loads(line), question, formula)
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        if isinstance(error, BadInput):
-            raise
-        raise BadInput("a line of the evaluation is no row of one; --redo starts over") from None
+        return asked_of(row_of(json.loads(line)), question, formula)
+    except BadInput as error:
+        raise BadInput(error.sentence, line=number) from None
+    except (ValueError, RecursionError):
+        raise BadInput(NO_ROW, line=number) from None
 
 
 def found_view(found: Sequence[Found], total: int) -> RenderableType:

@@ -11,11 +11,12 @@ from rich.padding import Padding
 from rich.syntax import Syntax
 from rich.text import Text
 
+from codebotler.english import counted
 from codebotler.rtl import explain
 from codebotler.simulator.robot import located, resolve_room
 from codebotler.storyboard import grid, steps_of, storyboard
 from codebotler.terminal import shortened, visible
-from codebotler.trace import Trace
+from codebotler.trace import Event, Trace
 from codebotler.tracefile import trace_from
 from codebotler.world import World
 from roboeval.records import Completion, name_of
@@ -50,8 +51,12 @@ __all__ = [
 
 GONE = "the program that was judged no longer stands in this run"
 CHANGED = "the suite has changed since this was judged"
+CUT = "the trace that was judged is too long to be kept, so this cannot be explained"
+TOO_LONG = "the traces of this program are too long for this to be explained as well"
 
 MOST_LINES, EXPLANATION = 1_000, 2_000
+MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
+EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one
 
 
 # --- what there is to show, as plain data
@@ -99,6 +104,23 @@ def prompt_data(
     }
 
 
+class Patience:
+    """How much of the traces of one completion is still compared with what was required."""
+
+    def __init__(self) -> None:
+        self._left = MOST_COMPARED
+
+    def reaches_for(self, trace: Trace) -> bool:
+        """Whether a check on a trace is still explained; if so, that is taken into account."""
+        self._left -= sum(map(_weight, trace))
+        return self._left >= 0
+
+
+def _weight(event: Event) -> int:
+    each = SPOKEN if event.kind in {"say", "ask"} else OTHER
+    return EVENT + each * (len(event.text) + sum(len(option.text) for option in event.options))
+
+
 def reason(row: RowData, suite: Suite, *, ablated: bool) -> dict[str, Any]:
     """Why a completion fails: the world that decided, and its error or failed check, explained.
 
@@ -115,7 +137,7 @@ def reason(row: RowData, suite: Suite, *, ablated: bool) -> dict[str, Any]:
     if why["check"] is None:
         return {"passed": False, "failure": why, **told, "explanation": None, "step": None}
     scenario = _scenario(suite, row, why["world"], ablated=ablated)
-    explained = _explained(why["check"], scenario, _trace(verdict, scenario))
+    explained = _explained(why["check"], scenario, _trace(verdict, scenario), Patience(), verdict.get("cut"))
     return {"passed": False, "failure": why, **told, **explained}
 
 
@@ -130,11 +152,12 @@ def completion_data(
         suite: by which it was judged.
         ablated: whether common sense only was required.
     """
+    patience = Patience()
     return {
         **{key: row[key] for key in ("task", "prompt", "index", "passed", "failure")},
         **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
         "worlds": [
-            _world_data(verdict, _scenario(suite, row, number, ablated=ablated))
+            _world_data(verdict, _scenario(suite, row, number, ablated=ablated), patience)
             for number, verdict in enumerate(row["verdicts"])
         ],
     }
@@ -153,13 +176,15 @@ def _trace(verdict: RowData, scenario: Scenario | None) -> Trace:
     return trace if scenario is None else located(trace, scenario.world)
 
 
-def _world_data(verdict: RowData, scenario: Scenario | None) -> dict[str, Any]:
-    trace = _trace(verdict, scenario)
+def _world_data(verdict: RowData, scenario: Scenario | None, patience: Patience) -> dict[str, Any]:
+    trace, cut = _trace(verdict, scenario), verdict.get("cut")
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
         "steps": steps_of(trace, None if scenario is None else _rooms_of(scenario.world)),
+        **({} if cut is None else {"cut": cut}),
         "failed_checks": [
-            {"check": check, **_explained(check, scenario, trace)} for check in verdict["failed_checks"]
+            {"check": check, **_explained(check, scenario, trace, patience, cut)}
+            for check in verdict["failed_checks"]
         ],
     }
 
@@ -169,12 +194,18 @@ def _rooms_of(world: World) -> Callable[[str], str | None]:
     return lambda request: resolve_room(rooms, request)
 
 
-def _explained(check: str, scenario: Scenario | None, trace: Trace) -> dict[str, Any]:
+def _explained(
+    check: str, scenario: Scenario | None, trace: Trace, patience: Patience, cut: object
+) -> dict[str, Any]:
     """Why a check fails, with the step that makes it fail if it is one."""
+    if cut is not None:
+        return {"explanation": CUT, "step": None}
     require = () if scenario is None else scenario.require
     requirement = next((r for r in require if r.text == check), None)
     if requirement is None:
         return {"explanation": f"{CHANGED} and no longer requires this here", "step": None}
+    if not patience.reaches_for(trace):
+        return {"explanation": TOO_LONG, "step": None}
     why = explain(requirement.formula, trace)
     if why is None:
         return {"explanation": f"{CHANGED}; by now this is satisfied", "step": None}
@@ -312,17 +343,24 @@ def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
 
 
 def _world(world: Mapping[str, Any], name: str) -> list[RenderableType]:
-    parts: list[RenderableType] = [
-        Text(name + visible(world["world"]), "bold"),
-        _ending(world),
-        storyboard(world["steps"], {check["step"] for check in world["failed_checks"]}),
-    ]
+    cut = world.get("cut")
+    parts: list[RenderableType] = [Text(name + visible(world["world"]), "bold"), _ending(world)]
+    if world["steps"] or cut is None:
+        parts.append(storyboard(world["steps"], {check["step"] for check in world["failed_checks"]}))
+    if cut is not None:
+        parts.append(Padding(Text(cut_told(cut), "yellow"), (0, 0, 0, 2)))
     for check in world["failed_checks"]:
         text = Text.assemble(
             ("failed ", "red"), visible(check["check"]), f": {shortened(check['explanation'], EXPLANATION)}"
         )
         parts.append(Padding(text, (0, 0, 0, 2)))
     return parts
+
+
+def cut_told(cut: Mapping[str, Any]) -> str:
+    """How much of a trace was not kept, in a sentence."""
+    were = "was" if cut["events"] == 1 else "were"
+    return f"{counted(cut['events'], 'more step')} {were} not kept, since the trace is too long"
 
 
 def _ending(world: Mapping[str, Any]) -> Text:

@@ -19,6 +19,7 @@ from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
 from roboeval.engines import Local, OpenEngine
 from roboeval.records import Completion, Judgement, Row, unknown
+from roboeval.rowsize import bounded
 from roboeval.suite import Requirement, Scenario, Suite, expect_suite
 from roboeval.taxonomy import Verdict, failure
 
@@ -128,11 +129,13 @@ def evaluation(completion: Completion, told: Judgement) -> Row:
 def judgement(verdicts: list[Verdict]) -> Judgement:
     """What the row of an evaluation says of a program."""
     why = failure(verdicts)
-    return {
-        "passed": why is None,
-        "failure": None if why is None else why.data(),
-        "verdicts": [verdict_data(verdict) for verdict in verdicts],
-    }
+    return bounded(
+        {
+            "passed": why is None,
+            "failure": None if why is None else why.data(),
+            "verdicts": [verdict_data(verdict) for verdict in verdicts],
+        }
+    )
 
 
 def verdict_data(verdict: Verdict) -> dict[str, Any]:

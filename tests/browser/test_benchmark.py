@@ -20,6 +20,7 @@ from pageserver import PageServer
 from roboeval.records import to_line
 from roboeval.run import Run
 from runs_server import serving
+from seals import unseal
 from viewing import PHONE, SCREENS, OpenPage, Screen, expect_no_grave_fault
 
 TASKS = "SayGoodDay,LunchBreak,StaplerSupply"
@@ -208,6 +209,7 @@ def test_a_run_is_followed_while_it_is_made(runs: Path, opened: OpenPage) -> Non
             write("completions.jsonl", 60, 240)
             expect(page.locator("#count")).to_have_text("240 completions")
             shutil.copytree(whole.path / "evaluations", run.path / "evaluations")
+            unseal(run.path)
             (run.path / "evaluations" / "paper.jsonl").write_bytes(b"")
             (run.path / "evaluations" / "paper.sha256").write_bytes(b"")
             write("evaluations/paper.sha256", 0, 240)
@@ -297,6 +299,7 @@ def changed(run: Run, change: Callable[[dict[str, Any], dict[str, Any]], None]) 
         change(completion, row)
     run.completions.write_bytes(b"".join(map(to_line, completions)))
     run.rows("paper").write_bytes(b"".join(map(to_line, rows)))
+    unseal(run.path)
 
 
 def expect_unharmed(page: Page, before: int) -> None:

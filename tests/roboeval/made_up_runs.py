@@ -16,6 +16,7 @@ from roboeval.resampling import Trial, by_prompt
 from roboeval.run import Run
 from roboeval.suite import Suite
 from roboeval.tables import RowData
+from seals import unseal
 from small_run import TASK
 
 HOSTILE = "<script>alert('x')</script>&\"$\\frac{1}$\x1b[2J\u202e\ud800\n</pre>"
@@ -149,5 +150,6 @@ def grown(run: Path, times: int) -> None:
         with path.open("wb") as file:
             for n in range(times):
                 file.writelines(to_line({**row, "index": row["index"] + n * most}) for row in rows)
+    unseal(run)
     hashes = found.programs("paper")
     hashes.write_bytes(hashes.read_bytes() * times)

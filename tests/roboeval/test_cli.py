@@ -15,6 +15,7 @@ import pytest
 
 from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
+from seals import unseal
 
 GREETS = 'def task_program():\n    say("good day")\n'
 
@@ -529,6 +530,7 @@ def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
     assert roboeval("evaluate", "a.jsonl", "--out", "run", *options, cwd=tmp_path).status == 0
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:2]))
+    unseal(tmp_path / "run")
     shown = roboeval("show", "run", cwd=tmp_path)
     assert "2 of 4 completions judged\n" in shown.out
     assert "not judged yet: LunchTime\n" in shown.out

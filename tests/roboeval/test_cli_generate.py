@@ -12,6 +12,7 @@ import pytest
 
 from command_line import ENVIRONMENT, refused, roboeval
 from forked import Forked
+from seals import unseal
 from server import Fault, Server
 
 KEY = "sk-verysecret0123456789abcdefghijkl"
@@ -309,6 +310,7 @@ def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> 
     assert "SayGoodDay" not in checked
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:4]))
+    unseal(tmp_path / "run")
     ended = roboeval("resample", "run", "--json", cwd=tmp_path)
     assert ended.err == (
         "4 of 10 completions judged, and only these count; "

@@ -17,6 +17,7 @@ from roboeval.records import Completion, Row, read_completions, read_rows, recor
 from roboeval.resume import evaluate_run
 from roboeval.run import Run, Source, open_source, tasks_to_judge
 from roboeval.suite import Suite
+from seals import unseal
 
 GREETS = 'def task_program():\n    say("good day")\n'
 ADDRESS = "def task_program():\n    say(str(object()))\n    say(str(id([])))\n    say(str({'a', 'b', 'c'}))\n"
@@ -144,6 +145,7 @@ def test_a_torn_last_row_is_judged_again(tmp_path: Path, paper: Suite, cut: int)
     judged(run, paper)
     whole = run.rows("paper").read_bytes()
     run.rows("paper").write_bytes(whole[:-cut])
+    unseal(run.path)
     judged(run, paper)
     assert run.rows("paper").read_bytes() == whole
 
@@ -155,6 +157,7 @@ def test_a_hash_that_a_crash_left_without_its_row_is_dropped(tmp_path: Path, pap
     rows, hashes = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
     run.rows("paper").write_bytes(b"".join(rows.splitlines(keepends=True)[:2]))
     run.programs("paper").write_bytes(hashes[:130] + more.encode())
+    unseal(run.path)
     judged(run, paper)
     assert run.rows("paper").read_bytes() == rows
     assert run.programs("paper").read_bytes() == hashes

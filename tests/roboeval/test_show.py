@@ -11,9 +11,9 @@ import pytest
 from rich.console import Console, RenderableType
 
 from codebotler.badinput import BadInput
-from codebotler.rtl import parse
+from codebotler.rtl import Explanation, Formula, explain, parse
 from codebotler.simulator.rules import Rules
-from codebotler.trace import Event, Option, Outcome, RunError, Status
+from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.world import Person, Room, World
 from roboeval.records import Completion
 from roboeval.show import (
@@ -339,3 +339,24 @@ def test_views_fit_the_width(width: int) -> None:
     for selection in (Selection("Visit"), Selection("Visit", 0), Selection("Visit", 0, 2)):
         text = printed(view(selection, ROWS, THREE, SUITE), width)
         assert max(map(len, text.splitlines())) <= width
+
+
+def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = [Event("say", "no " * 1_000)] * 10
+    task = replace(TASK, scenarios=tuple(Scenario(replace(WORLD, about=str(n)), (BIDS,)) for n in range(30)))
+    suite = replace(SUITE, tasks={"Visit": task})
+    verdicts = [judge(Outcome(Status.FINISHED, tuple(told)), s) for s in task.scenarios]
+    one = evaluation(completion(), judgement(verdicts))
+    compared = []
+
+    def noting(formula: Formula, trace: Trace) -> Explanation | None:
+        compared.append(sum(len(event.text) for event in trace))
+        return explain(formula, trace)
+
+    monkeypatch.setattr("roboeval.show.explain", noting)
+    worlds = completion_data(one, None, suite)["worlds"]
+    why = [check["explanation"] for world in worlds for check in world["failed_checks"]]
+    assert len(why) == 30
+    assert "never said" in why[0]
+    assert "too long" in why[-1]
+    assert 0 < sum(compared) <= 100_000

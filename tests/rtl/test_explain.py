@@ -161,3 +161,13 @@ def test_the_time_grows_with_the_trace_and_no_faster(text: str) -> None:
     short = sum(seconds(formula, day * 30) for day in days)
     long = sum(seconds(formula, day * 30 * times) for day in days)
     assert long < 4 * times * short  # were it quadratic, it would be 16 * times
+
+
+def test_among_very_long_texts_the_nearest_is_not_looked_for() -> None:
+    said = Event("say", "x" * 9_999)
+    formula = parse('tr.Exists(say("bye"))')
+    few, many = explain(formula, (said,)), explain(formula, (said,) * 99)
+    assert few is not None
+    assert many is not None
+    assert (few.event, many.event) == (0, None)
+    assert many.sentence.startswith("the robot never said")

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from codebotler.trace import Trace
 
 _MOST = 5
+_MOST_COMPARED = 50_000
+"""Characters among which the nearest text is looked for; in more it is not."""
 
 
 @dataclass(frozen=True)
@@ -139,11 +141,10 @@ class Absence:
             return done[0], f": it did so only {self._placed(done)}"
         if self.deed[0].kind == "goto":
             return None, self._went(here)
-        near = max(
-            (at for at in here if self.trace[at].kind == self.deed[0].kind), key=self._likeness, default=None
-        )
-        if near is None:
+        alike = [at for at in here if self.trace[at].kind == self.deed[0].kind]
+        if not alike or sum(len(self.trace[at].text) for at in alike) > _MOST_COMPARED:
             return None, ""
+        near = max(alike, key=self._likeness)
         event = self.trace[near]
         return near, f": it {happened(event, 'past')} at step {near + 1}, {lacking(self.deed, event)}"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -19,7 +19,7 @@ from roboeval.commands.options import (
     load,
     open_evaluation,
 )
-from roboeval.terminal import fail, print_json, print_rich, watched
+from roboeval.terminal import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
     from roboeval.clusters import Cluster
@@ -52,6 +52,7 @@ def find(
     Of those that did something in some world, those that fail are put together by the reason.
     """
     from roboeval.clusters import clusters, groups
+    from roboeval.records import how_many
     from roboeval.search import Question, search
 
     if negated and formula is None:
@@ -72,8 +73,11 @@ def find(
     shown = together if json else together[:most]
     telling = clusters(shown, right, programs, known, ablated=ablation)
     told = list(watched(telling, "comparing", len(shown)))
+    undecided = [one for one in every if one.undecided]
+    if undecided:
+        note(f"undecided, since their traces were too long to be kept: {how_many(len(undecided))}")
     if json:
-        print_found(found, told, total)
+        print_found(found, undecided, told, total)
     else:
         show_found(found, told, total, failed=len(failed), groups=len(together))
 
@@ -99,25 +103,30 @@ def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
         fail(f'{where} has no world "{question.world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
-def print_found(found: Sequence[Found], told: Sequence[Cluster], total: int) -> None:
+def print_found(
+    found: Sequence[Found], undecided: Sequence[Found], told: Sequence[Cluster], total: int
+) -> None:
     """Print what was found for machines."""
     from roboeval.clusters import cluster_data
-    from roboeval.records import name_of
 
     print_json(
         {
             "looked_at": total,
-            "found": [
-                {
-                    "completion": name_of(one.key),
-                    "passed": one.passed,
-                    "worlds": [{"number": number, "world": world} for number, world in one.worlds],
-                }
-                for one in found
-            ],
+            "found": [_found_data(one, one.worlds) for one in found],
+            "undecided": [_found_data(one, one.undecided) for one in undecided],
             "groups": list(map(cluster_data, told)),
         }
     )
+
+
+def _found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]:
+    from roboeval.records import name_of
+
+    return {
+        "completion": name_of(one.key),
+        "passed": one.passed,
+        "worlds": [{"number": number, "world": world} for number, world in worlds],
+    }
 
 
 def show_found(

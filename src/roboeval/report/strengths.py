@@ -114,12 +114,13 @@ def never_returned(row: RowData, suite: Suite) -> bool:
 
     Args:
         row: of a completion that failed, as `trimmed` leaves it.
-        suite: whose worlds have the rooms; where it has the world no more, the answer is no.
+        suite: whose worlds have the rooms; where it has the world no more, the answer is no, as it is where
+            the trace was too long to be kept.
     """
     task = suite.tasks.get(row["task"])
     number = row["failure"]["world"]
     scenarios = () if task is None else task.scenarios
-    if number >= len(scenarios):
+    if number >= len(scenarios) or "cut" in row["verdicts"][number]:
         return False
     world = scenarios[number].world
     rooms = [room.name for room in world.rooms]

@@ -15,7 +15,8 @@ from typing import Any
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
-from roboeval.records import EVALUATED, HASH_LINE, MAX_EVALUATION, MAX_ROW, Completion, Key, name_of
+from roboeval.judgedrows import BROKEN, HASH_LINE, MAX_EVALUATION, NO_ROW, Seal, row_of
+from roboeval.records import MAX_ROW, Completion, Key, name_of
 from roboeval.run import Run, load_head
 from roboeval.tables import RowData, key_of
 from roboeval.web.seen import Entry, Judged, Seen, Written
@@ -59,6 +60,7 @@ class FollowedRun:
             Key | None
         ] = []  # None for a damaged row, so that the next ones keep their programs
         self._digests: list[bytes] = []
+        self._seal = Seal()
         self._faults: list[str] = []
         self._fault_count = 0
 
@@ -75,23 +77,35 @@ class FollowedRun:
             if not self.run.path.is_dir():
                 raise GoneError("is gone: its folder was deleted or renamed", file=self.run.path.name)
             before = self._size, self._fault_count
+            head = self._head(self.run.head(self.key)) if self.key else {}
             is_whole = self._read(time.monotonic() + seconds)
+            faults = self._faults
+            if is_whole and self._is_broken(head):
+                faults = [f"{self._rows.path.name}: {BROKEN}; --redo judges again", *faults]
             found = Seen(
                 version=self._seen.version,
                 name=self.run.path.name,
                 key=self.key,
                 about=self._head(self.run.about),
-                head=self._head(self.run.head(self.key)) if self.key else {},
+                head=head,
                 is_written=_is_locked(self.run.path / ".lock"),
                 share=1.0 if is_whole else self._share(),
-                faults=tuple(self._faults),
-                fault_count=self._fault_count,
+                faults=tuple(faults),
+                fault_count=self._fault_count + len(faults) - len(self._faults),
                 entries=self._seen.entries if before == (self._size, self._fault_count) else self._entries(),
             )
             if found != self._seen:
                 found = found.next()
                 self._seen = found
             return self._seen
+
+    def _is_broken(self, head: Mapping[str, Any]) -> bool:
+        """Whether the rows are others than those of the finished evaluation, and no other fault was found.
+
+        An evaluation that is gone on with meanwhile is not finished any more.
+        """
+        broken = not self._fault_count and self._seal.is_broken(head)
+        return broken and self._head(self.run.head(self.key or "")) == head
 
     def wait(self) -> Seen:
         """Read all there is, and say what is known then.
@@ -112,10 +126,10 @@ class FollowedRun:
         if entry.judged is None:
             return None
         row = self._again(self._rows, entry.judged.at, entry.judged.size)
-        if _judged(row, 0, 0) is None or key_of(row) != entry.key:
-            raise BadInput("was written anew meanwhile; reload the page", file=self._rows.path.name)
-        found: RowData = row
-        return found
+        with suppress(BadInput):
+            if key_of(found := row_of(row)) == entry.key:
+                return found
+        raise BadInput("was written anew meanwhile; reload the page", file=self._rows.path.name)
 
     def completion(self, entry: Entry) -> Completion | None:
         """The completion again, with its program; None if it is not there.
@@ -169,6 +183,8 @@ class FollowedRun:
             with suppress(ValueError):
                 self._digests.append(bytes.fromhex(line.decode("ascii", "replace")))
             return
+        if tail is self._rows:
+            self._seal.add(line)
         if not line.strip():
             return
         try:
@@ -199,15 +215,16 @@ class FollowedRun:
         self._written[key] = Written(at, len(line), bytes.fromhex(completion.program_sha256), model)
 
     def _take_row(self, row: object, at: int, line: bytes) -> None:
-        found = _judged(row, at, len(line))
-        self._order.append(found and found[0])
-        if found is None:
+        try:
+            key, judged = _judged(row, at, len(line))
+        except BadInput as error:
+            self._order.append(None)
             raise BadInput(
-                "this line is no row of an evaluation; --redo judges again",
+                f"{error.sentence}; --redo judges again",
                 file=self._rows.path.name,
                 line=self._rows.number,
-            )
-        key, judged = found
+            ) from None
+        self._order.append(key)
         self._judged[key] = judged
 
     def _fault(self, error: BadInput) -> None:
@@ -258,29 +275,20 @@ def _completion(row: object) -> Completion | None:
     return None
 
 
-def _judged(row: Any, at: int, size: int) -> tuple[Key, Judged] | None:  # noqa: ANN401 - JSON has no types
-    """What is kept of a row of an evaluation; None if it is none."""
-    if not isinstance(row, dict) or not all(isinstance(row.get(f), t) for f, t in EVALUATED.items()):
-        return None
-    if any(isinstance(row[name], bool) for name in ("prompt", "index")):
-        return None
-    try:
-        verdicts = [
-            (v["satisfied"], v["status"] == "finished" or v["error"] is None) for v in row["verdicts"]
-        ]
-        worlds = "".join("+" if ok else "-" if finished else "!" for ok, finished in verdicts)
-        why = row["failure"]
-        if why is None:
-            return _interned(key_of(row)), Judged(at, size, row["passed"], None, None, None, None, worlds, "")
-        failure_class, kind, world, check = (why[part] for part in ("class", "kind", "world", "check"))
-        told = check if check is not None else row["verdicts"][world]["error"]["message"]
-        if not all(isinstance(each, str) for each in (failure_class, kind, told)):
-            return None
-    except (KeyError, TypeError, IndexError):
-        return None
-    names = sys.intern(failure_class), sys.intern(kind)
-    judged = Judged(at, size, row["passed"], *names, world, check, worlds, shortened(told, MOST_WORDS))
-    return _interned(key_of(row)), judged
+def _judged(data: object, at: int, size: int) -> tuple[Key, Judged]:
+    """What is kept of a row of an evaluation."""
+    row = row_of(data)
+    verdicts = [(v["satisfied"], v["status"] == "finished" or v["error"] is None) for v in row["verdicts"]]
+    worlds = "".join("+" if ok else "-" if finished else "!" for ok, finished in verdicts)
+    why = row["failure"]
+    if why is None:
+        return _interned(key_of(row)), Judged(at, size, row["passed"], None, None, None, None, worlds, "")
+    check, error = why["check"], row["verdicts"][why["world"]]["error"]
+    if check is None and error is None:
+        raise BadInput(NO_ROW)
+    told = shortened(error["message"] if check is None else check, MOST_WORDS)
+    names = sys.intern(why["class"]), sys.intern(why["kind"])
+    return _interned(key_of(row)), Judged(at, size, row["passed"], *names, why["world"], check, worlds, told)
 
 
 def _is_locked(path: Path) -> bool:

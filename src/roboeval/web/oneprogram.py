@@ -19,6 +19,7 @@ from codebotler.web.words import Words
 from codebotler.world import World
 from roboeval.catalogue import person_told
 from roboeval.records import Key, name_of
+from roboeval.show import cut_told
 from roboeval.suite import ABLATED, Suite
 from roboeval.tables import NOT_RECORDED, by_hand
 from roboeval.web.api import Choice, Evaluation
@@ -154,14 +155,17 @@ def _draw_world(number: int, of: int, found: Mapping[str, Any], world: World | N
         with ui.element("ul").classes("failed-checks"):
             for check in found["failed_checks"]:
                 _draw_check(check)
-        if not steps:
+        if not steps and "cut" not in found:
             Words("p", "The robot did nothing.", "quiet")
-        elif "place" in steps[0]:
+        elif steps and "place" in steps[0]:
             with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
                 for scene in scenes(steps, steps[0]["place"], wrong):
                     draw_scene(scene, wrong)
+        if "cut" in found:
+            Words("p", f"{cut_told(found['cut'])}.", "quiet")
         if steps:
-            _draw_folded(f"Every step, {len(steps):,} in all", lambda: _draw_steps(steps))
+            every = "Every step that was kept" if "cut" in found else "Every step"
+            _draw_folded(f"{every}, {len(steps):,} in all", lambda: _draw_steps(steps))
         if world is not None:
             _draw_folded("The world", lambda: _draw_rooms(world))
 

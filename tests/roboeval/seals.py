@@ -1,0 +1,15 @@
+"""What tests do to evaluations that their readers would otherwise call damaged."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from roboeval.run import Run, to_text
+
+
+def unseal(run: Path, key: str = "paper") -> None:
+    """Let an evaluation be one that was not finished, whose rows may be any."""
+    path = Run(run).head(key)
+    head = json.loads(path.read_text())
+    path.write_bytes(to_text({name: value for name, value in head.items() if name not in {"rows", "sha256"}}))
