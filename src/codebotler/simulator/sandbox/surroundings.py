@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def simulate_surroundings(run: Run) -> None:
-    """Give programs a simulated clock and locks, no input, a deaf output, no environment, and a way to exit."""
+    """Give programs a simulated clock and locks, no input, a deaf output, no environment, a way to exit."""
     simulate_time(run)
     simulate_locks(run)
     sys.stdin = io.StringIO("")
