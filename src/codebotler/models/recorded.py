@@ -120,7 +120,7 @@ def closest_to(instruction: str, known: Iterable[str]) -> list[str]:
 
 
 def _words(text: str) -> tuple[str, ...]:
-    return tuple(text.lower().split())
+    return tuple(text.lower().rstrip(". \n").split())
 
 
 def _short(text: str) -> str:

@@ -1,5 +1,6 @@
 import ast
 import asyncio
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,11 @@ from codebotler.badinput import BadInput
 from codebotler.models import base
 from codebotler.models.base import Settings
 from codebotler.models.open import expect_server, open_model
-from codebotler.models.recorded import NAMES, read_replies, recorded_model
+from codebotler.models.recorded import NAMES, _words, read_replies, recorded_model
 from codebotler.prompts import prompt_for
+from codebotler.simulator.engine import run
+from codebotler.trace import Status
+from codebotler.world import Room, World
 
 
 def write(path: Path, text: str) -> Path:
@@ -42,10 +46,10 @@ def test_nobody_recorded_an_instruction_of_ones_own() -> None:
         recorded_model("recorded").reply("Fetch me a coffee", 0)
 
 
-def test_both_models_know_the_same_eighty_instructions() -> None:
+def test_both_models_know_the_same_instructions() -> None:
     careful, hasty = (recorded_model(name).replies for name in NAMES)
     assert set(careful) == set(hasty)
-    assert len(careful) == 80
+    assert len({*map(_words, careful)}) == len(careful) == 81
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -111,9 +115,49 @@ def test_recorded_model_is_asked_like_any_other() -> None:
     assert reply_to(instruction, len(replies), "recorded:hasty").program == replies[0].program
 
 
-def test_spaces_and_capitals_do_not_make_another_instruction() -> None:
-    instruction = next(iter(recorded_model("recorded").replies))
-    assert reply_to(f"\n {instruction.upper().replace(' ', '  ')}\n") == reply_to(instruction)
+def test_spaces_capitals_and_the_final_full_stop_do_not_make_another_instruction() -> None:
+    instruction = next(one for one in recorded_model("recorded").replies if one.endswith("."))
+    for other in (f"\n {instruction.upper().replace(' ', '  ')}\n", instruction[:-1], f"{instruction}\n.."):
+        assert reply_to(other) == reply_to(instruction)
+
+
+# --- the first sentence of the README
+
+CHECK_THE_PRINTER_ROOMS = "Check every printer room for a stapler, and come back and tell me which have none"
+PRINTER_ROOMS = ("printer room 1", "printer room 2", "printer room 3")
+
+
+def what_it_does(model: str, without_stapler: Iterable[str]) -> tuple[str, str]:
+    """What a recorded program says in the end, and where."""
+    rooms = (Room(room, () if room in without_stapler else ("stapler",)) for room in ("lab", *PRINTER_ROOMS))
+    world = World((Room("hall"), *rooms), "hall")
+    (outcome,) = run([(reply_to(CHECK_THE_PRINTER_ROOMS, model=model).program, world)], workers=1)
+    assert outcome.status is Status.FINISHED
+    assert {event.text for event in outcome.trace if event.kind == "goto"} == {"hall", *PRINTER_ROOMS}
+    (said,) = (event for event in outcome.trace if event.kind == "say")
+    assert outcome.trace[-1] == said
+    return said.text, said.place
+
+
+@pytest.mark.parametrize("without_stapler", [(), PRINTER_ROOMS[:1], PRINTER_ROOMS[::2], PRINTER_ROOMS])
+def test_the_readmes_first_instruction_is_carried_out_by_the_careful_model(
+    without_stapler: tuple[str, ...],
+) -> None:
+    said, place = what_it_does("recorded", without_stapler)
+    assert place == "hall"
+    assert tuple(room for room in PRINTER_ROOMS if room in said) == without_stapler
+
+
+def test_the_readmes_first_instruction_is_one_that_the_hasty_model_gets_wrong() -> None:
+    said, _ = what_it_does("recorded:hasty", PRINTER_ROOMS)
+    assert [room for room in PRINTER_ROOMS if room in said] == ["printer room 3"]
+
+
+def test_the_readmes_first_instruction_is_in_the_readme() -> None:
+    text = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+    first, rest = text.split("\n## ", 1)
+    assert f'"{CHECK_THE_PRINTER_ROOMS}"' in " ".join(first.split())
+    assert f'codebotler run "{CHECK_THE_PRINTER_ROOMS}"' in rest
 
 
 def test_unknown_instruction_is_told_with_the_closest_that_are_known_and_how_to_name_a_model() -> None:

@@ -34,6 +34,7 @@ WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
 OTHER = World((Room("elsewhere"),), "elsewhere")
 AS_WRITTEN = Rules(literals="as-written")
 FUTEX = {"x86_64": 202, "aarch64": 98}
+LIBRARY = 'sys.modules["_ctypes"].dlopen(None, 0)'
 
 
 def saying(text: str) -> str:
@@ -441,25 +442,54 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
     lane.close()
 
 
-WAITING_TWICE = """
+COMPUTING_TWICE = """
+def now():
+    sys.modules["_ctypes"].call_function(clock, (1, moment))
+    return int.from_bytes(moment[:8], sys.byteorder) + int.from_bytes(moment[8:], sys.byteorder) / 1e9
+
 def task_program():
-    library = sys.modules["_ctypes"].dlopen(None, 0)
-    call = sys.modules["_ctypes"].dlsym(library, "syscall")
-    word, second = bytes(8), (0).to_bytes(8, "little") + (900_000_000).to_bytes(8, "little")
-    for _ in range(3):
-        sys.modules["_ctypes"].call_function(call, (FUTEX, word, 0, 0, second))
-        sum(range(3_000_000))  # else it is seen to wait
+    global clock, moment
+    clock, moment = sys.modules["_ctypes"].dlsym(LIBRARY, "clock_gettime"), bytes(16)
+    until = now() + 0.35
+    while now() < until:
+        sum(range(10_000))
     if "json" not in sys.modules:
         __import__("json")
     say("a")
-"""
+""".replace("LIBRARY", LIBRARY)
+
+
+def test_program_that_is_run_again_is_not_waited_for_as_long_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    lane = Lane()
+    for warming in ("pass", "import json"):
+        lane.run(f"def task_program():\n    {warming}\n", lambda: SimulatedRobot(WORLD))
+    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 0.6)
+    outcome = lane.run(COMPUTING_TWICE, lambda: SimulatedRobot(WORLD))
+    lane.close()
+    assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
+
+
+WAITING_A_LITTLE = """
+def task_program():  # NUMBER
+    lock = sys.modules["_thread"].allocate_lock()
+    lock.acquire()
+    for _ in range(40):
+        lock.acquire(True, 0.05)
+    say(f"{time.monotonic():.2f}")
+    call = sys.modules["_ctypes"].dlsym(LIBRARY, "syscall")
+    word, a_while = bytes(8), (0).to_bytes(8, "little") + (50_000_000).to_bytes(8, "little")
+    for _ in range(40):
+        refused = sys.modules["_ctypes"].call_function(call, (FUTEX, word, 0, 0, a_while))
+    say(str(refused))
+""".replace("LIBRARY", LIBRARY)
 
 
 @pytest.mark.skipif(platform.machine() not in FUTEX, reason="the number of futex is not known here")
-def test_program_that_is_run_again_is_not_waited_for_as_long_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 4.0)
-    (outcome,) = run([(WAITING_TWICE.replace("FUTEX", str(FUTEX[platform.machine()])), WORLD)], workers=1)
-    assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
+def test_program_that_waits_a_little_at_a_time_ends_the_same_way_in_each_of_many_runs() -> None:
+    source = WAITING_A_LITTLE.replace("FUTEX", str(FUTEX[platform.machine()]))
+    pairs = [(source.replace("NUMBER", str(number)), WORLD) for number in range(100)]
+    ends = {(one.status, *(event.text for event in one.trace)) for one in run(pairs, workers=4)}
+    assert ends == {(Status.FINISHED, "2.00", "-1")}
 
 
 def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:

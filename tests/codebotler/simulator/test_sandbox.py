@@ -254,6 +254,13 @@ WORKS: dict[str, tuple[str, object]] = {
         ),
         ["2.0", "102.0", "105.0", "False", "TrueFalse110.0", "120.0", "True"],
     ),
+    "timed waits cost simulated time without any import": (
+        task(
+            "lock = __import__('_thread').allocate_lock()\nlock.acquire()\n"
+            "say(str(lock.acquire(True, 0.5)) + str(time.monotonic()))"
+        ),
+        ["False0.5"],
+    ),
     "dates are what they seem": (
         "import datetime, pickle\nclass D(datetime.datetime): pass\n"
         + task(

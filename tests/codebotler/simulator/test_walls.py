@@ -116,6 +116,10 @@ if looker == 0:
 if seen := os.waitstatus_to_exitcode(os.waitpid(looker, 0)[1]):
     raise OSError(seen, "refused")
 """
+A_SHORT_WAIT = """
+word, a_moment = (ctypes.c_int * 1)(), (ctypes.c_long * 2)(0, 1_000_000)
+futex = dict(x86_64=202, aarch64=98).get(platform.machine())
+"""
 A_QUEUE = "succeed(libc.mq_open(b'/walls', os.O_CREAT | os.O_RDWR, 0o600, None))\nlibc.mq_unlink(b'/walls')"
 DUMP = """
 dumper = os.fork()
@@ -158,6 +162,14 @@ DEEDS = {
     "seccomp: write elsewhere": denied("os.write(writer, b'x')", A_PIPE),
     "seccomp: executable memory": denied("succeed(libc.mmap(None, 4096, EXECUTABLE, PRIVATE, -1, 0))"),
     "seccomp: memory made executable": denied("succeed(libc.mprotect(page, 4096, EXECUTABLE))", A_PAGE),
+    "seccomp: wait for a futex": Deed(
+        "only_seccomp()",
+        "succeed(libc.syscall(futex, word, 0, 0, a_moment))",
+        "EPERM",
+        A_SHORT_WAIT,
+        bare="ETIMEDOUT",
+    ),
+    "seccomp: wake by a futex": allowed("succeed(libc.pthread_once(word, libc.getpid))", A_SHORT_WAIT),
     "seccomp: memory": allowed(A_PAGE),
     "seccomp: memory made read-only": allowed("succeed(libc.mprotect(page, 4096, READABLE))", A_PAGE),
     "seccomp: read on the channel": allowed("os.read(3, 1)", comes_to="EBADF"),  # which only writes here
@@ -253,6 +265,45 @@ def test_call_by_an_x32_number_ends_the_process() -> None:
     call = "libc.syscall(0x40000000 + 39)"
     assert result("pass", call, "") == "done"
     assert result("only_seccomp()", call, "") == "SIGSYS"
+
+
+MACHINE = platform.machine()
+ON_THE_LIST = set(walls.SYSCALLS[MACHINE][1].values()) if MACHINE in walls.SYSCALLS else set()
+PAST_LISTS = {335: "SIGILL", 336: "ENXIO"} if MACHINE == "x86_64" else {}  # what newer kernels say to them
+HIGHEST = 700  # of system calls; no kernel has as many
+CALL = "libc.syscall(ctypes.c_long(number), 0, 0, 0, 0, 0, 0)"
+EACH_REFUSED = f"""
+for number in {{}}:
+    if {CALL} != -1 or ctypes.get_errno() != errno.EPERM:
+        tell(f"{{{{number}}}} ")
+"""
+EACH_ENDS_ITS_PROCESS = f"""
+for number in {{}}:
+    if os.fork() == 0:
+        only_seccomp()
+        {CALL}
+        os._exit(0)
+    if os.WTERMSIG(os.wait()[1]) != signal.SIGSYS:
+        tell(f"{{{{number}}}} ")
+"""
+one_list = pytest.mark.skipif(MACHINE not in walls.SYSCALLS, reason="this kind of machine has no list")
+
+
+@one_list
+def test_every_system_call_that_is_not_on_the_list_is_refused() -> None:
+    numbers = {*range(HIGHEST), walls.X32 - 1, 2**32 + 2} - ON_THE_LIST - PAST_LISTS.keys()
+    assert result("only_seccomp()", EACH_REFUSED.format(sorted(numbers)), NOBODY) == "done"
+
+
+@one_list
+def test_every_number_of_another_interface_ends_the_process() -> None:
+    numbers = [*range(walls.X32, walls.X32 + HIGHEST), 2**31 - 1, 2**31]
+    assert result("pass", EACH_ENDS_ITS_PROCESS.format(numbers), f"{NOBODY}; limit('CORE')") == "done"
+
+
+@pytest.mark.parametrize("number", PAST_LISTS)
+def test_calls_that_newer_kernels_let_past_any_list_do_nothing(number: int) -> None:
+    assert result("only_seccomp()", f"succeed(libc.syscall({number}))", "") in ("EPERM", PAST_LISTS[number])
 
 
 def test_list_of_system_calls_is_known_for_two_kinds_of_machines_only() -> None:

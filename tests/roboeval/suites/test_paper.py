@@ -92,9 +92,9 @@ def test_programs_were_thought_out_differently(task: Task, model: str) -> None:
 def test_every_prompt_has_recorded_programs(paper: Suite, model: str) -> None:
     replies = recorded_model(f"recorded:{model}").replies
     prompts = {prompt for task in paper.tasks.values() for prompt in task.prompts}
-    assert set(replies) == prompts
+    assert prompts <= set(replies)
     assert len(prompts) == 80
-    assert all(len(them) >= (1 if model == "careful" else 2) for them in replies.values())
+    assert all(len(replies[prompt]) >= (1 if model == "careful" else 2) for prompt in prompts)
 
 
 @pytest.fixture(scope="module")

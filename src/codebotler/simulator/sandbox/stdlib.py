@@ -15,7 +15,6 @@ import posix
 import sys
 
 from codebotler.simulator.sandbox.execution import Run
-from codebotler.simulator.sandbox.locks import simulate_locks
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -45,7 +44,6 @@ def load_stdlib(run: Run) -> None:
     """Import all that a program may import, on the run's clock and with chance that repeats."""
     simulate_select(run)
     simulate_chance()
-    simulate_locks(run)
     vars(_thread)["get_native_id"] = lambda: 1
     forget_forks()
     sys.modules["_queue"] = None  # type: ignore[assignment]  # `queue` then takes its own, with simulated locks

@@ -12,6 +12,7 @@ import types
 from _sitebuiltins import Quitter
 
 from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, Run
+from codebotler.simulator.sandbox.locks import simulate_locks
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
 
 
 def simulate_surroundings(run: Run) -> None:
-    """Give programs a simulated clock, an empty input, a deaf output, no environment, and a way to exit."""
+    """Give programs a simulated clock and locks, no input, a deaf output, no environment, a way to exit."""
     simulate_time(run)
+    simulate_locks(run)
     sys.stdin = io.StringIO("")
     sys.stdout = sys.stderr = io.TextIOWrapper(Nowhere(), encoding="utf-8", errors="replace")
     sys.argv = ["program"]

@@ -123,15 +123,17 @@ SYSCALLS = {
 }  # fmt: skip
 LOAD, RETURN, EQUAL, AT_LEAST, ANY_BIT = 0x20, 0x06, 0x15, 0x35, 0x45
 ALLOW, DENY, KILL = 0x7FFF0000, 0x00050001, 0x80000000
-NUMBER, ARCHITECTURE, FIRST_ARGUMENT, THIRD_ARGUMENT = 0, 4, 16, 32
+NUMBER, ARCHITECTURE, FIRST_ARGUMENT, SECOND_ARGUMENT, THIRD_ARGUMENT = 0, 4, 16, 24, 32
 X32 = 0x40000000
 PROT_EXEC = 4
+FUTEX_WAKE_PRIVATE = 129
 
 
 def seccomp_filter(machine: str = MACHINE) -> Filter | None:
     """The list of what a child may ask of the kernel, as a BPF program; None on an unknown machine.
 
-    Reading and writing go to the channel only, memory is never executable; all else is refused with EPERM.
+    Reading and writing go to the channel only, memory is never executable, and a futex wakes but never waits,
+    since nobody else could wake; all else is refused with EPERM.
     """
     if machine not in SYSCALLS or sys.platform != "linux":
         return None
@@ -139,6 +141,7 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
     guarded = {
         **dict.fromkeys(("read", "write"), (FIRST_ARGUMENT, (EQUAL, 0, 1, CHANNEL))),
         **dict.fromkeys(("mmap", "mprotect"), (THIRD_ARGUMENT, (ANY_BIT, 1, 0, PROT_EXEC))),
+        "futex": (SECOND_ARGUMENT, (EQUAL, 0, 1, FUTEX_WAKE_PRIVATE)),
     }
     code = [
         (LOAD, 0, 0, ARCHITECTURE),
