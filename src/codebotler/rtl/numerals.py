@@ -42,7 +42,9 @@ _ROUGHLY = re.compile(
     re.IGNORECASE,
 )
 _MORE = re.compile(r"\s*(?:dozen|hundred|thousand|or (?:so|more|less|fewer))\b", re.IGNORECASE)
-_TOGETHER = re.compile(r"\s*(?:or|to|-|\u2013|,|/|maybe|perhaps)?\s*(?:or|maybe|perhaps)?\s*", re.IGNORECASE)
+_TOGETHER = re.compile(
+    r"\s*+(?:(?:or|to|-|\u2013|,|/|maybe|perhaps)\s*+)?(?:(?:or|maybe|perhaps)\s*+)?", re.IGNORECASE
+)
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
