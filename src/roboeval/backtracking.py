@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
+from random import Random
 from typing import Any
 
 from codebotler.rtl.pattern import compile_regex
@@ -21,6 +22,7 @@ LINEAR = 5.5
 
 FLOOR = 0.001  # seconds below which a measurement says nothing
 ENOUGH = 0.02  # seconds beyond which no longer text is needed
+MOST = 40  # texts that are tried with a regex
 MANY = 50  # repetitions from which a repeat counts as one without an end
 
 FILLERS = (" ", "\n", "1", "a", "a ", "1 ", "a, ", "-", ",", "'", "no ", "not ")
@@ -79,17 +81,27 @@ def _seconds(read: Callable[[str], object], text: str) -> float:
 
 @cache
 def slow_text(pattern: str) -> Attack | None:
-    """A text on which the search for a regex takes more than linear time; None where none was found.
+    """A text on which finding a regex takes more than linear time; None where none was found.
 
     Args:
         pattern: the regex, as RTL understands it.
     """
-    search = compile_regex(pattern).search
-    return next((attack for attack in attacks(pattern) if is_superlinear(search, attack)), None)
+    find = compile_regex(pattern).findall
+    return next((attack for attack in drawn(pattern) if is_superlinear(find, attack)), None)
+
+
+def drawn(pattern: str) -> list[Attack]:
+    """Some of the texts that may take a regex long, the same ones each time.
+
+    Args:
+        pattern: the regex.
+    """
+    every = [*attacks(pattern)]
+    return Random(pattern).sample(every, min(MOST, len(every)))  # noqa: S311 - no secret
 
 
 def attacks(pattern: str) -> Iterator[Attack]:
-    """Texts that may take a regex long: near misses that repeat what it repeats; none where it repeats nothing.
+    """Texts that may take a regex long: near misses that repeat what it repeats; none if it repeats nothing.
 
     Args:
         pattern: the regex.
@@ -126,7 +138,9 @@ def _repeats(items: Sequence[Any], before: Sequence[str]) -> Iterator[tuple[Sequ
 
 def _until_next_repeat(items: Sequence[Any]) -> list[str]:
     upto = next((n for n, (op, v) in enumerate(items) if _repeated(str(op), v) is not None), len(items))
-    return [text for text in dict.fromkeys([*spelled(items[:upto])[:2], *spelled(items[:upto], " ")[:2]]) if text]
+    return [
+        text for text in dict.fromkeys([*spelled(items[:upto])[:2], *spelled(items[:upto], " ")[:2]]) if text
+    ]
 
 
 def _denied(items: Sequence[Any]) -> Iterator[str]:
@@ -140,4 +154,3 @@ def _denied(items: Sequence[Any]) -> Iterator[str]:
 
 def _repeated(op: str, value: Any) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
     return value[2] if op in ("MAX_REPEAT", "MIN_REPEAT") and value[1] >= MANY else None
-

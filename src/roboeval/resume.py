@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections import deque
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from codebotler.badinput import BadInput
-from roboeval.engines import OpenEngine
+from roboeval.engines import Local, OpenEngine
 from roboeval.records import (
     HASH_LINE,
     Appender,
     Completion,
+    Key,
     Row,
     length_before,
     name_of,
@@ -23,7 +24,7 @@ from roboeval.records import (
 )
 from roboeval.run import Run, evaluation_key, load_head, to_text, write_whole
 from roboeval.suite import Suite
-from roboeval.verdicts import evaluate, head
+from roboeval.verdicts import evaluation, head, judgements
 
 
 def evaluate_run(
@@ -65,37 +66,61 @@ def evaluate_run(
             contextlib.closing(Appender(run.rows(key))) as rows,
         ):
             completions = run.source(suite).of(tasks)
-            yield from _judged(rows, programs, completions)
-            hashes: deque[str] = deque()
-            for row in evaluate(
-                _noting(hashes, completions),
-                suite,
-                ablated=ablated,
-                workers=workers,
-                require_isolation=require_isolation,
-                engine=engine,
-            ):
+            left_out = LeftOut(run.head(key))
+            yield from _judged(rows, programs, completions, left_out)
+            chosen = engine or Local(workers, require_isolation=require_isolation)
+            again = chain([*left_out.waiting.values()], completions)
+            for completion, told in judgements(again, suite, ablated=ablated, engine=chosen):
+                if told is None:
+                    left_out.add(completion)
+                    continue
                 # The hash comes first: a crash in between leaves one too many, and no row without one.
-                programs.append(f"{hashes.popleft()}\n".encode())
+                programs.append(f"{completion.program_sha256}\n".encode())
+                row = evaluation(completion, told)
                 rows.append(to_line(row))
                 yield row
 
 
-def _noting(hashes: deque[str], completions: Iterator[Completion]) -> Iterator[Completion]:
-    for completion in completions:
-        hashes.append(completion.program_sha256)
-        yield completion
+class LeftOut:
+    """The completions that have no row since judging them took too long; their rows may come at the end.
+
+    Args:
+        head: KEY.json, which keeps their names.
+    """
+
+    def __init__(self, head: Path) -> None:
+        self._head = head
+        self._names: list[str] = load_head(head).get(LEFT_OUT, [])
+        self.waiting: dict[Key, Completion] = {}
+
+    def __contains__(self, completion: Completion) -> bool:
+        return name_of(completion.key) in self._names
+
+    def add(self, completion: Completion) -> None:
+        """Remember one, before the row of any later one is written."""
+        if completion not in self:
+            self._names.append(name_of(completion.key))
+            write_whole(self._head, to_text({**load_head(self._head), LEFT_OUT: self._names}))
 
 
-def _judged(rows: Appender, programs: Appender, completions: Iterator[Completion]) -> Iterator[Row]:
+LEFT_OUT = "took_too_long"
+
+
+def _judged(
+    rows: Appender, programs: Appender, completions: Iterator[Completion], left_out: LeftOut
+) -> Iterator[Row]:
     """The rows that are there; afterwards both files end where to go on."""
     count = 0
+    waiting = left_out.waiting
     for number, row, judged in read_judged(rows.path, programs.path):
         if judged is None:  # the machine lost its power before the hash was on the disk
             rows.cut(length_before(rows.path, number))
             break
         found = row["task"], row["prompt"], row["index"]
-        completion = next(completions, None)
+        completion = waiting.pop(found) if found in waiting else next(completions, None)
+        while completion is not None and completion.key != found and completion in left_out:
+            waiting[completion.key] = completion
+            completion = next(completions, None)
         if completion is None or completion.key != found:
             expected = "nothing more" if completion is None else name_of(completion.key)
             raise BadInput(

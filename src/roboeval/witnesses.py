@@ -305,9 +305,7 @@ def _spelled_one(op: str, value: Any, gap: str) -> list[str]:  # noqa: ANN401, P
             return spelled(value, gap)
         case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
             least, _, items = value
-            repeated = [
-                text * max(least, 1) for text in spelled(items, gap) if len(text) * least <= _LONGEST
-            ]
+            repeated = [text * max(least, 1) for text in spelled(items, gap) if len(text) * least <= _LONGEST]
             none = [] if least else [""]
             return [*repeated, *none] if gap else [*none, *repeated]
     return [""]
