@@ -9,7 +9,7 @@ from functools import partial
 
 from codebotler import __version__
 from codebotler.badinput import BadInput
-from codebotler.checker import Settings, check_on
+from codebotler.checker import Check, Settings, check_on
 from codebotler.simulator.engine import digest
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.lane import Lane
@@ -79,10 +79,10 @@ class Checks:
     ) -> Iterator[tuple[tuple[str, str], list[str]]]:
         if not programs:
             return
-        checking = partial(problems, self._plans, self._settings)
+        checking = partial(checked, self._plans, self._settings)
         works = ((task, program) for (task, _), program in programs.items())
         with engine as opened:
-            found = opened.map_distinct(checking, works, name=lambda work: digest(*work))
+            found = opened.map_distinct(checking, works, name=lambda work: digest(*work), then=sentences)
             yield from zip(programs, found, strict=True)
 
     def _begin(self) -> None:
@@ -103,7 +103,12 @@ class Checks:
                     raise BadInput("this line tells of no check; delete the file", file=path, line=number)
 
 
-def problems(plans: Mapping[str, Plan], settings: Settings, lane: Lane, work: tuple[str, str]) -> list[str]:
-    """What is wrong with a program, the second of the two, in sentences; the first is its task."""
+def checked(plans: Mapping[str, Plan], settings: Settings, lane: Lane, work: tuple[str, str]) -> Check:
+    """The check of a program, the second of the two; the first is its task."""
     task, program = work
-    return [problem.sentence for problem in check_on(lane, program, plans[task], settings).problems]
+    return check_on(lane, program, plans[task], settings)
+
+
+def sentences(check: Check) -> list[str]:
+    """What is wrong with a program, in sentences."""
+    return [problem.sentence for problem in check.problems]

@@ -12,6 +12,7 @@ from codebotler.simulator.engine import Lanes
 from codebotler.simulator.lane import Lane
 
 Key = TypeVar("Key")
+Ran = TypeVar("Ran")
 Value = TypeVar("Value")
 
 
@@ -19,7 +20,12 @@ class Engine(Protocol):
     """Calls a function with a lane, which runs programs isolated, and with each of many keys."""
 
     def map_distinct(
-        self, function: Callable[[Lane, Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]
+        self,
+        function: Callable[[Lane, Key], Ran],
+        keys: Iterable[Key],
+        *,
+        name: Callable[[Key], bytes],
+        then: Callable[[Ran], Value],
     ) -> Iterator[Value]:
         """The results in the order of the keys; equal keys are one call, and keys are read as needed.
 
@@ -27,6 +33,7 @@ class Engine(Protocol):
             function: what to call; it, the keys and the results can be pickled.
             keys: what to call it with.
             name: a short name of a key, which no other key has.
+            then: what to call with what comes of it, in the main thread of a process where that is possible.
 
         Raises:
             EngineError: no isolated process can be started, or none is left.
@@ -67,9 +74,14 @@ class Local:
             self._lanes = None
 
     def map_distinct(
-        self, function: Callable[[Lane, Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]
+        self,
+        function: Callable[[Lane, Key], Ran],
+        keys: Iterable[Key],
+        *,
+        name: Callable[[Key], bytes],
+        then: Callable[[Ran], Value],
     ) -> Iterator[Value]:
         """The results in the order of the keys."""
         lanes = self._lanes
         assert lanes is not None, "enter it first"
-        return lanes.map_distinct(lambda key: function(lanes.here(), key), keys, name=name)
+        return lanes.map_distinct(lambda key: function(lanes.here(), key), keys, name=name, then=then)

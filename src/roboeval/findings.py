@@ -17,6 +17,7 @@ Kind = Literal[
     "unsaid",
     "untripped",
     "dead-regex",
+    "slow-regex",
     "absent",
     "same-worlds",
     "stale-acceptance",

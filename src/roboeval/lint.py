@@ -11,15 +11,17 @@ import re
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import chain, combinations
 from textwrap import shorten
 
 from codebotler.badinput import YamlFile
 from codebotler.cachedproperty import cached_property
 from codebotler.english import listed
 from codebotler.models.recorded import closest_to
-from codebotler.rtl import Element, Formula, Regex, Text
-from codebotler.simulator.robot import resolve_room
+from codebotler.rtl import Claim, Element, Formula, Number, Regex, Text, Without, Words
+from codebotler.simulator.robot import resolve_room, whole_words
+from codebotler.world import World
+from roboeval.backtracking import slow_text
 from roboeval.findings import Finding, Kind
 from roboeval.names import absent_names
 from roboeval.representatives import elements
@@ -38,7 +40,7 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
         verdicts: on programs that are meant to be right or wrong.
     """
     places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
-    found = [*_unused(task), *_unsaid(task), *_unasked(task)]
+    found = [*_unused(task), *_unsaid(task), *_unasked(task), *_slow(task)]
     found += [*_misjudged(task, verdicts), *_untripped(task, verdicts)]
     if task.drawn:
         found += _of_drawn(places)
@@ -114,6 +116,66 @@ def _unused(task: Task) -> Iterator[Finding]:
         if check.name not in used:
             message = f'no world requires the check "{check.name}"; require it or remove it'
             yield Finding("unused", check.name, message, task.path, check.line)
+
+
+@dataclass(frozen=True)
+class Searched:
+    """A regex that is looked for in what a program says.
+
+    Args:
+        pattern: as it is looked for.
+        where: by which requirement, or in which world.
+        line: where that stands.
+    """
+
+    pattern: str
+    where: str
+    line: int | None
+
+
+def regexes(task: Task) -> Iterator[Searched]:
+    """The regexes of a task: those of its requirements, and what its worlds call things and answer."""
+    lines = {check.name: check.line for check in task.checks}
+    scenarios = [*_scenarios(task)]
+    for requirement in {one.text: one for *_, scenario in scenarios for one in scenario.require}.values():
+        for element in elements(requirement.formula):
+            texts = (text for text in (element.text, element.options, element.answer) if text is not None)
+            for pattern in (one for text in texts for one in _compiled(text)):
+                yield Searched(pattern, f'"{requirement.text}"', lines[requirement.check])
+    labels = {label: (where, n) for where, n, scenario in scenarios for label in _labels(scenario.world)}
+    for label, (where, number) in labels.items():
+        yield Searched(whole_words(label), where, None if task.drawn else _line_of_world(task, number))
+
+
+def _labels(world: World) -> Iterator[str]:
+    for room in world.rooms:
+        yield from (room.name, *room.objects)
+        for person in room.people:
+            answers = (*person.answers, *chain.from_iterable(person.topics))
+            yield from (text for text in (person.name, *answers) if isinstance(text, str))
+
+
+def _compiled(text: Text) -> Iterator[str]:
+    match text:
+        case Words(parts):
+            yield from chain.from_iterable(map(_compiled, parts))
+        case Number():
+            yield from (kind.pattern for kind in text.kinds)
+        case Regex() | Without() | Claim():
+            yield text.compiled.pattern
+
+
+def _slow(task: Task) -> Iterator[Finding]:
+    """Regexes that make the judge slow: the time that it takes to find them grows faster than the text."""
+    distinct = {one.pattern: one for one in reversed([*regexes(task)])}
+    for pattern, one in distinct.items():
+        if (text := slow_text(pattern)) is not None:
+            message = (
+                f"finding the regex {pattern!r} of {one.where} takes much longer the longer a text is, "
+                f"such as {text.prefix + text.unit!r} with {text.unit!r} many times more; let no two repeats "
+                "match the same text"
+            )
+            yield Finding("slow-regex", pattern, message, task.path, one.line)
 
 
 def _unsaid(task: Task) -> Iterator[Finding]:

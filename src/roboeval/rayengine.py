@@ -9,7 +9,7 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
@@ -23,6 +23,7 @@ from roboeval.rayaddress import LOCAL, expect_cluster, is_here_only, named_addre
 
 LOG = logging.getLogger("roboeval.ray")
 Key = TypeVar("Key")
+Ran = TypeVar("Ran")
 Value = TypeVar("Value")
 
 LARGEST = 16  # keys of a shard: some tens of milliseconds, beside which Ray's one or two are little
@@ -62,14 +63,19 @@ class Cluster:
         self._ray.shutdown()
 
     def map_distinct(
-        self, function: Callable[[Lane, Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]
+        self,
+        function: Callable[[Lane, Key], Ran],
+        keys: Iterable[Key],
+        *,
+        name: Callable[[Key], bytes],
+        then: Callable[[Ran], Value],
     ) -> Iterator[Value]:
         """The results in the order of the keys.
 
         What is under way when no more results are wanted comes to its end in the cluster: Ray 2.60 can abort
         this process when a shard that is just done is cancelled.
         """
-        shards: Shards[Key] = Shards(self._give_out(function))
+        shards: Shards[Key] = Shards(self._give_out(partial(call_both, function, then)))
         remaining = iter(keys)
         waiting: deque[bytes] = deque()
         with Done() as done:
@@ -213,6 +219,13 @@ def call_all(function: Callable[[Lane, Any], Any], keys: Sequence[Any], theirs: 
     except EngineError as error:
         return Told(machine=machine, complaint=f"{machine}: {error}")
     return Told(values, lane.has_seccomp, machine)
+
+
+def call_both(
+    function: Callable[[Lane, Key], Ran], then: Callable[[Ran], Value], lane: Lane, key: Key
+) -> Value:
+    """What comes of a key after both functions."""
+    return then(function(lane, key))
 
 
 @cache

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections import deque
 from collections.abc import Generator, Iterator, Mapping
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 from codebotler.badinput import BadInput
-from roboeval.engines import OpenEngine
+from roboeval.engines import Local, OpenEngine
 from roboeval.judgedrows import HASH_LINE, Seal, is_sealed, read_judged
-from roboeval.records import Appender, Completion, Row, length_before, name_of, to_line
+from roboeval.records import Appender, Completion, Key, Row, length_before, name_of, to_line
 from roboeval.run import Run, evaluation_key, load_head, to_text, write_whole
 from roboeval.suite import Suite
-from roboeval.verdicts import evaluate, head
+from roboeval.verdicts import evaluation, head, judgements
 
 
 def evaluate_run(
@@ -58,49 +57,81 @@ def evaluate_run(
             contextlib.closing(Appender(run.rows(key))) as rows,
         ):
             completions = run.source(suite).of(tasks)
-            seal = yield from _judged(rows, programs, completions, was)
-            left = [*islice(completions, 1)]
+            left_out = LeftOut(run.head(key))
+            seal = yield from _judged(rows, programs, completions, was, left_out)
+            left = [*left_out.waiting.values(), *islice(completions, 1)]
             if is_sealed(was) and (left or seal.is_broken(was)):
-                write_whole(run.head(key), to_text(about))
-            hashes: deque[str] = deque()
-            for row in evaluate(
-                _noting(hashes, chain(left, completions)),
-                suite,
-                ablated=ablated,
-                workers=workers,
-                require_isolation=require_isolation,
-                engine=engine,
+                write_whole(run.head(key), to_text({**about, **left_out.data()}))
+            chosen = engine or Local(workers, require_isolation=require_isolation)
+            is_whole = True
+            for completion, told in judgements(
+                chain(left, completions), suite, ablated=ablated, engine=chosen
             ):
+                if told is None:
+                    left_out.add(completion)
+                    is_whole = False
+                    continue
                 # The hash comes first: a crash in between leaves one too many, and no row without one.
-                programs.append(f"{hashes.popleft()}\n".encode())
+                programs.append(f"{completion.program_sha256}\n".encode())
+                row = evaluation(completion, told)
                 rows.append(line := to_line(row))
                 seal.add(line)
                 yield row
-            finished = {**about, **seal.data()}
-            if finished != was:
+            finished = {**about, **left_out.data(), **seal.data()}
+            if is_whole and finished != was:
                 programs.sync()
                 rows.sync()
                 write_whole(run.head(key), to_text(finished))
 
 
-def _noting(hashes: deque[str], completions: Iterator[Completion]) -> Iterator[Completion]:
-    for completion in completions:
-        hashes.append(completion.program_sha256)
-        yield completion
+class LeftOut:
+    """The completions that once had no row since judging them took too long; their rows come at the end.
+
+    Args:
+        head: KEY.json, which keeps their names.
+    """
+
+    def __init__(self, head: Path) -> None:
+        self._head = head
+        self._names: list[str] = load_head(head).get(LEFT_OUT, [])
+        self.waiting: dict[Key, Completion] = {}
+
+    def __contains__(self, completion: Completion) -> bool:
+        return name_of(completion.key) in self._names
+
+    def add(self, completion: Completion) -> None:
+        """Remember one, before the row of any later one is written."""
+        if completion not in self:
+            self._names.append(name_of(completion.key))
+            write_whole(self._head, to_text({**load_head(self._head), **self.data()}))
+
+    def data(self) -> dict[str, Any]:
+        """As KEY.json names them; nothing where there are none."""
+        return {LEFT_OUT: self._names} if self._names else {}
+
+
+LEFT_OUT = "took_too_long"
 
 
 def _judged(
-    rows: Appender, programs: Appender, completions: Iterator[Completion], was: Mapping[str, Any]
+    rows: Appender,
+    programs: Appender,
+    completions: Iterator[Completion],
+    was: Mapping[str, Any],
+    left_out: LeftOut,
 ) -> Generator[Row, None, Seal]:
     """The rows that are there, and their seal; afterwards both files end where to go on."""
-    count, seal = 0, Seal()
+    count, seal, waiting = 0, Seal(), left_out.waiting
     for number, row, judged in read_judged(rows.path, programs.path, was, seal):
         if judged is None:  # the machine lost its power before the hash was on the disk
             rows.cut(length_before(rows.path, number))
             seal = Seal.of(rows.path)
             break
         found = row["task"], row["prompt"], row["index"]
-        completion = next(completions, None)
+        completion = waiting.pop(found) if found in waiting else next(completions, None)
+        while completion is not None and completion.key != found and completion in left_out:
+            waiting[completion.key] = completion
+            completion = next(completions, None)
         if completion is None or completion.key != found:
             expected = "nothing more" if completion is None else name_of(completion.key)
             raise BadInput(

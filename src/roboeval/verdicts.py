@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import platform
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -18,10 +19,16 @@ from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
 from roboeval.engines import Local, OpenEngine
-from roboeval.records import Completion, Judgement, Row, unknown
+from roboeval.records import Completion, Judgement, Row, name_of, unknown
 from roboeval.rowsize import bounded
 from roboeval.suite import Requirement, Scenario, Suite, expect_suite
 from roboeval.taxonomy import Verdict, failure
+from roboeval.timelimit import TimeLimitExceeded, time_limit
+
+LOG = logging.getLogger("roboeval.verdicts")
+
+BUDGET = 60
+"""Seconds of processor time that judging one program may take, in all its worlds."""
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
@@ -65,6 +72,9 @@ def evaluate(
 ) -> Iterator[Row]:
     """Judge completions, yielding one row each in their order; equal programs of a task run once.
 
+    One whose judging takes more than 60 seconds of processor time has no row, and a warning is logged; this
+    limit holds only where rows are asked for in the main thread.
+
     Args:
         completions: whose tasks the suite knows; read as they are needed.
         suite: tasks and rules.
@@ -80,12 +90,21 @@ def evaluate(
     """
     expect_suite(suite)
     chosen = engine or Local(workers, require_isolation=require_isolation)
-    return _evaluated(completions, suite, ablated=ablated, engine=chosen)
+    told = judgements(completions, suite, ablated=ablated, engine=chosen)
+    return (evaluation(completion, one) for completion, one in told if one is not None)
 
 
-def _evaluated(
+def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
-) -> Iterator[Row]:
+) -> Iterator[tuple[Completion, Judgement | None]]:
+    """What is said of each completion, in their order; None, and a warning, where that takes too long.
+
+    Args:
+        completions: whose tasks the suite knows; read as they are needed.
+        suite: tasks and rules.
+        ablated: whether to require common sense only.
+        engine: where programs are run.
+    """
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -95,9 +114,18 @@ def _evaluated(
             yield completion.task, completion.program
 
     with engine as opened:
+        running = partial(run_in_worlds, suite, ablated=ablated)
         judging = partial(judged, suite, ablated=ablated)
-        for told in opened.map_distinct(judging, works(), name=lambda work: digest(*work)):
-            yield evaluation(waiting.popleft(), told)
+        for told in opened.map_distinct(running, works(), name=lambda work: digest(*work), then=judging):
+            completion = waiting.popleft()
+            if told is None:
+                LOG.warning(
+                    "%s is not judged: that took more than %g seconds of processor time; "
+                    "`roboeval tasks --lint` finds slow regexes",
+                    name_of(completion.key),
+                    BUDGET,
+                )
+            yield completion, told
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
@@ -113,12 +141,24 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
         raise BadInput(f'the task "{completion.task}" has no ablation')
 
 
-def judged(suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool) -> Judgement:
-    """What is said of a program, the second of the two, in all worlds of a task, the first."""
+def run_in_worlds(
+    suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool
+) -> tuple[str, Sequence[Outcome]]:
+    """A task, the first of the two, and how a program, the second, ends in each of its worlds."""
     task, program = work
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
-    outcomes = (lane.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios)
-    return judgement([judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
+    return task, [lane.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios]
+
+
+def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> Judgement | None:
+    """What is said of a program that ran in all worlds of a task; None where that takes too long."""
+    task, outcomes = ran
+    scenarios = suite.tasks[task].judged_in(ablated=ablated)
+    try:
+        with time_limit(BUDGET):
+            return judgement([judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
+    except TimeLimitExceeded:
+        return None
 
 
 def evaluation(completion: Completion, told: Judgement) -> Row:

@@ -182,7 +182,7 @@ def spelled_out(pattern: str) -> Iterator[str]:
     Args:
         pattern: the regex.
     """
-    yield from _literals(_parsed(pattern))
+    yield from _literals(parsed(pattern))
 
 
 def _literals(items: Any) -> Iterator[str]:  # noqa: ANN401 - the tree of a private module of Python's
@@ -193,12 +193,13 @@ def _literals(items: Any) -> Iterator[str]:  # noqa: ANN401 - the tree of a priv
             continue
         yield text
         text = ""
-        for inner in _inner(str(op), value):
+        for inner in inner_parts(str(op), value):
             yield from _literals(inner)
     yield text
 
 
-def _inner(op: str, value: Any) -> list[Any]:  # noqa: ANN401 - the same
+def inner_parts(op: str, value: Any) -> list[Any]:  # noqa: ANN401 - the same
+    """The parts within one node of the tree of a regex."""
     match op:
         case "BRANCH":
             return list(value[1])
@@ -236,8 +237,8 @@ def samples(pattern: str, *, outer: bool = False) -> tuple[str, ...]:
         outer: whether they may begin or end with spaces.
     """
     matches = Regex(pattern).matches
-    spelled = _spelled_in_all_ways(_parsed(pattern))
-    whole = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in spelled]
+    texts = _spelled_in_all_ways(parsed(pattern))
+    whole = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in texts]
     forms = [*(form.strip() for form in whole), *(whole if outer else ())]
     found = dict.fromkeys(form for form in forms if matches(form))
     return tuple(islice(found or _guessed(pattern, outer=outer), _MOST_SAMPLES))
@@ -252,12 +253,13 @@ def _guessed(pattern: str, *, outer: bool) -> Iterator[str]:
 
 def _forbidden(pattern: str) -> tuple[str, ...]:
     """What stands in the negative lookaheads of a regex: what a text must hold not to match."""
-    inner = (value[1] for op, value in _parsed(pattern) if str(op) == "ASSERT_NOT")
+    inner = (value[1] for op, value in parsed(pattern) if str(op) == "ASSERT_NOT")
     words = (word.strip() for items in inner for word in _spelled_in_all_ways(items)[: 4 * _MOST_SAMPLES])
     return tuple(dict.fromkeys(word for word in words if word))
 
 
-def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
+def parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
+    """The tree of a regex, as Python parses it."""
     with unwarned():
         return import_module("re._parser").parse(pattern, re.IGNORECASE | re.DOTALL)
 
@@ -265,11 +267,17 @@ def _parsed(pattern: str) -> Any:  # noqa: ANN401 - the tree of a private module
 def _spelled_in_all_ways(items: Any) -> list[str]:  # noqa: ANN401 - the same
     """Spelled close together and apart, and with what is looked ahead for behind all else."""
     behind = sorted(items, key=lambda item: str(item[0]) == "ASSERT")
-    ways = zip_longest(_spelled(items), _spelled(items, " "), _spelled(behind, " "))
+    ways = zip_longest(spelled(items), spelled(items, " "), spelled(behind, " "))
     return [*dict.fromkeys(text for way in ways for text in way if text is not None)]
 
 
-def _spelled(items: Any, gap: str = "") -> list[str]:  # noqa: ANN401 - the same
+def spelled(items: Any, gap: str = "") -> list[str]:  # noqa: ANN401 - the same
+    """Some texts for which a part of a regex stands.
+
+    Args:
+        items: the part, as `parsed` tells it.
+        gap: what stands where anything may.
+    """
     texts = [""]
     for op, value in items:
         parts = _spelled_one(str(op), value, gap)
@@ -288,18 +296,16 @@ def _spelled_one(op: str, value: Any, gap: str) -> list[str]:  # noqa: ANN401, P
         case "IN":
             return _spelled_set(value, gap)
         case "BRANCH":
-            return [text for branch in value[1] for text in _spelled(branch, gap)[:_MOST_SAMPLES]]
+            return [text for branch in value[1] for text in spelled(branch, gap)[:_MOST_SAMPLES]]
         case "SUBPATTERN":
-            return _spelled(value[-1], gap)
+            return spelled(value[-1], gap)
         case "ASSERT":
-            return [text + gap for text in _spelled(value[-1], gap)]
+            return [text + gap for text in spelled(value[-1], gap)]
         case "ATOMIC_GROUP":
-            return _spelled(value, gap)
+            return spelled(value, gap)
         case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
             least, _, items = value
-            repeated = [
-                text * max(least, 1) for text in _spelled(items, gap) if len(text) * least <= _LONGEST
-            ]
+            repeated = [text * max(least, 1) for text in spelled(items, gap) if len(text) * least <= _LONGEST]
             none = [] if least else [""]
             return [*repeated, *none] if gap else [*none, *repeated]
     return [""]

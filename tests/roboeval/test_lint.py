@@ -246,6 +246,14 @@ def test_options_may_have_outer_spaces(linted: Lint, option: str) -> None:
     assert [one.kind for one in said] == ["dead-regex", "implied"]
 
 
+def test_a_regex_that_takes_much_longer_the_longer_a_text_is(linted: Lint) -> None:
+    (finding,) = linted({"greets": 'tr.Exists(say("a.*b"))'}, ["greets"])
+    assert finding.name == "slow-regex: a.*b"
+    assert finding.line == 5
+    assert '"greets"' in finding.message
+    assert not linted({"greets": 'tr.Exists(say("a[^a]*b"))'}, ["greets"])
+
+
 def test_a_visit_that_leads_nowhere(linted: Lint) -> None:
     (dead, absent) = linted({"goes": 'not tr.Exists(goto("^attic$"))', "speaks": SPEAKS}, ["goes", "speaks"])[
         :2

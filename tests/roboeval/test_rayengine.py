@@ -87,7 +87,7 @@ from roboeval.rayengine import Cluster
 with Cluster() as cluster:
     import ray
     import psutil  # which comes with it
-    print(list(cluster.map_distinct(lambda lane, key: key, [1, 2, 1], name=lambda key: b"%d" % key)))
+    print(list(cluster.map_distinct(lambda lane, key: key, [1, 2, 1], name=lambda k: b"%d" % k, then=abs)))
     print([node["NodeManagerAddress"] for node in ray.nodes()])
     ours = {process.pid for process in psutil.Process().children(recursive=True)}
     sockets = [one for one in psutil.net_connections("tcp") if one.pid in ours and one.status == "LISTEN"]
@@ -245,7 +245,7 @@ def test_keys_are_read_as_they_are_needed_and_equal_ones_are_one_call() -> None:
 
     with Cluster(2) as cluster:
         results = cluster.map_distinct(
-            lambda _, key: (key, time.time_ns()), keys(), name=lambda key: str(key).encode()
+            lambda _, key: (key, time.time_ns()), keys(), name=lambda key: str(key).encode(), then=tuple
         )
         first = [next(results) for _ in range(50)]
         assert [key for key, _ in first] == list(range(50))
@@ -262,7 +262,7 @@ def test_what_a_call_throws_is_thrown_here() -> None:
         return 1 // (key - 1)
 
     with Cluster() as cluster:
-        results = cluster.map_distinct(broken, [0, 1], name=lambda key: str(key).encode())
+        results = cluster.map_distinct(broken, [0, 1], name=lambda key: str(key).encode(), then=abs)
         with pytest.raises(ZeroDivisionError):
             list(results)
 
@@ -271,7 +271,9 @@ def test_what_a_call_throws_is_thrown_here() -> None:
 def test_who_wants_no_more_results_harms_nothing() -> None:
     with Cluster() as cluster:
         for number in range(40):  # a shard that was cancelled when just done would abort this process soon
-            results = cluster.map_distinct(lambda _, key: key, range(500), name=lambda key: b"%d" % key)
+            results = cluster.map_distinct(
+                lambda _, key: key, range(500), name=lambda key: b"%d" % key, then=abs
+            )
             assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
             del results
 
@@ -310,6 +312,8 @@ def test_a_cluster_without_a_core_ends_with_a_sentence(nodes: Nodes, monkeypatch
     monkeypatch.setattr(rayengine, "PATIENCE", 1)
     nodes.kill()
     with Cluster() as cluster:
-        results = cluster.map_distinct(lambda _, key: key, [1, 2], name=lambda key: str(key).encode())
+        results = cluster.map_distinct(
+            lambda _, key: key, [1, 2], name=lambda key: str(key).encode(), then=abs
+        )
         with pytest.raises(EngineError, match="has no core left"):
             list(results)

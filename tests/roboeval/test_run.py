@@ -8,15 +8,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from codebotler.badinput import BadInput
+from roboeval.cli import app
 from roboeval.records import Completion, Row, read_completions, read_rows, recorded_completions, to_line
 from roboeval.resume import evaluate_run
 from roboeval.run import Run, Source, open_source, tasks_to_judge
-from roboeval.suite import Suite
+from roboeval.suite import Suite, load_suite
+from roboeval.timelimit import TimeLimitExceeded, time_limit
 from seals import unseal
 
 GREETS = 'def task_program():\n    say("good day")\n'
@@ -378,3 +382,39 @@ def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> No
     run.head("paper").unlink()
     with pytest.raises(BadInput, match="nobody knows by what the rows were judged; --redo starts over"):
         judged(run, paper)
+
+
+def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "suite" / "tasks").mkdir(parents=True)
+    (tmp_path / "suite" / "suite.yaml").write_text("name: slow\nversion: 1\n")
+    (tmp_path / "suite" / "tasks" / "Slow.yaml").write_text(
+        "name: Slow\nsummary: Speak.\nprompts: [Speak.]\n"
+        "checks: {speaks: {category: SayAtLocation, rtl: 'tr.Exists(say(\"^(a+)+b\"))'}}\n"
+        "worlds: [{about: a, robot: hall, rooms: [hall], require: [speaks]}]\n"
+    )
+    suite = load_suite(str(tmp_path / "suite"))
+    slow, quick = (f"def task_program(): say({'a' * n!r})\n" for n in (18, 3))
+    run = a_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
+
+    monkeypatch.setattr("roboeval.verdicts.BUDGET", 0.001)
+    assert [row["index"] for row in judged(run, suite)] == [1, 3]
+    assert [record.getMessage().split()[0] for record in caplog.records] == ["Slow/0/0", "Slow/0/2"]
+    result = CliRunner().invoke(app, ["evaluate", str(run.path), "--suite", str(tmp_path / "suite")])
+    assert result.exit_code == 1
+
+    monkeypatch.undo()
+    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
+    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
+
+
+def test_other_threads_know_no_limit() -> None:
+    def work() -> bool:
+        with time_limit(0.01):
+            return sum(range(100_000)) > 0
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(work).result()
+    with pytest.raises(TimeLimitExceeded), time_limit(0.01):
+        re.search("(a+)+b", "a" * 26)

@@ -43,7 +43,7 @@ class Number:
         In each clause a number belongs to the thing next to it: the one that follows, or, where things come
         first, the one before. A text that does not name the thing gives all numbers that belong to no other.
         """
-        kinds = self._kinds
+        kinds = self.kinds
         told = [sentence for sentence in sentences(without_harmless(text)) if not sentence.endswith("?")]
         parts = [[*_marks(clause, kinds)] for sentence in told for clause in clauses(sentence)]
         named = any(kind == 0 for part in parts for kind, _ in part)
@@ -53,7 +53,8 @@ class Number:
         return found or {n for sentence in told for n in _paired([*_marks(sentence, kinds)])}
 
     @cached_property
-    def _kinds(self) -> tuple[re.Pattern[str], ...]:
+    def kinds(self) -> tuple[re.Pattern[str], ...]:
+        """The regexes for the thing and the others, ready to search with."""
         return tuple(map(_word, (self.thing, *self.others)))
 
     def __str__(self) -> str:

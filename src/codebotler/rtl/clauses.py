@@ -12,8 +12,8 @@ _END = re.compile(r"(?<=\?)(?!\?)|[!;\n]+|\.(?!\d)")
 _JOINT = re.compile(
     r",(?!\d)|(?<!\d),|\b(?:and|(?<!anything )but|while|whereas|however|although|though)\b", re.IGNORECASE
 )
-_FEW = r"(?:\w[\w']*\W+){0,2}(?:\w[\w']*\W*)?"
-_ITEM = re.compile(rf"\W*(?:(?:in|at|(?:as )?for|from)\s+(?:\w[\w']*\W+)?)?{_FEW}", re.IGNORECASE)
+_FEW = r"(?:\w[\w']*+\W++){0,2}(?:\w[\w']*+\W*+)?"
+_ITEM = re.compile(rf"\W*+(?:(?:in|at|(?:as )?for|from)\s+(?:\w[\w']*+\W++)?)?{_FEW}", re.IGNORECASE)
 _PLACE = re.compile(r"\W*(?:in|at|(?:as )?for|from)\b", re.IGNORECASE)
 _VERB = re.compile(
     r"\b(?:is|are|was|were|am|be|has|have|had|will|would|can|could|should|might|does|do|did|says?|said|wants?|yes"
@@ -34,8 +34,9 @@ _ASIDE = re.compile(
     re.IGNORECASE,
 )
 _THERE = re.compile(r"\s*(?:there|it)\b", re.IGNORECASE)
-_HAS = re.compile(r"\b(?:has|have|had|got|with|contains?)\b", re.IGNORECASE)
-_NO_THING = re.compile(r"\W*no\s+\w+\W*", re.IGNORECASE)
+_POSSESSES = r"(?:has|have|had|got|with|contains?)"
+_HAS = re.compile(rf"\b{_POSSESSES}\b", re.IGNORECASE)
+_NO_THING = re.compile(rf"\W*no\s+(?!{_POSSESSES}\b)\w+\W*", re.IGNORECASE)
 _ASKED = re.compile(r"\basked\b", re.IGNORECASE)
 _WHETHER = re.compile(r"\b(?:if|whether)\b", re.IGNORECASE)
 _INVERTED = re.compile(

@@ -15,9 +15,14 @@ _NOTHING = r"no one|no-one|noone|nobody|nothing|none|neither|not (?:one|a single
 
 _NEAR = 60  # characters within which words belong together; without an end, long texts would take for ever
 
+# What a number may be glued to; a single F or C only by two digits or more, for 3C is as well a room.
+_GLUED = (
+    r"x|[ap]m|h|hrs?|hours?|mins?|minutes?|s|secs?|seconds?|k?g|lbs?|oz|m?l|[kcm]m|m|ft|degrees?|percent"
+    r"|pcs?|pieces?|people|(?<=\d\d)[fc]"
+)
 _UNITS = "|".join(_ONES[1:10])
 _NUMBER = re.compile(
-    rf"(?:(?<![\w.,:/-])|(?<=\bx))(?P<digits>-?\d+(?:\.\d+)?)(?!(?!x\b)[\w:]|\.\d)"
+    rf"(?:(?<![\w.,:/-])|(?<=\bx))(?P<digits>-?\d+(?:\.\d+)?)(?!(?!(?:{_GLUED})\b)[\w:]|\.\d)"
     rf"|\b(?P<tens>{'|'.join(_TENS)})(?:[ -](?P<units>{_UNITS}))?\b"
     rf"|\b(?P<hundred>(?:(?:a|one) )?hundred)\b"
     rf"|\b(?P<nothing>{_NOTHING})\b"
@@ -42,14 +47,16 @@ _ROUGHLY = re.compile(
     re.IGNORECASE,
 )
 _MORE = re.compile(r"\s*(?:dozen|hundred|thousand|or (?:so|more|less|fewer))\b", re.IGNORECASE)
-_TOGETHER = re.compile(r"\s*(?:or|to|-|\u2013|,|/|maybe|perhaps)?\s*(?:or|maybe|perhaps)?\s*", re.IGNORECASE)
+_TOGETHER = re.compile(
+    r"\s*+(?:(?:or|to|-|\u2013|,|/|maybe|perhaps)\s*+)?(?:(?:or|maybe|perhaps)\s*+)?", re.IGNORECASE
+)
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
     """The numbers in a text, as positions and values; those between which it leaves the choice are together.
 
-    `no`, `nobody` and the like are 0; `x2` and `2x` are 2. Of `2 of 4` only 2 is told, of `a total of 2`
-    the 2; `one` in `the one` is no number, and what is `not 3` or `at least 3` has none.
+    `no`, `nobody` and the like are 0; `x2`, `2x` and `2kg` are 2. Of `2 of 4` only 2 is told, of
+    `a total of 2` the 2; `one` in `the one` is no number, and what is `not 3` or `at least 3` has none.
 
     Args:
         text: any text.

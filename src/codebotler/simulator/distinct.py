@@ -15,29 +15,36 @@ from queue import SimpleQueue
 from typing import Any, Generic, Self, TypeVar
 
 Key = TypeVar("Key")
+Called = TypeVar("Called")
 Value = TypeVar("Value")
 
 IN_MEMORY = 8_000_000  # bytes of results
 MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
 
-class Distinct(Generic[Key, Value]):
+class Distinct(Generic[Key, Called, Value]):
     """One such series of calls.
 
     Args:
         pool: the threads.
         busy: how many calls are begun or wait for a thread at any time.
-        function: what to call; its results are pickled.
+        function: what to call.
         name: a short name of a key, which no other key has.
+        then: what to call with each result, in the thread that asks for them; what it returns is pickled.
     """
 
     def __init__(
-        self, pool: Executor, busy: int, function: Callable[[Key], Value], name: Callable[[Key], bytes]
+        self,
+        pool: Executor,
+        busy: int,
+        function: Callable[[Key], Called],
+        name: Callable[[Key], bytes],
+        then: Callable[[Called], Value],
     ) -> None:
-        self._pool, self._busy, self._function, self._name = pool, busy, function, name
+        self._pool, self._busy, self._function, self._name, self._then = pool, busy, function, name, then
         self._waiting: deque[bytes] = deque()
         self._running: set[bytes] = set()
-        self._ended: SimpleQueue[bytes] = SimpleQueue()
+        self._ended: SimpleQueue[tuple[bytes, tuple[Called] | None]] = SimpleQueue()
         self._failed: dict[bytes, BaseException] = {}
         self._unreadable: list[Exception] = []
 
@@ -47,7 +54,7 @@ class Distinct(Generic[Key, Value]):
         with Done() as done:
             while self._read(remaining, done):
                 if self._waiting[0] in self._running or not self._ended.empty():
-                    self._running.remove(self._ended.get())
+                    self._finish(*self._ended.get(), done)
                     continue
                 named = self._waiting.popleft()
                 if named in self._failed:
@@ -70,15 +77,25 @@ class Distinct(Generic[Key, Value]):
             self._waiting.append(named)
             if named not in done and named not in self._running:
                 self._running.add(named)
-                self._pool.submit(self._call, named, key, done)
+                self._pool.submit(self._call, named, key)
         return bool(self._waiting)
 
-    def _call(self, named: bytes, key: Key, done: Done) -> None:
+    def _call(self, named: bytes, key: Key) -> None:
         try:
-            done[named] = self._function(key)
+            result = self._function(key)
         except BaseException as error:  # noqa: BLE001 - thrown where the result is waited for
             self._failed[named] = error
-        self._ended.put(named)  # an interrupt of who waits for it leaves nothing locked
+            self._ended.put((named, None))
+        else:
+            self._ended.put((named, (result,)))  # an interrupt of who waits for it leaves nothing locked
+
+    def _finish(self, named: bytes, result: tuple[Called] | None, done: Done) -> None:
+        self._running.remove(named)
+        try:
+            if result is not None:
+                done[named] = self._then(*result)
+        except Exception as error:  # noqa: BLE001 - thrown where the result is waited for
+            self._failed[named] = error
 
 
 class Done:

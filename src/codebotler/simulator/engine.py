@@ -10,7 +10,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import ParamSpec, Self, TypeVar
+from typing import Any, ParamSpec, Self, TypeVar, overload
 
 from codebotler.arguments import expect_whole
 from codebotler.simulator.distinct import Distinct
@@ -29,6 +29,7 @@ NOT_LINUX = "programs are less isolated here: only Linux has a list of allowed s
 ON_WINDOWS = "programs are run on Linux and macOS only; on Windows, use this inside WSL"
 
 Key = TypeVar("Key")
+Called = TypeVar("Called")
 Value = TypeVar("Value")
 Arguments = ParamSpec("Arguments")
 
@@ -164,16 +165,37 @@ class Lanes:
         for lane in self._lanes:
             lane.forget()
 
+    @overload
     def map_distinct(
         self, function: Callable[[Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]
-    ) -> Iterator[Value]:
+    ) -> Iterator[Value]: ...
+
+    @overload
+    def map_distinct(
+        self,
+        function: Callable[[Key], Called],
+        keys: Iterable[Key],
+        *,
+        name: Callable[[Key], bytes],
+        then: Callable[[Called], Value],
+    ) -> Iterator[Value]: ...
+
+    def map_distinct(
+        self,
+        function: Callable[[Key], Any],
+        keys: Iterable[Key],
+        *,
+        name: Callable[[Key], bytes],
+        then: Callable[[Any], Any] = lambda result: result,
+    ) -> Iterator[Any]:
         """Like `map`, in threads, calling the function once for equal keys and reading ahead a little.
 
         While the next result is long in coming, more is read, so that the other threads have work.
 
         Args:
-            function: what to do; its results are pickled.
+            function: what to do.
             keys: what to do it to.
             name: a short name of a key, which no other key has.
+            then: what to make of each result, in the thread that asks for them; what it returns is pickled.
         """
-        return Distinct(self._pool, 8 * self.workers, function, name).results(keys)
+        return Distinct(self._pool, 8 * self.workers, function, name, then).results(keys)

@@ -175,12 +175,23 @@ def finds(request: str, label: str, matching: Matching) -> bool:
 @lru_cache(maxsize=4096)
 def whole_words(label: str) -> str:
     """A regex that finds another one as whole words, in the singular or the plural."""
-    return rf"(?<!\w)(?:{label})(?:e?s)?(?!\w)"
+    return rf"(?<!\w)(?:{_anchored(label)})(?:e?s)?(?!\w)"
 
 
 @lru_cache(maxsize=4096)
 def _pattern(label: str) -> re.Pattern[str]:
-    return re.compile(label, re.IGNORECASE | re.DOTALL)
+    return re.compile(_anchored(label), re.IGNORECASE | re.DOTALL)
+
+
+def _anchored(label: str) -> str:
+    """A label whose choices that begin with `.*` are tried at the start only, which takes linear time.
+
+    The same is found: such a choice that is found anywhere is found from the start.
+    """
+    return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
+
+
+_ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
 
 
 def is_called(person: Person, request: str, rules: Rules) -> bool:

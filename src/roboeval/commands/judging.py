@@ -61,6 +61,7 @@ def evaluate(
 ) -> None:
     """Say of every completion whether it does what was asked."""
     from roboeval.evaluation import Scope
+    from roboeval.records import how_many
     from roboeval.resume import evaluate_run
     from roboeval.run import Run, open_source, tasks_to_judge
     from roboeval.verdicts import evaluate as judge_all
@@ -97,6 +98,10 @@ def evaluate(
         raise SystemExit(STOPPED) from None
     if run is not None:
         tally.say_how_to_look(run.path, suite, ablated=ablation)
+    if (left_out := scope.total - tally.count) > 0:
+        again = "the same command tries again" if run is not None else "the others are judged as always"
+        note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
+        raise SystemExit(1)
 
 
 def show(
