@@ -30,7 +30,7 @@ class SharedLane(Lane):
         self.is_running = self.is_leaving = False
         super().__init__()
         start = self._preparer.start
-        self._preparer.start = lambda: lasting(start)
+        self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
     def run(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         """Run a program."""
