@@ -95,7 +95,10 @@ UNITS = (
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_functions_that_read_texts_take_linear_time(name: str) -> None:
     texts = [
-        Attack(prefix, unit, suffix) for prefix in ("", "a has b, 1") for unit in UNITS for suffix in SUFFIXES
+        Attack(prefix, unit, suffix)
+        for prefix in ("", "a has b, 1")
+        for unit in UNITS
+        for suffix in (*SUFFIXES, "x 2")
     ]
     assert slow(FUNCTIONS[name], texts) is None
 
