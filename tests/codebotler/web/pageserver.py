@@ -61,7 +61,7 @@ class PageServer:
     ) -> None:
         self.home = folder / "home"
         (folder / "world.yaml").write_text(world)
-        name, *words = [*serve, "--port", "0", *arguments]
+        name, words = serve[0], (*serve[1:], "--port", "0", *arguments)
         variables = {**os.environ, "CODEBOTLER_HOME": str(self.home), "NO_PROXY": "*"}
         self._said = folder / "said.txt"
         with self._said.open("w") as file:
