@@ -237,8 +237,7 @@ def driving(folder: Path, *wrapper: str) -> Process:
     [([signal.SIGINT], 130), ([signal.SIGINT] * 3, 130), ([signal.SIGTERM], 143), ([signal.SIGHUP], 129)],
 )
 def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: int) -> None:
-    begun_with_nohup = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN  # these tests, and what they start
-    process = driving(folder, *(["env", "--default-signal=HUP"] if begun_with_nohup else []))
+    process = driving(folder)
     with stopping(process):
         family = children_of(process.pid)
         for number in signals:

@@ -190,6 +190,7 @@ def become(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
         os.dup2(number, standard)
         os.close(number)
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # also where the tests were begun with nohup
     os.chdir(request["cwd"])
     os.environ.clear()
     os.environ.update(request["env"])
