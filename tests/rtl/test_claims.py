@@ -104,6 +104,7 @@ def test_of_several_things_each_has_its_own_number(
 TIMES = [
     ("12:00", [(0, 720)]),
     ("12 pm", [(720,)]),
+    ("1:15 PM", [(795,)]),
     ("lunch at noon", [(720,)]),
     ("1", [(60, 780)]),
     ("around one", [(60, 780)]),

@@ -14,10 +14,10 @@ from typing import Any, TypeVar
 import pytest
 
 from codebotler.badinput import BadInput
-from codebotler.models.base import BudgetSpentError, ModelError, Reply, Settings, Usage
+from codebotler.models.base import BudgetSpentError, Heard, ModelError, Reply, Settings, Usage, unheard
 from codebotler.models.open import open_model
 from codebotler.models.paced import Paced
-from codebotler.prompts import prompt_for
+from codebotler.prompts import Prompt, prompt_for
 from server import Fault, Request, Server
 
 T = TypeVar("T")
@@ -225,6 +225,27 @@ def test_spent_budget_stops_before_a_request(name: str, server: Server) -> None:
     assert (error.budget, error.used) == (5_000, paced.spent)
     assert error.sentence == f"the token budget of 5,000 is spent: {paced.spent:,} tokens are used"
     assert len(server.requests) == paced.requests == replies
+
+
+class HundredTokens:
+    """A model whose replies take a hundred tokens each."""
+
+    name = "hundred"
+
+    async def reply(self, _prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+        heard(str(number))
+        return Reply("", "", Usage(60, 40), 0.0, "stop")
+
+    async def close(self) -> None:
+        pass
+
+
+def test_budget_that_is_used_to_the_last_token_is_spent() -> None:
+    async def spending() -> tuple[int, BudgetSpentError]:
+        return await spend(Paced(HundredTokens(), token_budget=200))
+
+    replies, error = asyncio.run(spending())
+    assert (replies, error.used) == (2, 200)
 
 
 @both

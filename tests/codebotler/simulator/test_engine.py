@@ -19,7 +19,7 @@ import pytest
 from codebotler.simulator import isolated
 from codebotler.simulator.child import Child
 from codebotler.simulator.conversation import OVERRUN, Answer, Conversation
-from codebotler.simulator.engine import EngineError, Lanes, run
+from codebotler.simulator.engine import EngineError, Lanes, digest, run
 from codebotler.simulator.isolated import codes
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
@@ -94,6 +94,12 @@ def test_equal_pairs_are_run_once_and_have_equal_outcomes() -> None:
     outcomes = list(run(pairs * 30, workers=2, behaviours=doing(say)))
     assert [said(outcome) for outcome in outcomes] == [["a"], ["b"], ["a"], ["a"]] * 30
     assert sorted(ran) == ["elsewhere a", "start_loc a", "start_loc b"]
+
+
+def test_pairs_are_told_apart_wherever_one_text_ends_and_the_next_begins() -> None:
+    assert (
+        len({digest("say(1)", "23"), digest("say(1)2", "3"), digest("say(1)23"), digest("", "say(1)23")}) == 4
+    )
 
 
 def test_no_pairs_give_no_outcomes() -> None:
