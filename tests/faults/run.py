@@ -129,7 +129,7 @@ def faults_of(root: Path) -> list[Fault]:
     return [Fault(**entry) for entry in yaml.safe_load((root / FAULTS).read_text())]
 
 
-def complaints(faults: Sequence[Fault]) -> Iterator[str]:
+def complaints(faults: Sequence[Fault], tests_from: Path) -> Iterator[str]:
     """What is wrong with the list, each in a sentence that names the entry."""
     names = [fault.name for fault in faults]
     yield from (
@@ -145,6 +145,8 @@ def complaints(faults: Sequence[Fault]) -> Iterator[str]:
             yield f"{fault.name}: `new` is `old`"
         elif path.suffix == ".py" and not _parses(planted(path.read_text(), fault)):
             yield f"{fault.name}: with `new`, {fault.file} is no Python"
+        there = [test for test in fault.tests if not (tests_from / test.partition("::")[0]).exists()]
+        yield from (f"{fault.name}: there is no {test} in {tests_from}" for test in there)
 
 
 def planted(text: str, fault: Fault) -> str:
@@ -291,20 +293,6 @@ def _is_in(file: str, named: str) -> bool:
 # --- the command
 
 
-def chosen(names: Sequence[str]) -> list[Fault]:
-    """The faults of some names, or all.
-
-    Raises:
-        WrongError: there is no such fault, or one of the list does not fit the sources.
-    """
-    listed = faults_of(ROOT)
-    unknown = set(names) - {fault.name for fault in listed}
-    wrong = [*complaints(listed), *(f"{name}: there is no such fault" for name in sorted(unknown))]
-    if wrong:
-        raise WrongError("\n".join(wrong))
-    return [fault for fault in listed if not names or fault.name in names]
-
-
 def as_named_there(faults: Sequence[Fault], tests_from: Path) -> list[Fault]:
     """The same faults with the tests that another checkout names for them, where it does."""
     if not (tests_from / FAULTS).exists():
@@ -314,6 +302,23 @@ def as_named_there(faults: Sequence[Fault], tests_from: Path) -> list[Fault]:
         fault.model_copy(update={"tests": theirs[fault.name].tests}) if fault.name in theirs else fault
         for fault in faults
     ]
+
+
+def chosen(names: Sequence[str], tests_from: Path) -> list[Fault]:
+    """The faults of some names, or all.
+
+    Raises:
+        WrongError: there is no such fault, or one of the list does not fit.
+    """
+    listed = as_named_there(faults_of(ROOT), tests_from)
+    unknown = set(names) - {fault.name for fault in listed}
+    wrong = [
+        *complaints(listed, tests_from),
+        *(f"{name}: there is no such fault" for name in sorted(unknown)),
+    ]
+    if wrong:
+        raise WrongError("\n".join(wrong))
+    return [fault for fault in listed if not names or fault.name in names]
 
 
 def fates_of(runner: Runner, faults: Sequence[Fault], jobs: int, console: Console) -> list[Fate]:
@@ -364,9 +369,9 @@ def main() -> int:
     console = Console(width=None if sys.stdout.isatty() else 220)
     try:
         tests_from = arguments.tests_from.resolve()
-        faults = as_named_there(chosen(arguments.names), tests_from)
+        faults = chosen(arguments.names, tests_from)
         if arguments.check:
-            console.print(f"{len(faults)} faults fit the sources")
+            console.print(f"{len(faults)} faults fit the sources and the tests")
             return 0
         with tempfile.TemporaryDirectory(prefix="faults-") as folder:
             trees = [
