@@ -124,8 +124,8 @@ def test_an_absence_that_it_saw_counts_and_is_told_in_words(checks: Checks) -> N
     found = checks("go_to('kitchen')", "is_in_room('person')", "ask('person', 'Tea?', ['Yes', 'No'])")
     (problem,) = found.problems
     assert (problem.kind, problem.line, problem.where) == ("AskNoPerson", 4, 'nobody is in "kitchen"')
-    assert problem.sentence.startswith("line 4: AskNoPerson: nobody is in")
-    assert problem.sentence.endswith(', where nobody is in "kitchen"')
+    assert problem.sentence.startswith("line 4: AskNoPerson: ")
+    assert problem.sentence.endswith(problem.where)
     alone = [s.number for s in found.samples if 'nobody is in "kitchen"' in s.world]
     assert list(problem.samples) == alone
     assert 0 < len(alone) < 5
@@ -171,9 +171,8 @@ def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
 def test_a_line_is_blamed_once(checks: Checks) -> None:
     found = checks("say(a, b)", "go_to('lab'); say(c)")
     assert [(p.line, p.kind) for p in found.problems] == [(2, "NameError"), (3, "NameError")]
-    assert "the name a is not defined" in found.problems[0].message
-    assert "the name b is not defined" in found.problems[0].message
-    assert "there is no room" in found.problems[1].message
+    assert all(name in found.problems[0].message for name in (" a ", " b "))
+    assert '"lab"' in found.problems[1].message
 
 
 def test_a_program_that_does_not_parse_is_not_run(checks: Checks) -> None:
@@ -188,7 +187,7 @@ def test_a_program_without_a_task_is_told_so_once(lanes: Lanes) -> None:
 def test_the_closest_room_is_named(checks: Checks) -> None:
     for lines in (["go_to('alices office')"], ["for name in ['Alices']:", "    go_to(name + ' office')"]):
         (problem,) = checks(*lines).problems
-        assert problem.message.endswith('the closest is "alice\'s office"')
+        assert '"alice\'s office"' in problem.message
 
 
 # --- waiting and searching
@@ -222,7 +221,7 @@ def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None
     assert len(found.samples) == 5 + MORE
     (problem,) = found.problems
     assert (problem.kind, problem.line) == ("TimeoutError", 2)
-    assert "in each of 25 imagined worlds" in problem.message
+    assert "25 imagined worlds" in problem.message
 
 
 def test_who_computes_for_ever_does_not_wait(checks: Checks) -> None:
@@ -317,12 +316,12 @@ def test_where_the_robot_starts(lanes: Lanes) -> None:
     assert said(()) == "start_loc"
     assert said((), "hall") == "hall"
     assert check(source, start="hall", lanes=lanes).plan.start == "hall"
-    with pytest.raises(BadInput, match=r'^the robot starts in "hal", but the rooms are: lab, hall$'):
+    with pytest.raises(BadInput, match=r'"hal".* lab, hall$'):
         said(("lab", "hall"), "hal")
 
 
 def test_a_room_that_is_no_regex_is_refused(lanes: Lanes) -> None:
-    with pytest.raises(BadInput, match=r'the room "c\+\+ \(" is no valid regular expression'):
+    with pytest.raises(BadInput, match=r'"c\+\+ \("'):
         check(START + "pass", rooms=["c++ ("], lanes=lanes)
 
 

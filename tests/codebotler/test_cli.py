@@ -12,7 +12,7 @@ import pytest
 import command_line
 from codebotler.cli import app, obey
 from codebotler.terminal import busy
-from command_line import Ended, command
+from command_line import Ended, Refusal, command
 
 GOOD = """def task_program():
     go_to("kitchen")
@@ -35,7 +35,7 @@ def codebotler(*arguments: str | Path, given: str = "") -> Ended:
     return command("codebotler", *arguments, given=given, environment=wide)
 
 
-def refused(*arguments: str | Path, given: str = "") -> str:
+def refused(*arguments: str | Path, given: str = "") -> Refusal:
     return command_line.refused(*arguments, name="codebotler", given=given)
 
 
@@ -59,7 +59,7 @@ def test_the_version() -> None:
 
 
 def test_what_is_no_command_is_one_sentence() -> None:
-    assert refused("dance").startswith("no such command 'dance'")
+    assert "'dance'" in refused("dance").sentence
 
 
 # --- check
@@ -70,9 +70,9 @@ def test_an_accepted_program(files: Path) -> None:
     assert (status, err) == (0, "")
     first, ran, *rest = out.split("\n")
     assert first == f"accepted: no problem in {files / 'good.py'}"
-    assert ran == "run in 5 imagined worlds"
+    assert "5 imagined worlds" in ran
     assert rest[:3] == ["", 'rooms: "start_loc", "kitchen"', ""]
-    assert rest[3] == 'what the robot would do, where "mug" is in "kitchen"'
+    assert rest[3].endswith('"mug" is in "kitchen"')
     assert [line.split() for line in rest[4:6]] == [
         ["1", "start_loc", "→", "kitchen"],
         ["2", "looked", "for", '"mug":', "found"],
@@ -83,15 +83,12 @@ def test_an_accepted_program(files: Path) -> None:
 def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
     status, out, err = codebotler("check", files / "bad.py", "--world", files / "world.yaml")
     assert (status, err) == (1, "")
-    assert out.startswith(f"rejected: 2 problems in {files / 'bad.py'}\nit does the same in every world\n")
-    assert (
-        'line 2: GoToInvalidLocation: there is no room "kitchn"; the closest is "kitchen"\n'
-        "  1 | def task_program():\n"
-        '> 2 |     go_to("kitchn")\n'
-        "  3 |     say(mesage)\n"
-    ) in out
-    assert "line 3: NameError: the name mesage is not defined\n" in out
-    assert '"kitchn"  failed: there is no such room' in out
+    assert out.startswith(f"rejected: 2 problems in {files / 'bad.py'}\n")
+    assert "in every world" in out.splitlines()[1]
+    assert re.search(r'^line 2: GoToInvalidLocation: .*"kitchn".*"kitchen"$', out, re.MULTILINE)
+    assert '\n  1 | def task_program():\n> 2 |     go_to("kitchn")\n  3 |     say(mesage)\n' in out
+    assert re.search(r"^line 3: NameError: .*\bmesage\b", out, re.MULTILINE)
+    assert '"kitchn"  failed: ' in out
 
 
 def test_what_takes_long_says_that_it_goes_on(
@@ -106,9 +103,10 @@ def test_what_takes_long_says_that_it_goes_on(
 def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
     status, out, _ = codebotler("check", files / "bad.py")
     assert status == 1
-    assert 'rooms, taken from the program itself: "kitchn", "start_loc"\n' in out
+    guessed = re.search(r'^rooms, (.+): "kitchn", "start_loc"$', out, re.MULTILINE)
+    assert guessed is not None
     assert "--world FILE" in out
-    assert "taken from" not in codebotler("check", files / "good.py", "--world", files / "world.yaml")[1]
+    assert guessed[1] not in codebotler("check", files / "good.py", "--world", files / "world.yaml")[1]
 
 
 def test_json_for_machines(files: Path) -> None:
@@ -164,20 +162,24 @@ def test_lines_on_standard_input_are_counted_as_they_stand() -> None:
 
 
 def test_what_cannot_be_checked_is_refused_in_a_sentence(files: Path) -> None:
-    assert refused("check", files / "gone.py") == f"{files / 'gone.py'}: there is no such file"
-    assert refused("check", "fetch me a mug") == "fetch me a mug: there is no such file"
-    assert refused("check", files) == f"{files}: is a folder; name a file"
-    assert refused("check", "") == "nothing is named; name a file, or - for standard input"
-    assert refused("check", "-", given=" \n").startswith("standard input: nothing came")
+    for path, fault in ((files / "gone.py", "no such file"), (files, "a folder")):
+        refusal = refused("check", path)
+        assert refusal.at == (str(path), None)
+        assert fault in refusal.sentence
+    assert refused("check", "fetch me a mug").sentence.startswith("fetch me a mug: ")
+    assert "- for standard input" in refused("check", "").sentence
+    assert "standard input: " in refused("check", "-", given=" \n").sentence
     (files / "empty.py").write_text("\n")
-    assert refused("check", files / "empty.py") == f"{files / 'empty.py'}: there is no program in it"
+    refusal = refused("check", files / "empty.py")
+    assert refusal.at == (str(files / "empty.py"), None)
+    assert "no program" in refusal.sentence
     (files / "bytes.py").write_bytes(b"def \xff")
-    assert refused("check", files / "bytes.py").endswith("is no UTF-8 text; save it as UTF-8")
-    assert refused("check", files / "good.py", "--world", files / "no.yaml").endswith("there is no such file")
+    assert "UTF-8" in refused("check", files / "bytes.py").sentence
+    assert refused("check", files / "good.py", "--world", files / "no.yaml").file == str(files / "no.yaml")
     (files / "wrong.yaml").write_text("robot: hall\nrooms: [lab]\n")
-    sentence = refused("check", files / "good.py", "--world", files / "wrong.yaml")
-    assert sentence.startswith(f"{files / 'wrong.yaml'}, line 1: ")
-    assert "samples" in refused("check", files / "good.py", "--samples", "0")
+    refusal = refused("check", files / "good.py", "--world", files / "wrong.yaml")
+    assert refusal.at == (str(files / "wrong.yaml"), 1)
+    assert "samples" in refused("check", files / "good.py", "--samples", "0").sentence
 
 
 def test_what_a_terminal_would_obey_is_shown(files: Path) -> None:
@@ -194,6 +196,4 @@ def test_windows_is_told_of_wsl_with_the_platform_patched(
     with pytest.raises(SystemExit) as end:
         obey(app, "codebotler")
     assert end.value.code == 1
-    assert (
-        capsys.readouterr().err == "codebotler: this runs on Linux and macOS; on Windows, use it inside WSL\n"
-    )
+    assert re.fullmatch(r"codebotler: .*\bWSL\n", capsys.readouterr().err)

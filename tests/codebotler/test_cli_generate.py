@@ -2,13 +2,15 @@
 
 import json
 import os
+import re
 import shlex
 import sys
 from pathlib import Path
 
 import pytest
 
-from command_line import Ended, command, process
+import command_line
+from command_line import Ended, Refusal, command, process
 from roboeval.suite import Suite
 from server import Fault, Request, Server
 
@@ -27,6 +29,10 @@ def codebotler(*arguments: str | Path, cwd: Path | None = None, before: str = ""
         name, words = "codebotler", arguments
         return process(name, *words, cwd=cwd, before=before, after=after, environment=variables)
     return command("codebotler", *arguments, cwd=cwd, environment=variables)
+
+
+def refused(*arguments: str | Path, cwd: Path | None = None) -> Refusal:
+    return command_line.refused("generate", *arguments, name="codebotler", cwd=cwd)
 
 
 def instruction(suite: Suite) -> str:
@@ -56,21 +62,14 @@ def test_a_recorded_program_goes_through_a_pipe_into_the_check(tmp_path: Path, p
 
 
 def test_an_instruction_that_nobody_recorded() -> None:
-    ended = codebotler("generate", "Bring me the moon.")
-    assert (ended.status, ended.out) == (2, "")
-    assert ended.err.startswith(
-        'codebotler: recorded:careful has no program for "Bring me the moon."; the clos'
-    )
-    assert ended.err.count("\n") == 1
+    refusal = refused("Bring me the moon.")
+    assert "recorded:careful" in refusal.sentence
+    assert '"Bring me the moon."' in refusal.sentence
 
 
 @pytest.mark.parametrize("instruction", ["", "  \n"])
 def test_no_instruction(instruction: str) -> None:
-    assert codebotler("generate", instruction) == (
-        2,
-        "",
-        "codebotler: the instruction is empty; say what the robot is to do\n",
-    )
+    assert "instruction is empty" in refused(instruction).sentence
 
 
 def test_a_program_with_problems_is_printed_with_status_1(tmp_path: Path) -> None:
@@ -78,9 +77,8 @@ def test_a_program_with_problems_is_printed_with_status_1(tmp_path: Path) -> Non
         ended = written(server, cwd=tmp_path)
     assert ended.status == 1
     assert ended.out == "def task_program():\n    go_to('the moon')\n"
-    assert ended.err == (
-        'the program has a problem:\n  line 2: GoToInvalidLocation: there is no room "the moon"\n'
-    )
+    _, problem = ended.err.splitlines()
+    assert re.search(r'^  line 2: GoToInvalidLocation: .*"the moon"', problem)
     assert len(server.requests) == 1
 
 
@@ -89,11 +87,11 @@ def test_rejection_sampling_asks_again_and_records_both_attempts(tmp_path: Path)
         ended = written(server, "--retries", "3", "--record", "attempts.jsonl", cwd=tmp_path)
     assert ended.status == 0
     assert ended.out == "def task_program():\n    go_to('kitchen')\n"
-    assert ended.err.splitlines() == [
-        "attempt 1 of 4 has a problem:",
-        '  line 2: GoToInvalidLocation: there is no room "the moon"',
-        "attempt 2 of 4 is accepted",
-    ]
+    told = ended.err.splitlines()
+    assert re.match("attempt 1 of 4 .*problem", told[0])
+    assert re.match('  line 2: GoToInvalidLocation: .*"the moon"', told[1])
+    assert re.match("attempt 2 of 4 .*accepted", told[2])
+    assert len(told) == 3
     first, second = server.requests
     assert first.body["messages"] == second.body["messages"]
     assert "kitchen" in json.dumps(first.body["messages"][-1])
@@ -110,7 +108,7 @@ def test_a_repair_carries_the_program_and_the_problem_in_words(tmp_path: Path) -
     assert (ended.status, len(server.requests)) == (0, 2)
     said = json.dumps(server.requests[1].body["messages"][-2:])
     assert "go_to('the moon')" in said
-    assert "there is no room" in said
+    assert "GoToInvalidLocation" in said
     assert len(server.requests[1].body["messages"]) == len(server.requests[0].body["messages"]) + 2
 
 
@@ -118,7 +116,7 @@ def test_retries_end(tmp_path: Path) -> None:
     with Server(answer=lambda _: LOST) as server:
         ended = written(server, "--retries", "2", cwd=tmp_path)
     assert (ended.status, len(server.requests)) == (1, 3)
-    assert ended.err.splitlines()[-2].startswith("attempt 3 of 3 has a problem")
+    assert re.match("attempt 3 of 3 .*problem", ended.err.splitlines()[-2])
 
 
 def test_a_refused_key_is_one_sentence(tmp_path: Path) -> None:
@@ -142,44 +140,39 @@ def test_the_prompt_for_a_local_model_says_which_form_it_is() -> None:
     ended = codebotler("generate", "Go to the kitchen.", "--model", "hf:no/such", "--show-prompt")
     assert ended.status == 0
     assert ended.out.startswith("--- system\n")
-    assert ended.err == (
-        "these are the messages that hf:no/such gets if its tokenizer has a chat template; "
-        "without one it gets the text that --model completions:NAME shows\n"
-    )
+    assert "hf:no/such" in ended.err
+    assert "--model completions:NAME" in ended.err
 
 
 @pytest.mark.parametrize(
-    ("model", "sentence"),
+    ("model", "named"),
     [
-        ("nonsense", '"nonsense" names no model; write recorded, '),
-        ("hf:", '"hf:" names no model; write recorded, '),
-        ("recorded:lazy", 'there is no recorded model "recorded:lazy"; there are recorded:careful, '),
+        ("nonsense", ['"nonsense"', "recorded, "]),
+        ("hf:", ['"hf:"', "recorded, "]),
+        ("recorded:lazy", ['"recorded:lazy"', "recorded:careful, "]),
     ],
 )
-def test_no_prompt_is_shown_for_a_model_that_is_none(model: str, sentence: str) -> None:
-    ended = codebotler("generate", "Go to the kitchen.", "--model", model, "--show-prompt")
-    assert (ended.status, ended.out) == (2, "")
-    assert ended.err.startswith(f"codebotler: {sentence}")
-    assert ended.err.count("\n") == 1
+def test_no_prompt_is_shown_for_a_model_that_is_none(model: str, named: list[str]) -> None:
+    refusal = refused("Go to the kitchen.", "--model", model, "--show-prompt")
+    assert all(name in refusal.sentence for name in named), refusal
 
 
 def test_a_world_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text("rooms: 3\n")
-    ended = codebotler("generate", "Go.", "--world", "world.yaml", cwd=tmp_path)
-    assert (ended.status, ended.out) == (2, "")
-    assert ended.err.startswith("codebotler: world.yaml")
+    assert refused("Go.", "--world", "world.yaml", cwd=tmp_path).file == "world.yaml"
 
 
 def test_a_record_that_cannot_be_written(tmp_path: Path, paper: Suite) -> None:
-    ended = codebotler("generate", instruction(paper), "--record", "no/such/folder", cwd=tmp_path)
-    assert ended == (2, "", "codebotler: no/such/folder: No such file or directory\n")
+    refusal = refused(instruction(paper), "--record", "no/such/folder", cwd=tmp_path)
+    assert refusal.at == ("no/such/folder", None)
+    assert "No such file or directory" in refusal.sentence
 
 
 def test_a_record_is_added_to_no_file_of_other_things(tmp_path: Path, paper: Suite) -> None:
     (tmp_path / "first.py").write_text("def task_program(): ...\n")
-    ended = codebotler("generate", instruction(paper), "--record", "first.py", cwd=tmp_path)
-    sentence = "first.py: this file holds something else; name another one, or remove it"
-    assert ended == (2, "", f"codebotler: {sentence}\n")
+    refusal = refused(instruction(paper), "--record", "first.py", cwd=tmp_path)
+    assert refusal.at == ("first.py", None)
+    assert "something else" in refusal.sentence
     assert (tmp_path / "first.py").read_text() == "def task_program(): ...\n"
 
 
@@ -188,10 +181,9 @@ def test_a_full_disk_under_the_record_is_told_and_costs_no_program(tmp_path: Pat
         ended = written(server, "--retries", "3", "--record", "/dev/full", cwd=tmp_path)
     assert ended.status == 1
     assert ended.out == "def task_program():\n    go_to('kitchen')\n"
-    assert ended.err.splitlines()[-2:] == [
-        "attempt 2 of 4 is accepted",
-        "codebotler: /dev/full: No space left on device; make room and give the same command again",
-    ]
+    accepted, full = ended.err.splitlines()[-2:]
+    assert re.match("attempt 2 of 4 .*accepted", accepted)
+    assert full.startswith("codebotler: /dev/full: No space left on device; ")
 
 
 def test_a_record_that_does_not_fit_keeps_only_whole_lines(tmp_path: Path, paper: Suite) -> None:

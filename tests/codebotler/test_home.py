@@ -25,8 +25,9 @@ def test_a_folder_in_which_nothing_can_be_written_is_said() -> None:
         user = os.geteuid()
         os.seteuid(user or NOBODY)  # root may write everywhere
         try:
-            with pytest.raises(BadInput, match="nothing can be written into this folder; name another by"):
+            with pytest.raises(BadInput, match="CODEBOTLER_HOME") as error:
                 make_folder(folder)
+            assert error.value.file == folder
         finally:
             os.seteuid(user)
             folder.chmod(0o755)

@@ -63,14 +63,14 @@ def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(module, "MOST_IN_ALL", 2 * len(JPEG))
     mission, lines = mission_with(tmp_path, b"<svg onload=alert(1)>", b"", JPEG + b"!" * 20, JPEG, JPEG, JPEG)
     assert mission.state is State.DONE
-    assert [line.get("file") or line["text"] for line in lines] == [
-        "a picture was not kept: its 21 bytes are neither JPEG nor PNG",
-        "a picture was not kept: its 0 bytes are neither JPEG nor PNG",
-        "a picture was not kept: it has 32 bytes, and 20 are the most",
-        "pictures/1.jpg",
-        "pictures/2.jpg",
-        "a picture was not kept: a mission keeps 24 bytes of them at most",
-    ]
+    kept = [line.get("file") or line["text"] for line in lines]
+    assert kept[3:5] == ["pictures/1.jpg", "pictures/2.jpg"]
+    for text, named in zip(
+        [*kept[:3], *kept[5:]],
+        [["21 bytes", "JPEG nor PNG"], ["0 bytes", "JPEG nor PNG"], ["32 bytes", "20"], ["24 bytes"]],
+        strict=True,
+    ):
+        assert all(name in text for name in ["picture", "not kept", *named]), text
     assert str(told(lines[0])) == lines[0]["text"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import time
 from collections.abc import Callable
@@ -32,22 +33,16 @@ def knowing(rooms: object, here: object = "") -> Callable[[str, str], Result]:
 
 
 @pytest.mark.parametrize(
-    ("rooms", "here", "sentence"),
+    ("rooms", "here", "named"),
     [
-        (
-            [1, None, {}],
-            "hall",
-            r"which rooms it knows: .* answers get_all_rooms with \[1, None, {}\], no list\[str\]",
-        ),
-        ("hall", "hall", r"which rooms it knows: .* answers get_all_rooms with 'hall', no list\[str\]"),
-        (["hall"], ["hall"], r"where it is: the robot answers get_current_location with \['hall'\], no str"),
-        (["hall"], None, r"where it is: the robot answers get_current_location with None, no str"),
+        ([1, None, {}], "hall", r"get_all_rooms .*\[1, None, {}\], .*list\[str\]"),
+        ("hall", "hall", r"get_all_rooms .*'hall', .*list\[str\]"),
+        (["hall"], ["hall"], r"get_current_location .*\['hall'\], .*str"),
+        (["hall"], None, r"get_current_location .*None, .*str"),
     ],
 )
-def test_answer_that_is_none_is_said_before_the_robot_moves(
-    rooms: object, here: object, sentence: str
-) -> None:
-    with pytest.raises(NotReadyError, match=f"the robot does not say {sentence}"):
+def test_answer_that_is_none_is_said_before_the_robot_moves(rooms: object, here: object, named: str) -> None:
+    with pytest.raises(NotReadyError, match=named):
         preflight(Answering(knowing(rooms, here)))
 
 
@@ -62,11 +57,11 @@ def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
     plan, place = preflight(Answering(answers))
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab"), "hall", "")
-    assert capsys.readouterr().err == "the robot does not say where it is: not localised\n"
+    assert re.fullmatch(r"[^\n]*where it is\b[^\n]*: not localised\n", capsys.readouterr().err)
 
 
 def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
-    with pytest.raises(NotReadyError, match="does not say which rooms it knows: somebody stopped it"):
+    with pytest.raises(NotReadyError, match=r"rooms .*stopped"):
         preflight(Answering(raising(CancelledError())))
 
 
@@ -126,16 +121,16 @@ def test_check_and_model_see_the_robots_own_words(capsys: pytest.CaptureFixture[
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", LAB), LAB, LAB)
     assert check(TO_THE_LAB, plan=plan).problems == ()
-    assert unknown_rooms('def task_program():\n    go_to("lab (2nd flor)")\n', plan) == [
-        f'there is no room "lab (2nd flor)"; the closest is "{LAB}"'
-    ]
+    (unknown,) = unknown_rooms('def task_program():\n    go_to("lab (2nd flor)")\n', plan)
+    assert '"lab (2nd flor)"' in unknown
+    assert f'"{LAB}"' in unknown
     model = Writing(TO_THE_LAB)
     assert written(model, "go to the lab", plan) == TO_THE_LAB
     assert f"hall, {LAB}" in model.asked[0].text
     assert f"hall, {LAB}" in model.asked[0].messages[-1].text
     assert capsys.readouterr().err == ""
     written(Writing('def task_program():\n    go_to("cellar")\n'), "go down", plan)
-    assert 'there is no room "cellar"' in capsys.readouterr().err
+    assert '"cellar"' in capsys.readouterr().err
 
 
 def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
@@ -152,7 +147,7 @@ def test_robot_is_where_it_says_even_if_it_does_not_list_that_room(
     plan, place = preflight(Answering(knowing(["hall", "lab"], "dock")))
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab", "dock"), "dock", "dock")
-    assert 'it is in "dock", which is none of the rooms' in capsys.readouterr().err
+    assert '"dock"' in capsys.readouterr().err
     starts_there = 'def task_program():\n    if get_current_location() != "dock":\n        raise ValueError\n'
     assert check(starts_there, plan=plan).problems == ()
 
@@ -168,7 +163,7 @@ def test_more_rooms_than_a_check_takes_are_said(capsys: pytest.CaptureFixture[st
     began = time.monotonic()
     assert preflight(Answering(knowing(rooms, rooms[7]))) == (None, rooms[7])
     assert time.monotonic() - began < 2, "that is no more than a look at each"
-    assert "the robot knows 100,000 rooms, and a check takes 1,000 at most" in capsys.readouterr().err
+    assert re.search(r"\b100,000 rooms\b.*\b1,000\b", capsys.readouterr().err)
     plan, _ = preflight(Answering(knowing(rooms[:1_000], rooms[7])))
     assert plan is not None
     assert len(plan.rooms) == 1_000

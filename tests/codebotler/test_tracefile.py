@@ -62,66 +62,48 @@ GOOD = "status: robot-error\nerror: {kind: K, message: m}\nline: 3\ntrace:\n- [g
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("old", "new", "line", "named"),
     [
-        ("robot-error", "tired", "line 1: \"status\" is 'tired', but it should be 'finished'"),
-        ("status: robot-error\n", "", 'line 1: the key "status" is missing'),
-        ("error: {kind: K, message: m}\n", "", "an outcome has an error exactly when it is not finished"),
-        ("robot-error", "finished", "an outcome has an error exactly when it is not finished"),
-        ("kind: K", "kind: 3", 'line 2: "kind" is a number, not a text'),
-        ("line: 3", "line: 0", 'line 3: "line" is 0, but it should be greater than or equal to 1'),
-        ("line: 3", "place: lab", 'line 3: the key "place" means nothing here'),
-        ("[say, hi]", "[say]", "line 6: ['say'] is no element of a trace; write [say, text], with texts"),
-        (
-            "[say, hi]",
-            "[say, 3]",
-            "line 6: ['say', 3] is no element of a trace; write [say, text], with texts",
-        ),
-        (
-            "[say, hi]",
-            "[say, q, [a], b]",
-            "line 6: ['say', 'q', ['a'], 'b'] is no element of a trace; write [say,",
-        ),
-        (
-            "[say, hi]",
-            "[say, hi, true]",
-            "line 6: ['say', 'hi', True] is no element of a trace; write [say, text]",
-        ),
-        ("[say, hi]", "[check, hi, 1]", "is no element of a trace; write [check, text, true or false]"),
-        (
-            "[say, hi]",
-            "[ask, q]",
-            "write [ask, question, [option, ...], answer or null], with texts in quotes",
-        ),
-        ("[say, hi]", "[ask, q, yes, a]", "write [ask, question, [option, ...], answer or null], with texts"),
-        ("[say, hi]", "[ask, q, [a], b]", 'line 6: "b" is no option of the question "q"; correct the answer'),
-        ("[say, hi]", "[ask, q, [3], a]", "line 6: 3 is no option"),
-        (
-            "[say, hi]",
-            "[wave, kim]",
-            'line 6: "wave" is no kind of event; write one of check, goto, ask, say, pick, place',
-        ),
-        ("[say, hi]", "say hi", "line 6: 'say hi' is no element of a trace; write [kind, text, ...]"),
-        ("[say, hi]", "{say: hi}", "line 6: {'say': 'hi'} is no element of a trace; write [kind, text, ...]"),
+        ("robot-error", "tired", 1, ['"status"', "'tired'", "'finished'"]),
+        ("status: robot-error\n", "", 1, ['"status"', "missing"]),
+        ("error: {kind: K, message: m}\n", "", 1, ["error", "not finished"]),
+        ("robot-error", "finished", 1, ["error", "not finished"]),
+        ("kind: K", "kind: 3", 2, ['"kind"', "a number", "a text"]),
+        ("line: 3", "line: 0", 3, ['"line"', " 0,", " 1"]),
+        ("line: 3", "place: lab", 3, ['"place"']),
+        ("[say, hi]", "[say]", 6, ["['say']", "[say, text]"]),
+        ("[say, hi]", "[say, 3]", 6, ["['say', 3]", "[say, text]"]),
+        ("[say, hi]", "[say, q, [a], b]", 6, ["['say', 'q', ['a'], 'b']", "[say, text]"]),
+        ("[say, hi]", "[say, hi, true]", 6, ["['say', 'hi', True]", "[say, text]"]),
+        ("[say, hi]", "[check, hi, 1]", 6, ["[check, text, true or false]"]),
+        ("[say, hi]", "[ask, q]", 6, ["[ask, question, [option, ...], answer or null]"]),
+        ("[say, hi]", "[ask, q, yes, a]", 6, ["[ask, question, [option, ...], answer or null]"]),
+        ("[say, hi]", "[ask, q, [a], b]", 6, ['"b"', '"q"']),
+        ("[say, hi]", "[ask, q, [3], a]", 6, ["3 is no option"]),
+        ("[say, hi]", "[wave, kim]", 6, ['"wave"', "check, goto, ask, say, pick, place"]),
+        ("[say, hi]", "say hi", 6, ["'say hi'", "[kind, text, ...]"]),
+        ("[say, hi]", "{say: hi}", 6, ["{'say': 'hi'}", "[kind, text, ...]"]),
     ],
 )
-def test_a_wrong_file_gets_a_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+def test_a_wrong_file_gets_a_sentence(
+    tmp_path: Path, old: str, new: str, line: int, named: list[str]
+) -> None:
     assert old in GOOD
     path = tmp_path / "o.yaml"
     path.write_text(GOOD.replace(old, new))
     with pytest.raises(BadInput) as caught:
         read_outcome(path)
-    assert sentence in str(caught.value)
-    assert str(caught.value).startswith(str(path))
+    assert (caught.value.file, caught.value.line) == (path, line)
+    assert all(name in caught.value.sentence for name in named), caught.value
     assert "\n" not in str(caught.value)
 
 
 def test_events_of_further_skills_are_read_where_they_may_stand() -> None:
     data = [["wave", "kim"], ["smell", "tea", True], ["vote", "q", ["a"], "a"], ["say", "hi"]]
     assert trace_data(trace_from(data, further=True)) == data
-    with pytest.raises(BadInput, match=r'^"wave" is no kind of event; write one of check, goto, ask, say, '):
+    with pytest.raises(BadInput, match=r'"wave" .*check, goto, ask, say, '):
         trace_from(data)
-    with pytest.raises(BadInput, match=r"^\['wave', 3\] is no element of a trace$"):
+    with pytest.raises(BadInput, match=r"\['wave', 3\]"):
         trace_from([["wave", 3]], further=True)
-    with pytest.raises(BadInput, match=r"^\['ask', 'q'\] is no element of a trace; write \[ask, question, "):
+    with pytest.raises(BadInput, match=r"\['ask', 'q'\] .*\[ask, question, "):
         trace_from([["ask", "q"]], further=True)

@@ -56,7 +56,7 @@ def test_a_point_on_a_slanted_edge_is_within(shift: float) -> None:
     ends = shift, shift + 0.7
     assert read(room.format(*ends, shift + 0.7 / 3, 0.1)).rooms[0].stand_at
     assert read(room.format(*ends, shift + 0.7, 0.3)).rooms[0].stand_at
-    with pytest.raises(BadInput, match="outside of the footprint"):
+    with pytest.raises(BadInput, match="outside"):
         read(room.format(*ends, shift + 0.7 / 3 + 0.001, 0.1))
 
 
@@ -64,150 +64,120 @@ def test_only_the_rooms_and_the_start_are_needed() -> None:
     assert read("robot: a\nrooms: [a]\n") == World((Room("a"),), "a", about="", may_wait_forever=False)
 
 
-WORD = 'w.yaml, line {}: {} is a truth value, not a text; put quotes around it ("{}")'
-KEY = 'w.yaml, line {}: the key "{}" means nothing here; remove it or correct its spelling'
-REGEX = 'w.yaml, line {}: "{}" is no valid regular expression: {}'
+def word(name: str, quoted: str) -> list[str]:
+    return [name, "truth value", f'("{quoted}")']
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "line", "named"),
     [
-        (GOOD + "robots: 3\n", KEY.format(5, "robots")),
-        ("rooms: [hall]\n", 'w.yaml, line 1: the key "robot" is missing'),
-        ("about: x\nrobot: hall\n", 'w.yaml, line 1: the key "rooms" is missing'),
-        (
-            "robot: 3\nrooms: [hall]\n",
-            'w.yaml, line 1: "robot" is a number, not a text; put quotes around it',
-        ),
-        ("robot:\nrooms: [hall]\n", 'w.yaml, line 1: "robot" is empty; fill it in or remove it'),
-        ("rooms: [hall]\nrobot: [hall]\n", 'w.yaml, line 2: "robot" is a list, not a text'),
-        ("robot: ''\nrooms: [hall]\n", 'w.yaml, line 1: "robot" is empty; write a text'),
-        (GOOD + "about: no\n", WORD.format(5, '"about"', "no")),
-        ("robot: yes\nrooms: [hall]\n", WORD.format(1, '"robot"', "yes")),
-        ("robot: hall\nrooms: hall\n", 'w.yaml, line 2: "rooms" is a text, not a list'),
-        ("robot: hall\nrooms: {hall: 1}\n", 'w.yaml, line 2: "rooms" is a mapping, not a list'),
-        ("robot: hall\nrooms: []\n", 'w.yaml, line 2: "rooms" has too few entries; it needs at least 1'),
-        (GOOD + "  - on\n", WORD.format(5, "this entry", "yes")),
-        (GOOD + "  - 12\n", "w.yaml, line 5: this entry is a number, not a text; put quotes around it"),
-        (GOOD + "  -\n", "w.yaml, line 5: this entry is empty; fill it in or remove it"),
-        (GOOD + "  - ''\n", "w.yaml, line 5: this entry is empty; write a text"),
-        (GOOD + "  - [a, b]\n", "w.yaml, line 5: this entry is a list, not a text"),
-        (GOOD + "  - {name: a, colour: red}\n", KEY.format(5, "colour")),
-        (GOOD + "  - {stand_at: [1, 2]}\n", 'w.yaml, line 5: the key "name" is missing'),
-        (GOOD + "  - {name: no}\n", WORD.format(5, '"name"', "no")),
+        (GOOD + "robots: 3\n", 5, ['"robots"']),
+        ("rooms: [hall]\n", 1, ['"robot"', "missing"]),
+        ("about: x\nrobot: hall\n", 1, ['"rooms"', "missing"]),
+        ("robot: 3\nrooms: [hall]\n", 1, ['"robot"', "a number", "a text", "quotes"]),
+        ("robot:\nrooms: [hall]\n", 1, ['"robot"', "empty"]),
+        ("rooms: [hall]\nrobot: [hall]\n", 2, ['"robot"', "a list", "a text"]),
+        ("robot: ''\nrooms: [hall]\n", 1, ['"robot"', "empty", "a text"]),
+        (GOOD + "about: no\n", 5, word('"about"', "no")),
+        ("robot: yes\nrooms: [hall]\n", 1, word('"robot"', "yes")),
+        ("robot: hall\nrooms: hall\n", 2, ['"rooms"', "a text", "a list"]),
+        ("robot: hall\nrooms: {hall: 1}\n", 2, ['"rooms"', "a mapping", "a list"]),
+        ("robot: hall\nrooms: []\n", 2, ['"rooms"', "too few", "1"]),
+        (GOOD + "  - on\n", 5, word("this entry", "yes")),
+        (GOOD + "  - 12\n", 5, ["this entry", "a number", "a text", "quotes"]),
+        (GOOD + "  -\n", 5, ["this entry", "empty"]),
+        (GOOD + "  - ''\n", 5, ["this entry", "empty", "a text"]),
+        (GOOD + "  - [a, b]\n", 5, ["this entry", "a list", "a text"]),
+        (GOOD + "  - {name: a, colour: red}\n", 5, ['"colour"']),
+        (GOOD + "  - {stand_at: [1, 2]}\n", 5, ['"name"', "missing"]),
+        (GOOD + "  - {name: no}\n", 5, word('"name"', "no")),
         (
             GOOD + "  - name: a\n    footprint: [[0, 0], [1, 0]]\n",
-            'w.yaml, line 6: "footprint" has too few entries; it needs at least 3',
+            6,
+            ['"footprint"', "too few", "3"],
         ),
         (
             GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, 0, 2]\n      - [1, 1]\n",
-            "w.yaml, line 8: this entry has too many entries; it takes 2",
+            8,
+            ["this entry", "too many", "2"],
         ),
         (
             GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, 0]\n      - [1]\n",
-            "w.yaml, line 9: this entry has too few values; it needs at least 2",
+            9,
+            ["this entry", "too few", "2"],
         ),
         (
             GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, b]\n      - [1, 1]\n",
-            "w.yaml, line 8: this entry is a text, not a number",
+            8,
+            ["this entry", "a text", "a number"],
         ),
-        (GOOD + "  - name: a\n    footprint: big\n", 'w.yaml, line 6: "footprint" is a text, not a list'),
-        (GOOD + "  - {name: a, stand_at: [1, .nan]}\n", "w.yaml, line 5: this entry is no finite number"),
-        (GOOD + "  - {name: a, stand_at: [-.inf, 1]}\n", "w.yaml, line 5: this entry is no finite number"),
-        (
-            GOOD + "  - {name: a, stand_at: [1.0e+300, 1]}\n",
-            "w.yaml, line 5: this entry is 1e+300, but it should be less than or equal to 1000000",
-        ),
+        (GOOD + "  - name: a\n    footprint: big\n", 6, ['"footprint"', "a text", "a list"]),
+        (GOOD + "  - {name: a, stand_at: [1, .nan]}\n", 5, ["this entry", "finite"]),
+        (GOOD + "  - {name: a, stand_at: [-.inf, 1]}\n", 5, ["this entry", "finite"]),
+        (GOOD + "  - {name: a, stand_at: [1.0e+300, 1]}\n", 5, ["this entry", "1e+300", "1000000"]),
         (
             GOOD + f"  - {{name: a, stand_at: [1, {'7' * 400}]}}\n",
-            (
-                f'w.yaml, line 5: "{"7" * 20} ... {"7" * 20}" is too large a number; '
-                "write a smaller one, or put quotes around a text"
-            ),
+            5,
+            [f'"{"7" * 20} ... {"7" * 20}"', "too large"],
         ),
         (
             GOOD + "  - name: a\n    footprint: [[0, 0], [4, 0], [4, 3], [0, 3]]\n    stand_at: [4.5, 1]\n",
-            'w.yaml, line 7: the robot would stand at (4.5, 1), outside of the footprint of "a"; move one',
+            7,
+            ["(4.5, 1)", '"a"'],
         ),
-        ("robot: hall\nrooms: !!set {hall}\n", 'w.yaml, line 2: the tag "set" is not supported; remove it'),
-        (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", "w.yaml, line 5: this entry is a text, not a number"),
-        (GOOD + "  - hall\n", 'w.yaml, line 5: the room "hall" stands here twice; remove one'),
-        (GOOD + "  - {name: lab}\n", 'w.yaml, line 5: the room "lab" stands here twice; remove one'),
-        (
-            "rooms: [hall, lab]\nrobot: attic\n",
-            'w.yaml, line 2: the robot starts in "attic", but the rooms are: hall, lab',
-        ),
-        (GOOD + "objects: [mug]\n", 'w.yaml, line 5: "objects" is a list, not a mapping of keys to values'),
-        (GOOD + "objects:\n", 'w.yaml, line 5: "objects" is empty; fill it in or remove it'),
-        (GOOD + "objects:\n  lab: mug\n", 'w.yaml, line 6: "lab" is a text, not a list'),
-        (GOOD + "objects:\n  lab:\n    - mug\n    - no\n", WORD.format(8, "this entry", "no")),
-        (
-            GOOD + "objects:\n  lab:\n    - mug\n    - ''\n",
-            "w.yaml, line 8: this entry is empty; write a text",
-        ),
-        (
-            GOOD + "objects:\n  lab: [mug]\n  attic: [mug]\n",
-            'w.yaml, line 7: there are objects in "attic", but the rooms are: hall, lab',
-        ),
+        ("robot: hall\nrooms: !!set {hall}\n", 2, ['tag "set"']),
+        (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", 5, ["this entry", "a text", "a number"]),
+        (GOOD + "  - hall\n", 5, ['"hall"', "twice"]),
+        (GOOD + "  - {name: lab}\n", 5, ['"lab"', "twice"]),
+        ("rooms: [hall, lab]\nrobot: attic\n", 2, ["robot", '"attic"', "hall, lab"]),
+        (GOOD + "objects: [mug]\n", 5, ['"objects"', "a list", "a mapping"]),
+        (GOOD + "objects:\n", 5, ['"objects"', "empty"]),
+        (GOOD + "objects:\n  lab: mug\n", 6, ['"lab"', "a text", "a list"]),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - no\n", 8, word("this entry", "no")),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - ''\n", 8, ["this entry", "empty", "a text"]),
+        (GOOD + "objects:\n  lab: [mug]\n  attic: [mug]\n", 7, ["objects", '"attic"', "hall, lab"]),
         (
             GOOD + "people:\n  lab: [{name: a}]\n  attic: [{name: b}]\n",
-            'w.yaml, line 7: there are people in "attic", but the rooms are: hall, lab',
+            7,
+            ["people", '"attic"', "hall, lab"],
         ),
-        (
-            GOOD + "people:\n  lab:\n    - alice\n",
-            "w.yaml, line 7: this entry is a text, not a mapping of keys to values",
-        ),
-        (GOOD + "people:\n  lab: {name: a}\n", 'w.yaml, line 6: "lab" is a mapping, not a list'),
-        (GOOD + "people:\n  lab:\n    - answers: [tea]\n", 'w.yaml, line 7: the key "name" is missing'),
-        (GOOD + "people:\n  lab:\n    - name: a\n      answer: b\n", KEY.format(8, "answer")),
+        (GOOD + "people:\n  lab:\n    - alice\n", 7, ["this entry", "a text", "a mapping"]),
+        (GOOD + "people:\n  lab: {name: a}\n", 6, ['"lab"', "a mapping", "a list"]),
+        (GOOD + "people:\n  lab:\n    - answers: [tea]\n", 7, ['"name"', "missing"]),
+        (GOOD + "people:\n  lab:\n    - name: a\n      answer: b\n", 8, ['"answer"']),
         (
             GOOD + "people:\n  lab:\n    - name: a\n      answers:\n        - tea\n        - yes\n",
-            WORD.format(10, "this entry", "yes"),
+            10,
+            word("this entry", "yes"),
         ),
         (
             GOOD + "people:\n  lab:\n    - name: a\n      answers: tea\n",
-            'w.yaml, line 8: "answers" is a text, not a list',
+            8,
+            ['"answers"', "a text", "a list"],
         ),
-        (
-            GOOD + "may_wait_forever: 'yes'\n",
-            'w.yaml, line 5: "may_wait_forever" is a text, not true or false',
-        ),
-        (
-            GOOD + "may_wait_forever: 1\n",
-            'w.yaml, line 5: "may_wait_forever" is a number, not true or false',
-        ),
-        (
-            GOOD + "  - lab (3\n",
-            REGEX.format(5, "lab (3", "missing ), unterminated subpattern at position 4"),
-        ),
-        (
-            GOOD + "objects:\n  lab:\n    - mug\n    - '*'\n",
-            REGEX.format(8, "*", "nothing to repeat at position 0"),
-        ),
-        (
-            GOOD + "people:\n  lab:\n    - name: '*'\n",
-            REGEX.format(7, "*", "nothing to repeat at position 0"),
-        ),
+        (GOOD + "may_wait_forever: 'yes'\n", 5, ['"may_wait_forever"', "a text", "true or false"]),
+        (GOOD + "may_wait_forever: 1\n", 5, ['"may_wait_forever"', "a number", "true or false"]),
+        (GOOD + "  - lab (3\n", 5, ['"lab (3"', "missing ), unterminated subpattern at position 4"]),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - '*'\n", 8, ['"*"', "nothing to repeat"]),
+        (GOOD + "people:\n  lab:\n    - name: '*'\n", 7, ['"*"', "nothing to repeat"]),
         (
             GOOD + "people:\n  lab:\n    - name: a\n      answers:\n        - tea\n        - '[a'\n",
-            REGEX.format(10, "[a", "unterminated character set at position 0"),
+            10,
+            ['"[a"', "unterminated character set"],
         ),
-        (
-            GOOD + "objects:\n  lab: ['a{9999999999999}']\n",
-            REGEX.format(6, "a{9999999999999}", "the repetition number is too large"),
-        ),
-        ("", "w.yaml: the file is empty; fill it in or remove it"),
-        ("- hall\n", "w.yaml, line 1: the file is a list, not a mapping of keys to values"),
-        (
-            GOOD + "objects:\n  lab: [a]\n  lab: [b]\n",
-            'w.yaml, line 7: the key "lab" stands here a second time; keep one of them',
-        ),
+        (GOOD + "objects:\n  lab: ['a{9999999999999}']\n", 6, ['"a{9999999999999}"', "too large"]),
+        ("", None, ["the file", "empty"]),
+        ("- hall\n", 1, ["the file", "a list", "a mapping"]),
+        (GOOD + "objects:\n  lab: [a]\n  lab: [b]\n", 7, ['"lab"', "second time"]),
     ],
 )
-def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(text: str, sentence: str) -> None:
+def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(
+    text: str, line: int | None, named: list[str]
+) -> None:
     with pytest.raises(BadInput) as caught:
         read(text)
-    assert str(caught.value) == sentence
+    assert (caught.value.file, caught.value.line) == ("w.yaml", line)
+    assert all(name in caught.value.sentence for name in named), caught.value
 
 
 @pytest.mark.parametrize(
@@ -232,15 +202,16 @@ def test_the_robot_stands_within_a_room_of_any_shape(point: tuple[float, float],
     if is_within:
         assert read(text).rooms[0].stand_at == point
     else:
-        with pytest.raises(BadInput, match="outside of the footprint"):
+        with pytest.raises(BadInput, match="outside"):
             read(text)
 
 
 def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "w.yaml"
     path.write_text("robot: attic\nrooms: [hall]\n", encoding="utf-8")
-    with pytest.raises(BadInput, match=re.escape(f"{path}, line 1: the robot starts in")):
+    with pytest.raises(BadInput, match='"attic"') as error:
         World.read(path)
+    assert (error.value.file, error.value.line) == (path, 1)
 
 
 def is_regex(text: str) -> bool:

@@ -10,8 +10,9 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import pytest
 
@@ -21,6 +22,7 @@ from roboeval.cli import main as roboeval_main
 MAINS = {"codebotler": codebotler_main, "roboeval": roboeval_main}
 ENVIRONMENT = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
 PROGRESS = re.compile(r"^(?:[a-z]+: [\d,]+( of [\d,]+)?(, .*)?|[\w .:-]+ \.\.\.)\n", re.MULTILINE)
+PLACE = re.compile(r"(?P<of>[^:]+), line (?P<line>\d+): |(?P<file>[^\s:]+): ")
 
 
 class Ended(NamedTuple):
@@ -29,6 +31,32 @@ class Ended(NamedTuple):
     status: int
     out: str
     err: str
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """What a command says of what it cannot use: a sentence, behind the file and line it is about."""
+
+    sentence: str
+    file: str | None = None
+    line: int | None = None
+
+    @classmethod
+    def parsed(cls, text: str) -> Self:
+        """Of a text such as `a.jsonl, line 2: this line is no JSON`."""
+        if not (found := PLACE.match(text)):
+            return cls(text)
+        return cls(text[found.end() :], found["of"] or found["file"], int(found["line"] or 0) or None)
+
+    @property
+    def at(self) -> tuple[str | None, int | None]:
+        """The file and the line."""
+        return self.file, self.line
+
+    @property
+    def commands(self) -> list[str]:
+        """What it names in backquotes."""
+        return re.findall("`([^`]+)`", self.sentence)
 
 
 def roboeval(
@@ -45,14 +73,16 @@ def roboeval(
     return command("roboeval", *arguments, cwd=cwd, environment=environment)
 
 
-def refused(*arguments: str | Path, name: str = "roboeval", cwd: Path | None = None, given: str = "") -> str:
+def refused(
+    *arguments: str | Path, name: str = "roboeval", cwd: Path | None = None, given: str = ""
+) -> Refusal:
     """The one sentence with which a command refuses; nothing but it is printed."""
     ended = command(name, *arguments, cwd=cwd, given=given)
     assert ended.status == 2, ended
     assert ended.out == ""
     assert ended.err.startswith(f"{name}: ")
     assert ended.err.count("\n") == 1
-    return ended.err.removeprefix(f"{name}: ").rstrip("\n")
+    return Refusal.parsed(ended.err.removeprefix(f"{name}: ").rstrip("\n"))
 
 
 def command(

@@ -26,57 +26,59 @@ def row(index: int = 0, program: object = GREETS, task: str = "SayGoodDay", prom
 
 # --- bad input
 
-LIKE_THIS = (
-    'a row looks like {"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
-)
-
 
 def test_a_missing_file(tmp_path: Path) -> None:
-    assert refused("evaluate", tmp_path / "no.jsonl").endswith(
-        "no.jsonl: there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py"
-    )
+    refusal = refused("evaluate", tmp_path / "no.jsonl")
+    assert refusal.at == (str(tmp_path / "no.jsonl"), None)
+    assert {".jsonl", ".py"} <= {*re.findall(r"\.\w+", refusal.sentence)}
 
 
 def test_an_empty_name() -> None:
     for verb in (("evaluate",), ("import", "--out", "run")):
-        assert refused(*verb, "") == "nothing is named; name a run, a .jsonl, or a folder or zip of .py"
+        assert "a run, a .jsonl, or a folder or zip of .py" in refused(*verb, "").sentence
     for words in (("show",), ("export",), ("import", "a.jsonl", "--out"), ("evaluate", "a.jsonl", "--out")):
-        assert refused(*words, "") == "nothing is named; name a run"
-    assert refused("export", "run", "--out", "") == "nothing is named; name a file"
+        assert refused(*words, "").sentence.endswith("a run")
+    assert refused("export", "run", "--out", "").sentence.endswith("a file")
 
 
 def test_an_empty_file(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text("")
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl: there is no completion in it"
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", None)
+    assert "no completion" in refusal.sentence
 
 
 def test_a_line_that_is_no_json(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "{oops\n" + row(1))
-    assert (
-        refused("evaluate", "a.jsonl", cwd=tmp_path) == f"a.jsonl, line 2: this line is no JSON; {LIKE_THIS}"
-    )
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 2)
+    assert "no JSON;" in refusal.sentence
+    example = json.loads(refusal.sentence[refusal.sentence.index("{") :])
+    assert example.keys() == {"task", "prompt", "index", "program"}
 
 
 def test_a_last_line_that_is_no_json_and_has_no_end(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + '{"task": "SayGoodDay", "program": "x')
-    assert (
-        refused("evaluate", "a.jsonl", cwd=tmp_path) == f"a.jsonl, line 2: this line is no JSON; {LIKE_THIS}"
-    )
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 2)
+    assert "no JSON;" in refusal.sentence
 
 
 def test_a_program_is_no_file_of_completions(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(GREETS)
-    sentence = refused("evaluate", "program.py", cwd=tmp_path)
-    assert sentence.startswith('program.py: is one program; write it as a row of a .jsonl: {"task": ')
-    json.loads(sentence.partition(".jsonl: ")[2])
+    refusal = refused("evaluate", "program.py", cwd=tmp_path)
+    assert refusal.at == ("program.py", None)
+    assert ".jsonl" in refusal.sentence
+    assert json.loads(refusal.sentence[refusal.sentence.index("{") :])["program"]
 
 
 @pytest.mark.parametrize("verb", ["evaluate", "import"])
 def test_a_file_is_no_run(tmp_path: Path, verb: str) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     (tmp_path / "verdicts").write_text("mine")
-    sentence = refused(verb, "a.jsonl", "--out", "verdicts", cwd=tmp_path)
-    assert sentence == "verdicts: is a file, but a run is a folder; name another"
+    refusal = refused(verb, "a.jsonl", "--out", "verdicts", cwd=tmp_path)
+    assert refusal.at == ("verdicts", None)
+    assert "is a file" in refusal.sentence
     assert (tmp_path / "verdicts").read_text() == "mine"
 
 
@@ -95,10 +97,10 @@ def test_files_that_are_named_otherwise_are_left_aside_aloud(
                 archive.write(tmp_path / "py" / name, name)
     ended = roboeval(*command, source, cwd=tmp_path)
     assert ended.status == 0
-    assert ended.err.splitlines()[0] == (
-        f"2 files were left aside, {source}/SayGoodDay_1.py the first; "
-        "a completion is named TASK_PROMPT_INDEX.py, such as LunchTime_0_1.py"
-    )
+    warning = ended.err.splitlines()[0]
+    assert warning.startswith("2 files")
+    assert f"{source}/SayGoodDay_1.py" in warning
+    assert "TASK_PROMPT_INDEX.py" in warning
 
 
 def test_no_file_is_left_aside_where_all_are_named_alike(tmp_path: Path) -> None:
@@ -112,96 +114,113 @@ def test_a_zip_with_a_damaged_member(tmp_path: Path) -> None:
     data = bytearray((tmp_path / "a.zip").read_bytes())
     data[50:60] = b"\xff" * 10
     (tmp_path / "a.zip").write_bytes(data)
-    assert refused("evaluate", "a.zip", cwd=tmp_path).startswith("a.zip: is no readable zip")
+    refusal = refused("evaluate", "a.zip", cwd=tmp_path)
+    assert refusal.at == ("a.zip", None)
+    assert "no readable zip" in refusal.sentence
 
 
 def test_a_line_that_is_no_object(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "[]\n")
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == (
-        f"a.jsonl, line 2: this line is no JSON object; {LIKE_THIS}"
-    )
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 2)
+    assert "JSON object" in refusal.sentence
 
 
 def test_an_unknown_task(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(task="SayGoodNight"))
-    sentence = refused("evaluate", "a.jsonl", cwd=tmp_path)
-    assert sentence.startswith(
-        'a.jsonl, line 2: the suite "paper" has no task "SayGoodNight"; its tasks are CountSavory,'
-    )
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 2)
+    for name in ('"paper"', '"SayGoodNight"', "CountSavory"):
+        assert name in refusal.sentence
 
 
 @pytest.mark.parametrize("prompt", [5, 10**9 - 1])
 def test_a_prompt_out_of_range(tmp_path: Path, prompt: int) -> None:
     (tmp_path / "a.jsonl").write_text(row(prompt=prompt))
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == (
-        f"a.jsonl, line 1: SayGoodDay/{prompt}/0: the task has prompts 0 to 4"
-    )
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 1)
+    assert f"SayGoodDay/{prompt}/0" in refusal.sentence
+    assert "0 to 4" in refusal.sentence
 
 
 def test_an_unknown_task_of_a_published_file(tmp_path: Path) -> None:
     (tmp_path / "py").mkdir()
     (tmp_path / "py" / "SayGoodNight_0_0.py").write_text("completion = ''")
-    sentence = refused("evaluate", "py", cwd=tmp_path)
-    assert sentence.startswith(
-        'py/SayGoodNight_0_0.py: the suite "paper" has no task "SayGoodNight"; its tasks are'
-    )
+    refusal = refused("evaluate", "py", cwd=tmp_path)
+    assert refusal.at == ("py/SayGoodNight_0_0.py", None)
+    for name in ('"paper"', '"SayGoodNight"', "CountSavory"):
+        assert name in refusal.sentence
 
 
 @pytest.mark.parametrize(
-    ("prompt", "problem"),
+    ("prompt", "value", "expected"),
     [
-        (-1, "-1, but it must be at least 0"),
-        ("0", "'0', not a whole number"),
-        (True, "True, not a whole number"),
+        (-1, "-1", "at least 0"),
+        ("0", "'0'", "whole number"),
+        (True, "True", "whole number"),
     ],
 )
-def test_a_prompt_that_is_no_number(tmp_path: Path, prompt: object, problem: str) -> None:
+def test_a_prompt_that_is_no_number(tmp_path: Path, prompt: object, value: str, expected: str) -> None:
     (tmp_path / "a.jsonl").write_text(row(prompt=prompt))
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == f"a.jsonl, line 1: the prompt is {problem}"
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 1)
+    for said in ("prompt", value, expected):
+        assert said in refusal.sentence
 
 
 def test_a_program_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, program=["x"]))
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == "a.jsonl, line 2: the program is ['x'], not a text"
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 2)
+    for said in ("program", "['x']", "a text"):
+        assert said in refusal.sentence
 
 
 def test_a_row_that_lacks_a_program(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text('{"task": "SayGoodDay", "prompt": 0, "index": 0}\n')
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == 'a.jsonl, line 1: "program" is missing'
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 1)
+    assert '"program"' in refusal.sentence
+    assert "missing" in refusal.sentence
 
 
 def test_a_row_that_repeats_another(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1) + row())
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == (
-        "a.jsonl, line 3: SayGoodDay/0/0 stands here again; it stood in line 1 already"
-    )
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 3)
+    assert "SayGoodDay/0/0" in refusal.sentence
+    assert "line 1" in refusal.sentence
 
 
 def test_a_row_of_ten_megabytes(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(1, program="#" * 10_000_000))
-    assert refused("evaluate", "a.jsonl", cwd=tmp_path) == (
-        "a.jsonl, line 2: this row is longer than 5,000,000 bytes"
-    )
+    refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", 2)
+    assert "5,000,000 bytes" in refusal.sentence
 
 
 @pytest.mark.parametrize("name", ["../SayGoodDay_0_0.py", "/SayGoodDay_0_0.py", "a/../../SayGoodDay_0_0.py"])
 def test_a_zip_that_names_a_file_outside(tmp_path: Path, name: str) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
         archive.writestr(name, "completion = ''")
-    assert (
-        refused("evaluate", "a.zip", cwd=tmp_path) == f'a.zip: the zip names a file outside itself, "{name}"'
-    )
+    refusal = refused("evaluate", "a.zip", cwd=tmp_path)
+    assert refusal.at == ("a.zip", None)
+    assert f'"{name}"' in refusal.sentence
 
 
 def test_a_zip_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_text("hello")
-    assert refused("evaluate", "a.zip", cwd=tmp_path).startswith("a.zip: is no readable zip")
+    refusal = refused("evaluate", "a.zip", cwd=tmp_path)
+    assert refusal.at == ("a.zip", None)
+    assert "no readable zip" in refusal.sentence
 
 
 def test_a_file_that_swells_in_a_zip(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("SayGoodDay_0_0.py", " " * 50_000_000)
-    assert "is larger than 5,000,000 bytes" in refused("evaluate", "a.zip", cwd=tmp_path)
+    refusal = refused("evaluate", "a.zip", cwd=tmp_path)
+    assert refusal.at == ("a.zip/SayGoodDay_0_0.py", None)
+    assert "5,000,000 bytes" in refusal.sentence
 
 
 def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> None:
@@ -211,7 +230,9 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
     (folder / "SayGoodDay_0_0.py").write_text(
         f"completion = open({str(marker)!r}, 'w').write('x') and 'program'\n"
     )
-    assert "line 1: `completion` is no plain text; write the text out" in refused("evaluate", folder)
+    refusal = refused("evaluate", folder)
+    assert refusal.at == (str(folder / "SayGoodDay_0_0.py"), 1)
+    assert refusal.commands == ["completion"]
     assert not marker.exists()
 
 
@@ -227,39 +248,47 @@ def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
     ) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        sentence = refused("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path)
-        assert sentence == "run: another process is writing this run; wait until it has ended"
+        refusal = refused("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path)
+        assert refusal.at == ("run", None)
+        assert "another process" in refusal.sentence
         process.kill()
 
 
 @pytest.mark.parametrize(
-    ("options", "sentence"),
+    ("options", "named"),
     [
-        (["--engine", "steam"], 'there is no engine "steam"; there are local and ray'),
-        (["--workers", "0"], "invalid value for '--workers': "),
-        (["--workers", "many"], "invalid value for '--workers': "),
-        (["--frobnicate"], "no such option: --frobnicate"),
-        (["--worlds", "7"], 'the worlds of the suite "paper" are written by hand'),
-        (["--seed", "7"], 'the worlds of the suite "paper" are written by hand'),
-        (["--suite", "plus", "--worlds", "0"], "invalid value for '--worlds': "),
-        (["--suite", "plus", "--worlds", "1000000000"], "invalid value for '--worlds': "),
-        (["--suite", "plus", "--ablation"], "none of CountSavory, "),
-        (["--suite", "nonsense"], 'there is no suite "nonsense"'),
-        (["--tasks", "SayGoodDay,Nonsense"], 'the suite "paper" has no task "Nonsense"'),
-        (["--tasks", "SayGoodDay", "--ablation"], "none of SayGoodDay has an ablation"),
-        (["--tasks", "LunchTime"], "a.jsonl: there is no completion of LunchTime in it"),
+        (["--engine", "steam"], ['"steam"', "local", "ray"]),
+        (["--workers", "0"], ["invalid value", "'--workers'"]),
+        (["--workers", "many"], ["invalid value", "'--workers'"]),
+        (["--frobnicate"], ["--frobnicate"]),
+        (["--worlds", "7"], ["worlds", '"paper"', "by hand"]),
+        (["--seed", "7"], ["worlds", '"paper"', "by hand"]),
+        (["--suite", "plus", "--worlds", "0"], ["invalid value", "'--worlds'"]),
+        (["--suite", "plus", "--worlds", "1000000000"], ["invalid value", "'--worlds'", "10000"]),
+        (["--suite", "plus", "--ablation"], ["none of CountSavory, ", "ablation"]),
+        (["--suite", "nonsense"], ['"nonsense"', "paper", "plus"]),
+        (["--tasks", "SayGoodDay,Nonsense"], ['"paper"', '"Nonsense"']),
+        (["--tasks", "SayGoodDay", "--ablation"], ["SayGoodDay", "ablation"]),
     ],
 )
-def test_an_option_that_cannot_be_followed(tmp_path: Path, options: list[str], sentence: str) -> None:
+def test_an_option_that_cannot_be_followed(tmp_path: Path, options: list[str], named: list[str]) -> None:
     (tmp_path / "a.jsonl").write_text(row())
-    assert refused("evaluate", "a.jsonl", *options, cwd=tmp_path).startswith(sentence)
+    refusal = refused("evaluate", "a.jsonl", *options, cwd=tmp_path)
+    assert all(name in refusal.sentence for name in named), refusal
+
+
+def test_a_task_of_which_there_is_no_completion(tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row())
+    refusal = refused("evaluate", "a.jsonl", "--tasks", "LunchTime", cwd=tmp_path)
+    assert refusal.at == ("a.jsonl", None)
+    assert "LunchTime" in refusal.sentence
 
 
 @pytest.mark.parametrize("arguments", [(), ("evaluate",), ("show", "a", "b", "c"), ("dance",), ("--frob",)])
 def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
     if arguments:
         command = "roboeval evaluate" if arguments == ("evaluate",) else "roboeval"
-        assert f"; `{command}" in refused(*arguments)
+        assert any(each.startswith(command) for each in refused(*arguments).commands)
     else:
         ended = roboeval()
         assert (ended.status, ended.err) == (0, "")
@@ -267,9 +296,10 @@ def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
 
 
 def test_a_question_ends_as_one() -> None:
-    sentence = refused("generat")
-    assert "did you mean" in sentence.lower()
-    assert sentence.endswith("? `roboeval --help` lists what there is")
+    refusal = refused("generat")
+    assert "generate" in refusal.sentence
+    assert "? `" in refusal.sentence
+    assert refusal.commands == ["roboeval --help"]
 
 
 def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path) -> None:
@@ -285,8 +315,7 @@ def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path
     assert shown.status == 0
     assert "the suite has changed" not in shown.err
     assert "9:" in shown.out or "world" in shown.out
-    sentence = refused("evaluate", "run", "--suite", "plus", cwd=tmp_path)
-    assert "--redo" in sentence
+    assert "--redo" in refused("evaluate", "run", "--suite", "plus", cwd=tmp_path).sentence
     assert roboeval("evaluate", "run", *drawn, cwd=tmp_path).status == 0
 
 
@@ -301,7 +330,7 @@ def test_nothing_is_left_behind_when_a_row_is_wrong(tmp_path: Path, verb: str, o
 # --- a machine that cannot
 
 
-FULL = r"[^\n]*: File too large; make room and give the same command again\n"
+FULL = r"[^\n]*: File too large; [^\n]*\n"
 SMALL_DISK = "ulimit -f 200;"  # in KiB: no file may grow beyond it
 LONG = 'def task_program(): say("good day " * 1000)\n'
 
@@ -346,8 +375,9 @@ def test_a_table_takes_the_place_of_no_other_file(tmp_path: Path) -> None:
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     for file in ("a.jsonl", "run/completions.jsonl"):
         before = (tmp_path / file).read_bytes()
-        said = refused("export", "run", "--out", file, cwd=tmp_path)
-        assert said == f"{file}: this file holds something else; name another one, or remove it"
+        refusal = refused("export", "run", "--out", file, cwd=tmp_path)
+        assert refusal.at == (file, None)
+        assert "something else" in refusal.sentence
         assert (tmp_path / file).read_bytes() == before
     for name in ("table.csv", "table.csv", "table.parquet", "table.parquet"):
         assert roboeval("export", "run", "--out", name, cwd=tmp_path).status == 0
@@ -358,8 +388,9 @@ def test_a_folder_of_other_things_is_no_place_for_a_run(tmp_path: Path, verb: st
     (tmp_path / "a.jsonl").write_text(row(task="LunchTime"))
     (tmp_path / "docs").mkdir()
     (tmp_path / "docs" / "mine.md").write_text("mine")
-    said = refused(verb, "a.jsonl", "--out", "docs", cwd=tmp_path)
-    assert said == 'docs: is no run, but holds other files, such as "mine.md"; name a new folder'
+    refusal = refused(verb, "a.jsonl", "--out", "docs", cwd=tmp_path)
+    assert refusal.at == ("docs", None)
+    assert '"mine.md"' in refusal.sentence
     assert [path.name for path in (tmp_path / "docs").iterdir()] == ["mine.md"]
 
 
@@ -374,9 +405,7 @@ def test_a_terminal_of_no_columns_is_one_of_unknown_width(columns: str) -> None:
 def test_an_output_that_is_full_or_closed() -> None:
     ended = roboeval("tasks", "--json", after="> /dev/full")
     assert ended.status == 1
-    assert ended.err == (
-        "roboeval: the output: No space left on device; make room and give the same command again\n"
-    )
+    assert re.fullmatch(r"roboeval: [^\n]*: No space left on device; [^\n]*\n", ended.err)
     assert roboeval("tasks", "--json", after="| head -c 1").err == ""
 
 
@@ -387,15 +416,17 @@ SLOW = "def task_program():\n    for i in range(150000): pass\n# {}\n"
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
+    ("arguments", "options", "kept"),
     [
-        (["a.jsonl", "--out", "run"], "stopped; the same command goes on where it was"),
-        (["kept"], "stopped; the same command goes on where it was"),
-        (["kept", "--redo"], "stopped; the same command without --redo goes on where it was"),
-        (["a.jsonl"], "stopped; nothing is kept (with --out RUN, what was judged would be)"),
+        (["a.jsonl", "--out", "run"], [], True),
+        (["kept"], [], True),
+        (["kept", "--redo"], ["--redo"], True),
+        (["a.jsonl"], ["--out"], False),
     ],
 )
-def test_ctrl_c_ends_in_one_true_sentence(tmp_path: Path, arguments: list[str], sentence: str) -> None:
+def test_ctrl_c_ends_in_one_true_sentence(
+    tmp_path: Path, arguments: list[str], options: list[str], *, kept: bool
+) -> None:
     (tmp_path / "a.jsonl").write_text("".join(row(i, SLOW.format(i)) for i in range(400)))
     assert roboeval("import", "a.jsonl", "--out", "kept", cwd=tmp_path).status == 0
     words = ("evaluate", "--workers", "1", *arguments)
@@ -406,17 +437,21 @@ def test_ctrl_c_ends_in_one_true_sentence(tmp_path: Path, arguments: list[str], 
     process.send_signal(signal.SIGINT)
     out, err = process.communicate()
     assert (process.returncode, out) == (130, "")
-    assert err.splitlines()[-1] == f"roboeval: {sentence}"
+    assert err.splitlines()[-1].startswith("roboeval: stopped; ")
+    assert re.findall("--[a-z]+", err.splitlines()[-1]) == options
     assert "Traceback" not in err
-    kept = list(tmp_path.glob("*/evaluations/paper.jsonl"))
-    assert bool(kept) == ("nothing is kept" not in sentence)
+    assert any(tmp_path.glob("*/evaluations/paper.jsonl")) == kept
 
 
 def test_a_run_that_was_not_judged(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     assert roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
-    assert refused("show", "run", cwd=tmp_path) == "run: has not been judged; `roboeval evaluate run` does it"
-    assert refused("show", "nothing", cwd=tmp_path) == "nothing: is no run: it holds no completions.jsonl"
+    refusal = refused("show", "run", cwd=tmp_path)
+    assert refusal.at == ("run", None)
+    assert refusal.commands == ["roboeval evaluate run"]
+    refusal = refused("show", "nothing", cwd=tmp_path)
+    assert refusal.at == ("nothing", None)
+    assert "completions.jsonl" in refusal.sentence
 
 
 def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
@@ -424,14 +459,14 @@ def test_a_run_that_was_judged_by_another_suite(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", "--suite", "mine", cwd=tmp_path).status == 0
     for asked in (("export", "run"), ("show", "run", "--ablation"), ("show", "run", "MakeTea")):
-        sentence = refused(*asked, cwd=tmp_path)
-        assert sentence == 'run: was judged by the suite "mine", not by "paper"; name it with --suite'
+        refusal = refused(*asked, cwd=tmp_path)
+        assert refusal.at == ("run", None)
+        for name in ('"mine"', '"paper"', "--suite"):
+            assert name in refusal.sentence
     (tmp_path / "run" / "evaluations" / "mine.sha256").unlink()
-    sentence = refused("show", "run", "--suite", "mine", cwd=tmp_path)
-    assert sentence.startswith(
-        "run/evaluations/mine.sha256: is missing, so that nobody knows which programs were"
-    )
-    assert pasted(sentence, tmp_path).status == 0
+    refusal = refused("show", "run", "--suite", "mine", cwd=tmp_path)
+    assert refusal.at == ("run/evaluations/mine.sha256", None)
+    assert pasted(refusal.sentence, tmp_path).status == 0
     assert roboeval("show", "run", "--suite", "mine", cwd=tmp_path).status == 0
 
 
@@ -467,7 +502,7 @@ def test_a_pipe_is_a_file_of_completions(tmp_path: Path) -> None:
     assert json.loads(ended.out)["completions"] == 2
     wrong = roboeval("evaluate", cwd=tmp_path, after="<(cat a.jsonl; echo oops)")
     assert (wrong.status, wrong.out) == (2, "")
-    assert re.fullmatch(r"roboeval: /dev/fd/\d+, line 3: this line is no JSON; .*\n", wrong.err)
+    assert re.fullmatch(r"roboeval: /dev/fd/\d+, line 3: .*\bJSON; .*\n", wrong.err)
 
 
 def test_the_version() -> None:
@@ -487,7 +522,7 @@ def test_commands_in_sentences_can_be_pasted(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row(task="MakeTea"))
     imported = roboeval("import", "a.jsonl", "--out", "my run", "--suite", "my suite", cwd=tmp_path)
     unjudged = refused("show", "my run", "--suite", "my suite", cwd=tmp_path)
-    assert pasted(unjudged, tmp_path).status == 0
+    assert pasted(unjudged.sentence, tmp_path).status == 0
     judged = pasted(imported.err, tmp_path)
     assert judged.status == 0
     shown = pasted(judged.err, tmp_path)
@@ -517,8 +552,8 @@ def test_commands_in_sentences_say_what_was_ablated(tmp_path: Path) -> None:
     imported = roboeval("import", "a.jsonl", "--out", "run", cwd=tmp_path)
     assert "1 completion is in run" in imported.err
     unjudged = refused("show", "run", "--ablation", cwd=tmp_path)
-    assert unjudged == "run: has not been judged; `roboeval evaluate run --ablation` does it"
-    judged = pasted(unjudged, tmp_path)
+    assert unjudged.commands == ["roboeval evaluate run --ablation"]
+    judged = pasted(unjudged.sentence, tmp_path)
     assert pasted(judged.err.splitlines()[-1], tmp_path).out.startswith("LunchTime/0/0")
 
 
@@ -533,16 +568,16 @@ def test_an_unfinished_evaluation_says_so(tmp_path: Path) -> None:
     unseal(tmp_path / "run")
     shown = roboeval("show", "run", cwd=tmp_path)
     assert "2 of 4 completions judged\n" in shown.out
-    assert "not judged yet: LunchTime\n" in shown.out
-    assert "not selected: CountSavory, " in shown.out
-    again = "`roboeval evaluate run --tasks LunchTime,SayGoodDay` goes on"
-    assert shown.err == f"2 of 4 completions judged; {again}\n"
+    assert re.search(r"not judged.*: LunchTime\n", shown.out)
+    assert re.search(r"not selected.*: CountSavory, ", shown.out)
+    assert "2 of 4 completions" in shown.err
+    assert "`roboeval evaluate run --tasks LunchTime,SayGoodDay`" in shown.err
     data = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
     assert (data["judged"], data["to_judge"]) == (2, 4)
     assert data["missing"]["not_judged"] == ["LunchTime"]
     assert "GetDrink" in data["missing"]["not_selected"]
     exported = roboeval("export", "run", cwd=tmp_path).err
-    assert exported.startswith("2 of 4 completions judged, and only these are in the table; ")
+    assert exported.startswith("2 of 4 completions")
     assert pasted(shown.err, tmp_path).status == 0
     assert roboeval("show", "run", cwd=tmp_path).err == ""
 
@@ -551,25 +586,24 @@ def test_a_program_that_was_changed_since_it_was_judged_is_noticed(tmp_path: Pat
     (tmp_path / "a.jsonl").write_text("".join(map(row, range(3))))
     assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
     (tmp_path / "run" / "completions.jsonl").write_text(row() + row(1, "say('other')") + row(2, "say('one')"))
-    changed = (
-        "SayGoodDay/0/1 and 1 other row judge another program than stands in run/completions.jsonl now; "
-        "`roboeval evaluate run --redo` judges what stands there"
-    )
-    for what in ((), ("SayGoodDay",), ("SayGoodDay/0",), ("SayGoodDay/0/1",)):
-        assert roboeval("show", "run", *what, cwd=tmp_path).err == changed + "\n"
+    changed = roboeval("show", "run", cwd=tmp_path).err
+    for named in ("SayGoodDay/0/1", "1 other row", "run/completions.jsonl"):
+        assert named in changed
+    assert changed.count("\n") == 1
+    for what in ("SayGoodDay", "SayGoodDay/0", "SayGoodDay/0/1"):
+        assert roboeval("show", "run", what, cwd=tmp_path).err == changed
     one = roboeval("show", "run", "SayGoodDay/0/1", cwd=tmp_path).out
-    assert "the program that was judged no longer stands in this run" in one
+    assert "no longer" in one
     assert "other" not in one
-    assert (
-        roboeval("show", "run", "SayGoodDay/0", cwd=tmp_path).out.count("no longer stands in this run") == 2
-    )
+    assert roboeval("show", "run", "SayGoodDay/0", cwd=tmp_path).out.count("no longer") == 2
     data = json.loads(roboeval("show", "run", "--json", cwd=tmp_path).out)
     assert data["stale"] == ["SayGoodDay/0/1", "SayGoodDay/0/2"]
-    assert refused("export", "run", cwd=tmp_path) == changed
-    assert refused("evaluate", "run", cwd=tmp_path) == (
-        "run/evaluations/paper.jsonl, line 2: the program of SayGoodDay/0/1 has changed since it was judged; "
-        "--redo starts over"
-    )
+    assert refused("export", "run", cwd=tmp_path).sentence == changed.rstrip("\n")
+    assert "`roboeval evaluate run --redo`" in changed
+    refusal = refused("evaluate", "run", cwd=tmp_path)
+    assert refusal.at == ("run/evaluations/paper.jsonl", 2)
+    assert "SayGoodDay/0/1" in refusal.sentence
+    assert "--redo" in refusal.sentence
     assert pasted(changed, tmp_path).status == 0
     assert roboeval("show", "run", cwd=tmp_path).err == ""
 
@@ -598,14 +632,15 @@ def test_show_says_why(run: Path) -> None:
     assert "GoToInvalidLocation" in roboeval("show", run, "SayGoodDay").out
     one = roboeval("show", run, "SayGoodDay/0/1").out
     assert "instruction not recorded" in one
-    assert 'there is no room "nowhere"' in one
+    assert '"nowhere"' in one
     other = roboeval("show", run, "SayGoodDay/0/0").out
     assert "the robot never went to" in other
 
 
 def test_show_gives_pass_at_any_k_that_the_run_can_estimate(run: Path) -> None:
     assert "pass@3" in roboeval("show", run, "--k", "3").out
-    assert "4" in refused("show", run, "--k", "4")
+    refusal = refused("show", run, "--k", "4").sentence
+    assert re.search(r"\b4\b.* 1 to 3", refusal)
 
 
 def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
@@ -614,13 +649,15 @@ def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
     for line, fault in [
         ('{"task": "SayGoodDay"}', "row of an evaluation"),
-        ("?", "JSON"),
+        ("?", "JSON;"),
         ("[]", "JSON object"),
     ]:
         rows.write_text(f"{line}\n")
-        expected = f"run/evaluations/paper.jsonl, line 1: this line is no {fault}; --redo starts over"
-        assert refused("show", "run", cwd=tmp_path) == expected
-        assert refused("evaluate", "run", cwd=tmp_path) == expected
+        refusal = refused("show", "run", cwd=tmp_path)
+        assert refusal.at == ("run/evaluations/paper.jsonl", 1)
+        assert fault in refusal.sentence
+        assert "--redo" in refusal.sentence
+        assert refused("evaluate", "run", cwd=tmp_path) == refusal
 
 
 def test_export_writes_a_row_for_each_completion_and_world(run: Path) -> None:
@@ -643,7 +680,8 @@ def test_ablation_names_the_tasks_that_have_none(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + row(task="LunchTime"))
     ended = roboeval("evaluate", "a.jsonl", "--ablation", "--out", "run", cwd=tmp_path)
     assert ended.status == 0
-    assert "without ablation, and so not judged: ElevatorTour, " in ended.err
+    assert "ablation" in ended.err
+    assert ": ElevatorTour, " in ended.err
     rows = (tmp_path / "run" / "evaluations" / "paper-ablation.jsonl").read_text().splitlines()
     assert [json.loads(line)["task"] for line in rows] == ["LunchTime"]
 
@@ -664,19 +702,17 @@ def test_tasks_are_listed_and_shown() -> None:
     assert "WeatherPoll" in listed
     shown = roboeval("tasks", "LunchBreak").out
     assert "requires not tells_after_asking" in shown
-    assert refused("tasks", "Nonsense").startswith('the suite "paper" has no task "Nonsense"')
+    assert '"Nonsense"' in refused("tasks", "Nonsense").sentence
 
 
 def test_accepted_findings_are_shown_with_their_reasons() -> None:
     linted = roboeval("tasks", "HalloweenShopping", "--lint")
     assert linted.status == 0
-    assert re.fullmatch(
-        r"nothing was found but 1 finding that the task files accept; --accepted tells why\n", linted.out
-    )
+    assert re.search(r"\b1 finding\b.* --accepted\b", linted.out)
     shown = roboeval("tasks", "HalloweenShopping", "--lint", "--accepted")
     assert shown.status == 0
     assert re.search(r"HalloweenShopping.yaml:\d+: accepted: .* \[same-worlds: 4 and 5\]: \w+", shown.out)
-    assert refused("tasks", "--accepted") == "--accepted is about what --lint finds; add --lint"
+    assert "--lint" in refused("tasks", "--accepted").sentence
 
 
 def test_help_costs_little() -> None:

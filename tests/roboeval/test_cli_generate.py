@@ -48,7 +48,7 @@ def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
     shutil.rmtree(run / "report")
     again = roboeval(*words, "--no-report", cwd=tmp_path)
     assert (again.status, again.out) == (0, ended.out)
-    assert "240 of 240 completions are there already" in again.err
+    assert "240 of 240 completions" in again.err
     assert not (run / "report").exists()
 
 
@@ -87,43 +87,45 @@ def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
 
 def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
     assert roboeval("generate", "--num-completions", "1", cwd=tmp_path).status == 0
-    assert refused("generate", "--num-completions", "1", "--temperature", "0.7", cwd=tmp_path) == (
-        "runs/recorded-careful/run.json: the completions were asked for with another temperature "
-        "(0.2, now 0.7); name another folder to begin anew"
-    )
+    refusal = refused("generate", "--num-completions", "1", "--temperature", "0.7", cwd=tmp_path)
+    assert refusal.at == ("runs/recorded-careful/run.json", None)
+    assert "temperature (0.2, now 0.7)" in refusal.sentence
 
 
 @pytest.mark.parametrize(
-    ("words", "sentence"),
+    ("words", "named"),
     [
-        (("--model", "nonsense"), '"nonsense" names no model; write recorded, '),
-        (("--tasks", "Nonsense"), 'the suite "paper" has no task "Nonsense"; its tasks are '),
-        (("--temperature", "-1"), "the temperature is -1, but it must be between 0 and 100"),
-        (("--num-completions", "0"), "invalid value for '--num-completions': "),
-        (("--concurrency", "0"), "invalid value for '--concurrency': "),
-        (("--out", ""), "nothing is named; name a run"),
-        (("--base-url", "http://me:secret@localhost/v1"), "the base URL has a user name, a password, a"),
+        (("--model", "nonsense"), ['"nonsense"', "recorded, "]),
+        (("--tasks", "Nonsense"), ['"paper"', '"Nonsense"', "CountSavory"]),
+        (("--temperature", "-1"), ["temperature", "-1", "0 and 100"]),
+        (("--num-completions", "0"), ["invalid value", "'--num-completions'"]),
+        (("--concurrency", "0"), ["invalid value", "'--concurrency'"]),
+        (("--out", ""), ["nothing", "a run"]),
+        (("--base-url", "http://me:secret@localhost/v1"), ["base URL", "password"]),
     ],
 )
-def test_what_is_asked_wrongly_leaves_nothing(tmp_path: Path, words: tuple[str, ...], sentence: str) -> None:
-    assert refused("generate", *words, cwd=tmp_path).startswith(sentence)
+def test_what_is_asked_wrongly_leaves_nothing(
+    tmp_path: Path, words: tuple[str, ...], named: list[str]
+) -> None:
+    refusal = refused("generate", *words, cwd=tmp_path)
+    assert all(name in refusal.sentence for name in named), refusal
+    assert "secret" not in refusal.sentence
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("command", ["generate", "run"])
 def test_no_more_than_10000_completions_of_a_prompt(tmp_path: Path, command: str) -> None:
     words = (command, "--model", "recorded:nobody", "--num-completions")  # it is asked for nothing
-    sentence = refused(*words, "10001", cwd=tmp_path)
-    assert sentence.startswith("invalid value for '--num-completions': ")
-    assert "10000" in sentence
-    assert refused(*words, "10000", cwd=tmp_path).startswith("there is no recorded model")
+    refusal = refused(*words, "10001", cwd=tmp_path)
+    assert "'--num-completions'" in refusal.sentence
+    assert "10000" in refusal.sentence
+    assert '"recorded:nobody"' in refused(*words, "10000", cwd=tmp_path).sentence
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_suite_that_nobody_recorded(tmp_path: Path) -> None:
     roboeval("tasks", "--new", "MakeTea", "--suite", "mine", cwd=tmp_path)
-    sentence = refused("generate", "--suite", "mine", cwd=tmp_path)
-    assert sentence.startswith('recorded:careful has no program for "')
+    assert "recorded:careful" in refused("generate", "--suite", "mine", cwd=tmp_path).sentence
     assert not (tmp_path / "runs").exists()
 
 
@@ -170,7 +172,7 @@ def test_the_key_is_in_no_file_of_a_run(tmp_path: Path, model: str) -> None:
             environment=WITH_KEY,
         )
     assert ended.status == 1  # one request was refused for good
-    assert "1 completion is missing" in ended.err
+    assert "1 completion " in ended.err
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert len(keys(tmp_path / "run")) == 19
     assert len(files) >= 3
@@ -185,16 +187,12 @@ def test_a_budget_stops_with_a_sentence_and_goes_on_later(tmp_path: Path) -> Non
         ended = roboeval(*words, "--token-budget", "5000", cwd=tmp_path)
         assert ended.status == 1
         assert ended.out == ""
-        assert re.fullmatch(
-            r"roboeval: \d+ completions are missing: the token budget of 5,000 is spent: [\d,]+ tokens are "
-            r"used; the same command goes on where it was\n",
-            ended.err,
-        )
+        assert re.fullmatch(r"roboeval: \d+ completions .*\btoken budget of 5,000\b.*\n", ended.err)
         before = keys(tmp_path / "run")
         assert 0 < len(before) < 20
         ended = roboeval(*words, cwd=tmp_path)
         assert ended.status == 0
-        assert f"{len(before)} of 20 completions are there already" in ended.err
+        assert f"{len(before)} of 20 completions" in ended.err
     assert len(server.requests) == len(set(keys(tmp_path / "run"))) == 20
 
 
@@ -216,7 +214,7 @@ def test_kill_minus_nine_at_random_moments_costs_only_what_was_under_way(tmp_pat
     assert ended.status == 0
     assert Counter(keys(tmp_path / "run")).most_common(1)[0][1] == 1
     assert len(keys(tmp_path / "run")) == 200
-    assert re.search(r"^[1-4] requests? w\w+ under way when this was interrupted, ", ended.err, re.MULTILINE)
+    assert re.search(r"^[1-4] requests? ", ended.err, re.MULTILINE)
     twice = json.loads((tmp_path / "run" / "run.json").read_text())["possibly_paid_twice"]
     assert len(server.requests) - 200 == lost
     assert lost <= twice <= lost + times  # a request that was noted need not have arrived
@@ -231,11 +229,7 @@ def test_control_c_says_what_is_kept(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         _, err = process.communicate()
     assert process.returncode == 130
-    said = re.fullmatch(
-        r"roboeval: stopped; (\d+) of 500 completions are kept; [1-4] requests? w\w+ under way, which may be "
-        r"paid twice; the same command goes on where it was\n",
-        err,
-    )
+    said = re.fullmatch(r"roboeval: stopped; (\d+) of 500 completions .*\b[1-4] requests? .*\n", err)
     assert said is not None, err
     assert len(keys(tmp_path / "run")) == int(said[1])
 
@@ -294,10 +288,12 @@ def test_resampling_checks_once_and_prints_both_figures(tmp_path: Path) -> None:
 
 def test_resampling_needs_a_judged_run(tmp_path: Path) -> None:
     roboeval("generate", "--num-completions", "1", "--tasks", "LunchTime", "--out", "run", cwd=tmp_path)
-    assert refused("resample", "run", cwd=tmp_path) == (
-        "run: has not been judged; `roboeval evaluate run` does it"
-    )
-    assert refused("resample", "nothing", cwd=tmp_path).startswith("nothing: is no run")
+    refusal = refused("resample", "run", cwd=tmp_path)
+    assert refusal.at == ("run", None)
+    assert refusal.commands == ["roboeval evaluate run"]
+    refusal = refused("resample", "nothing", cwd=tmp_path)
+    assert refusal.at == ("nothing", None)
+    assert "completions.jsonl" in refusal.sentence
 
 
 def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> None:
@@ -312,13 +308,13 @@ def test_resampling_counts_only_what_was_judged_as_it_stands(tmp_path: Path) -> 
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:4]))
     unseal(tmp_path / "run")
     ended = roboeval("resample", "run", "--json", cwd=tmp_path)
-    assert ended.err == (
-        "4 of 10 completions judged, and only these count; "
-        "`roboeval evaluate run --tasks LunchTime` goes on\n"
-    )
+    assert ended.err.startswith("4 of 10 completions ")
+    assert "`roboeval evaluate run --tasks LunchTime`" in ended.err
     assert sum(prompt["completions"] for prompt in json.loads(ended.out)["prompts"]) == 4
     completions = tmp_path / "run" / "completions.jsonl"
     changed = [json.loads(line) for line in completions.read_text().splitlines()]
     changed = [row | {"program": row["program"] + "#"} for row in changed]
     completions.write_text("".join(json.dumps(row) + "\n" for row in changed))
-    assert refused("resample", "run", cwd=tmp_path).endswith("--redo` judges what stands there")
+    assert refused("resample", "run", cwd=tmp_path).commands == [
+        "roboeval evaluate run --tasks LunchTime --redo"
+    ]

@@ -36,7 +36,7 @@ def test_the_other_way_round() -> None:
 
 
 def test_no_prompt_in_common() -> None:
-    with pytest.raises(BadInput, match="no prompt in common"):
+    with pytest.raises(BadInput, match="no prompt"):
         compared({("A", 0): 1.0}, {("A", 1): 1.0})
 
 
@@ -46,20 +46,19 @@ def test_verdicts() -> None:
         b = {key: 0.4 + d for key, d in zip(a, differences, strict=True)}
         return verdict(compared(a, b), ("one", "two"))
 
-    assert said([0.0] * 4, 4) == "one and two pass equally often."
+    assert "equally" in said([0.0] * 4, 4)
     assert "two is better than one by 10.0 points; tasks" in said([0.1] * 10, 10)
     assert "one is better than two by 10.0 points on prompts of these tasks" in said([-0.1] * 10, 2)
-    assert "chance alone may well" in said([0.3, -0.2], 2)
-    assert said([0.1, 0.2, -0.3], 3) == "one and two pass equally often."  # but for the last digit
+    assert "chance" in said([0.3, -0.2], 2)
+    assert said([0.1, 0.2, -0.3], 3) == said([0.0] * 4, 4)  # but for the last digit
 
 
 def test_how_much_it_takes_is_said() -> None:
-    assert to_tell(compared(FIRST, FIRST)) == [
-        "They do not differ, so no number of completions would tell them apart."
-    ]
+    (alike,) = to_tell(compared(FIRST, FIRST))
+    assert not re.search(r"\d", alike)
     told = to_tell(compared(FIRST, SECOND))
-    assert "25 completions of each model for each prompt (75 of each in all)" in told[0]
-    assert told[1].endswith("it takes 8 of them, as many completions each.")
+    assert re.search(r"\b25 completions .*\b75\b", told[0])
+    assert re.search(r"\b8\b", told[1])
 
 
 def test_names_are_text() -> None:
@@ -77,25 +76,30 @@ def test_what_is_unlike() -> None:
     }
     two = {"python": "3.12", "codebotler": "1", "template": "b", "settings": {"temperature": 0.8, "seed": 1}}
     assert unlike(one, one) == []
-    assert unlike(one, two) == [
-        "the Python versions with which they were judged differ: 3.11 and 3.12",
-        "the prompt templates differ: a and b",
-        "seed differs: none and 1",
-        "temperature differs: 0.2 and 0.8",
-    ]
-    assert unlike(one, {"python": "3.11"}) == ["of one of them nobody recorded the settings"]
+    for sentence, (name, values) in zip(
+        unlike(one, two),
+        [
+            ("Python", "3.11 and 3.12"),
+            ("template", "a and b"),
+            ("seed", "none and 1"),
+            ("temperature", "0.2 and 0.8"),
+        ],
+        strict=True,
+    ):
+        assert name in sentence
+        assert sentence.endswith(values)
+    (unknown,) = unlike(one, {"python": "3.11"})
+    assert "settings" in unknown
     for wrong in ([1, 2], "abc", 3):
-        assert unlike(one, {**one, "settings": wrong}) == ["of one of them nobody recorded the settings"]
+        assert unlike(one, {**one, "settings": wrong}) == [unknown]
 
 
 def test_other_suites_are_refused() -> None:
     again = {"a": "roboeval evaluate a", "b": "roboeval evaluate b --suite mine"}
     expect_same_suite({"a": {"digest": "1"}, "b": {"digest": "1"}}, SUITE, again)
-    with pytest.raises(
-        BadInput, match=r"b and a were judged by suites of other content \(1 and 00000000\)"
-    ) as e:
+    with pytest.raises(BadInput, match=r"\bb and a\b.* \(1 and 00000000\)") as e:
         expect_same_suite({"a": {"digest": SUITE.digest}, "b": {"digest": "1"}}, SUITE, again)
-    assert "`roboeval evaluate b --suite mine --redo` judges it" in str(e.value)
+    assert "`roboeval evaluate b --suite mine --redo`" in str(e.value)
 
 
 def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
@@ -103,7 +107,7 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
         a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
         return printed(render(compared(a, {key: value / 2 for key, value in a.items()}), ("a", "b")))
 
-    assert re.search(r"by bootstrap .* too narrow for so few tasks", shown(7))
+    assert re.search(r"by bootstrap .* too narrow", shown(7))
     assert "too narrow" not in shown(8)
 
 
@@ -146,5 +150,7 @@ def test_the_command_warns_and_refuses(runs: Path) -> None:
     ended = roboeval("compare", "careful", "hasty", cwd=runs)
     head.write_text(kept)
     assert ended.status == 2
-    assert "suites of other content" in ended.err
-    assert refused("compare", runs / "careful", "none").endswith("is no run: it holds no completions.jsonl")
+    assert re.search(r"\(1 and [0-9a-f]{8}\)", ended.err)
+    refusal = refused("compare", runs / "careful", "none")
+    assert refusal.at == ("none", None)
+    assert "completions.jsonl" in refusal.sentence

@@ -164,30 +164,29 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
 @pytest.mark.parametrize(
     ("settings", "what"),
     [
-        (Settings(temperature=0.7), "another temperature (0.2, now 0.7)"),
-        (Settings(top_p=0.5), "another top-p (0.95, now 0.5)"),
-        (Settings(max_tokens=100), "another max-tokens (512, now 100)"),
-        (Settings(seed=1), "another seed (none, now 1)"),
+        (Settings(temperature=0.7), "temperature (0.2, now 0.7)"),
+        (Settings(top_p=0.5), "top-p (0.95, now 0.5)"),
+        (Settings(max_tokens=100), "max-tokens (512, now 100)"),
+        (Settings(seed=1), "seed (none, now 1)"),
     ],
 )
 def test_other_settings_are_refused(tmp_path: Path, paper: Suite, settings: Settings, what: str) -> None:
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted())
     before = run.completions.read_bytes(), run.about.read_bytes()
-    with pytest.raises(
-        BadInput, match=re.escape(f"run.json: the completions were asked for with {what}; name")
-    ):
+    with pytest.raises(BadInput, match=re.escape(what)) as error:
         generated(run, paper, Scripted(), settings=settings)
+    assert error.value.file == run.about
     assert (run.completions.read_bytes(), run.about.read_bytes()) == before
 
 
 def test_another_model_or_template_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted())
-    with pytest.raises(BadInput, match=r"another model \(scripted:one, now scripted:two\)"):
+    with pytest.raises(BadInput, match=r"\(scripted:one, now scripted:two\)"):
         generated(run, paper, Scripted(name="scripted:two"))
     run.about.write_text(json.dumps(about(run) | {"template": "0" * 64}))
-    with pytest.raises(BadInput, match=r"another prompt template \(000000000000\.\.\., now "):
+    with pytest.raises(BadInput, match=r"template \(000000000000\.\.\., now "):
         generated(run, paper, Scripted())
 
 
@@ -203,12 +202,11 @@ def test_completions_from_elsewhere_are_left_alone(tmp_path: Path, paper: Suite)
     run = Run(tmp_path / "run")
     run.path.mkdir()
     run.completions.write_bytes(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}))
-    with pytest.raises(
-        BadInput, match=r"run.json: is missing, so that nobody knows how the completions were"
-    ):
+    with pytest.raises(BadInput, match="missing") as error:
         generated(run, paper, Scripted())
+    assert error.value.file == run.about
     run.about.write_text('{"model": null}')
-    with pytest.raises(BadInput, match="holds completions that were brought from elsewhere"):
+    with pytest.raises(BadInput, match="from elsewhere"):
         generated(run, paper, Scripted())
 
 
@@ -218,13 +216,13 @@ def test_completions_of_another_instruction_are_refused(tmp_path: Path, paper: S
     first, *others = rows(run)
     changed = [first | {"instruction": "Do something else."}, *others]
     run.completions.write_bytes(b"".join(map(to_line, changed)))
-    with pytest.raises(BadInput, match=r"/0/0 was asked for with another instruction than the suite has now"):
+    with pytest.raises(BadInput, match=r"/0/0 .* instruction"):
         generated(run, paper, Scripted())
 
 
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = Run(tmp_path / "run")
-    with run.writing(), pytest.raises(BadInput, match="another process is writing this run"):
+    with run.writing(), pytest.raises(BadInput, match="another process"):
         generated(run, paper, Scripted())
 
 
@@ -246,7 +244,9 @@ def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: 
     run = Run(tmp_path / "run")
     refusing = Scripted(fails=lambda number: REFUSED if number in {3, 7} else None)
     progress = generated(run, paper, refusing, pace=Pace(concurrency=1))
-    assert progress.missing == "2 completions are missing: the key in SCRIPTED_API_KEY is refused"
+    assert progress.missing is not None
+    assert progress.missing.startswith("2 completions ")
+    assert "SCRIPTED_API_KEY" in progress.missing
     assert about(run)["ended"] is None
     model = Scripted()
     assert generated(run, paper, model).missing is None
@@ -266,7 +266,7 @@ def test_a_model_that_only_fails_is_given_up_and_leaves_nothing(
     tmp_path: Path, paper: Suite, concurrency: int, most: int
 ) -> None:
     model = Scripted(fails=lambda _: REFUSED)
-    with pytest.raises(ModelError, match="SCRIPTED_API_KEY is refused"):
+    with pytest.raises(ModelError, match="SCRIPTED_API_KEY"):
         generated(Run(tmp_path / "runs" / "run"), paper, model, pace=Pace(concurrency))
     assert len(model.asked) <= most
     assert list(tmp_path.iterdir()) == []
@@ -274,7 +274,7 @@ def test_a_model_that_only_fails_is_given_up_and_leaves_nothing(
 
 
 def test_a_reply_too_long_to_be_kept_is_a_failure(tmp_path: Path, paper: Suite) -> None:
-    with pytest.raises(ModelError, match=r"the reply is too long to be kept: 6,0\d\d,\d\d\d bytes"):
+    with pytest.raises(ModelError, match=r"too long .* 6,0\d\d,\d\d\d bytes"):
         generated(Run(tmp_path / "run"), paper, Scripted(text="#" * 3_000_000), pace=Pace(1))
 
 
@@ -283,7 +283,7 @@ def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: 
     progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
     assert progress.done == 10
     assert progress.missing is not None
-    assert progress.missing.startswith("20 completions are missing: the token budget of 1,000 is spent")
+    assert re.match(r"20 completions .*\btoken budget of 1,000\b", progress.missing)
     assert len(rows(run)) == 10
     assert not run.in_flight.exists()
     progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
@@ -473,5 +473,6 @@ def test_a_note_that_somebody_broke_is_refused(tmp_path: Path, paper: Suite, lin
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted())
     run.in_flight.write_text(f'{{"lost": 0}}\n{line}\n')
-    with pytest.raises(BadInput, match=r"inflight\.jsonl, line 2: this line notes no request; delete"):
+    with pytest.raises(BadInput, match="request") as error:
         generated(run, paper, Scripted())
+    assert (error.value.file, error.value.line) == (run.in_flight, 2)

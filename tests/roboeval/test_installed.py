@@ -59,9 +59,7 @@ def test_a_suite_is_found_by_its_name_without_running_its_package(install: Insta
     ended = roboeval("tasks", "--lint", "--suite", "garden", environment=ENVIRONMENT | dict(os.environ))
     assert (ended.status, ended.out) == (0, "nothing was found\n"), ended
     listed = roboeval("tasks", environment=ENVIRONMENT | dict(os.environ))
-    assert (
-        "other suites, by --suite: plus, garden (garden-suite 1.0); or the folder of your own" in listed.err
-    )
+    assert "garden (garden-suite 1.0)" in listed.err
 
 
 def test_it_may_lie_in_a_folder_of_the_package(install: Install) -> None:
@@ -79,28 +77,22 @@ def test_the_pages_show_runs_that_were_judged_by_it(
     install()
     install("broken-suite", "broken", whole=False)
     assert list(Shelf(Path("runs")).suites) == ["paper", "plus", "garden"]
-    assert (
-        'a suite is left out: the package broken-suite 1.0 says that its suite "broken"'
-        in capsys.readouterr().err
-    )
+    warning = capsys.readouterr().err
+    assert "broken-suite 1.0" in warning
+    assert '"broken"' in warning
 
 
 def test_two_packages_with_one_name(install: Install) -> None:
     install()
     install("other-suite")
-    with pytest.raises(
-        BadInput,
-        match=r'have a suite "garden": garden-suite 1\.0 \(garden_suite\) and other-suite 1\.0',
-    ):
+    with pytest.raises(BadInput, match=r'"garden": garden-suite 1\.0 \(garden_suite\) and other-suite 1\.0'):
         load_suite("garden")
 
 
 def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
     install()
     new_task(Path("garden"), "WaterPlants")
-    with pytest.raises(
-        BadInput, match=r"garden-suite 1\.0 and a folder here; write \./garden for the folder"
-    ):
+    with pytest.raises(BadInput, match=r"garden-suite 1\.0 and .* \./garden "):
         load_suite("garden")
     assert load_suite("./garden").folder == Path("garden").resolve()
 
@@ -108,28 +100,22 @@ def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
 def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) -> None:
     folder = install(name="paper")
     assert load_suite("paper").folder != folder
-    assert any('garden-suite 1.0 names a suite "paper"' in sentence for sentence in other_suites("paper"))
+    assert any("garden-suite 1.0" in each and '"paper"' in each for each in other_suites("paper"))
 
 
 @pytest.mark.parametrize(
-    ("changed", "sentence"),
+    ("changed", "named"),
     [
-        (
-            {"whole": False},
-            r"says that its suite \"garden\" is garden_suite, but there is no suite.yaml in .*garden_suite",
-        ),
-        ({"place": "gone"}, r'its suite "garden" is gone, but there is no package "gone"'),
-        ({"place": "garden_suite:SUITE"}, r'there is no package "garden_suite:SUITE"'),
-        (
-            {"point": "roses", "name": "garden"},
-            r'line 1: the suite is named "garden", but its package calls it "roses"',
-        ),
+        ({"whole": False}, r'"garden" is garden_suite, .*suite\.yaml in .*garden_suite'),
+        ({"place": "gone"}, r'"garden" is gone, .*no package "gone"'),
+        ({"place": "garden_suite:SUITE"}, r'no package "garden_suite:SUITE"'),
+        ({"point": "roses", "name": "garden"}, r'line 1: .*"garden", .*"roses"'),
     ],
 )
-def test_a_broken_package(install: Install, changed: dict[str, str], sentence: str) -> None:
+def test_a_broken_package(install: Install, changed: dict[str, str], named: str) -> None:
     install(**changed)
     asked = changed.get("point", "garden")
-    with pytest.raises(BadInput, match=sentence):
+    with pytest.raises(BadInput, match=named):
         load_suite(asked)
     ended = roboeval("tasks", "--suite", asked, environment=ENVIRONMENT | dict(os.environ))
     assert (ended.status, ended.err.count("\n"), "Traceback" in ended.err) == (2, 1, False)
@@ -138,8 +124,8 @@ def test_a_broken_package(install: Install, changed: dict[str, str], sentence: s
 def test_nobody_starts_a_task_in_a_suite_of_somebody_else(install: Install) -> None:
     install()
     for suite, why in (
-        ("garden", "belongs to the package garden-suite 1.0"),
-        ("plus", "ships with RoboEval"),
+        ("garden", "garden-suite 1.0"),
+        ("plus", "RoboEval"),
     ):
         ended = roboeval(
             "tasks", "--new", "MakeTea", "--suite", suite, environment=ENVIRONMENT | dict(os.environ)

@@ -105,7 +105,8 @@ def test_a_sound_task_has_no_finding(linted: Lint) -> None:
 def test_a_requirement_that_cannot_hold(linted: Lint) -> None:
     (finding,) = linted({"odd": 'tr.Exists(say("a")) and not tr.Exists(say("a|b"))'}, ["odd"])
     assert finding.name == "unsatisfiable: odd"
-    assert finding.message == 'no text was found with which "odd" can hold in world 1'
+    assert '"odd"' in finding.message
+    assert "world 1" in finding.message
     assert finding.line == 5  # of the check, which can hold in no world
     assert linted({"even": 'tr.Exists(say("a|b")) and not tr.Exists(say("a"))'}, ["even"]) == []
 
@@ -122,17 +123,15 @@ def test_what_needs_a_visit_to_an_absent_room_can_hold_only_if_requests_are_odd(
     findings = linted(checks, ["greets"])
     assert names(findings) == ["absent: lobby in greets", "unsatisfiable: greets"]
     assert [one.line for one in findings] == [13, 13]
-    assert findings[1].message.endswith("as long as each visit names one room of the world")
+    assert "each visit" in findings[1].message
 
 
 def test_a_requirement_that_follows_from_another(linted: Lint) -> None:
     checks = {"greets": GREETS_THERE, "goes": GOES, "speaks": SPEAKS}
     (one, other) = linted(checks, ["greets", "goes", "speaks"])
     assert (one.name, other.name) == ("implied: goes", "implied: speaks")
-    assert one.message == (
-        'no sequence of the texts that were tried breaks "goes" in world 1 without breaking "greets"; '
-        "it may never be the only one to fail"
-    )
+    for name in ('"goes"', "world 1", '"greets"'):
+        assert name in one.message
     assert linted(checks, ["goes", "speaks"], ["greets"]) == []
 
 
@@ -141,14 +140,15 @@ def test_a_requirement_that_follows_from_several(linted: Lint) -> None:
     checks = {"greets": GREETS_THERE, "asks_first": asks_first}
     checks["asks"] = 'tr.ActAtFirst("kitchen", ask("tea", ".*"))'
     (finding,) = linted(checks, ["greets", "asks_first", "asks"])
-    assert 'breaks "asks" in world 1 without breaking one of "greets" and "asks_first"; ' in finding.message
+    for name in ('"asks"', "world 1", '"greets" and "asks_first"'):
+        assert name in finding.message
     assert linted(checks, ["asks_first", "asks"], ["greets", "asks"]) == []
 
 
 def test_a_requirement_that_always_holds(linted: Lint) -> None:
     (finding,) = linted({"any": 'tr.AtLeast(say("a"), 0)'}, ["any"])
-    tried = 'no sequence of the texts that were tried breaks "any" in world 1'
-    assert finding.message == f"{tried}; it may never be the only one to fail"
+    assert '"any" in world 1' in finding.message
+    assert "without" not in finding.message
     assert finding.line == 5
     checks = {"none(x)": 'tr.AtLeast(say("{x}"), 0)', "speaks": SPEAKS}
     found = linted(checks, ["speaks"], ['none("b")', "speaks"])
@@ -180,28 +180,25 @@ def test_a_check_that_no_wrong_program_trips(linted: Lint) -> None:
     assert linted(checks, ["speaks", "not swears"], recorded=swears, untripped=True) == []
 
 
-def test_how_many_programs_trip_nothing_is_said_in_english(linted: Lint) -> None:
+def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
     checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
     (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
-    assert finding.message == (
-        'the only wrong program of the task does not trip "not swears"; record one that does'
-    )
+    assert '"not swears"' in finding.message
+    assert not re.search(r"\d", finding.message)
     two = (
         RECORDED
         + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
     )
     (finding,) = linted(checks, ["speaks", "not swears"], recorded=two, untripped=True)
-    assert finding.message.startswith("none of the 2 wrong programs of the task trips ")
+    assert "2 wrong programs" in finding.message
 
 
 def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:
     speaks = RECORDED.replace("pass", "say('hello')")
     found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], recorded=speaks, untripped=True)
     (message,) = (one.message for one in found if one.kind == "untripped")
-    assert message == (
-        'none of the 2 wrong programs of the task trips "speaks" where it is required without "not"; '
-        "record one that does"
-    )
+    for name in ("2 wrong programs", '"speaks"', '"not"'):
+        assert name in message
 
 
 def test_a_task_without_wrong_programs(linted: Lint) -> None:
@@ -259,7 +256,7 @@ def test_a_visit_that_leads_nowhere(linted: Lint) -> None:
         :2
     ]
     assert {dead.kind, absent.kind} == {"dead-regex", "absent"} or dead.kind == "dead-regex"
-    assert "gets anywhere in world 1" in dead.message
+    assert "world 1" in dead.message
     fine = linted({"goes": 'not tr.Exists(goto("^(the )?kitchen$"))', "speaks": SPEAKS}, ["goes", "speaks"])
     assert fine == []
 
@@ -298,7 +295,8 @@ def test_a_person_who_is_not_in_the_world(linted: Lint) -> None:
     checks = {"greets(person)": 'tr.Exists(say("{person}"))'}
     (finding,) = linted(checks, ['not greets("bob")', 'greets("ann")'])
     assert finding.name == 'absent: bob in not greets("bob")'
-    assert finding.message == '"not greets("bob")" is about the person "bob", but world 1 has none'
+    assert finding.message.count('"bob"') == 2
+    assert "world 1" in finding.message
 
 
 def test_a_person_of_another_room_or_named_by_another_parameter(linted: Lint) -> None:
@@ -422,15 +420,14 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     findings = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
     path = findings[0].path
     monkeypatch.chdir(path.parent)
-    line = 'Hello.yaml:6: warning: no world requires the check "goes"; require it or remove it [unused: goes]'
+    line = f"Hello.yaml:6: warning: {findings[0].message} [unused: goes]"
+    assert '"goes"' in findings[0].message
     assert render(findings) == line
     accepted = replace(findings[0], accepted="for later")
-    assert render([*findings, accepted]) == (
-        f"{line}\n1 finding more is accepted by the task files; --accepted tells why"
-    )
-    assert render([accepted, accepted]) == (
-        "nothing was found but 2 findings that the task files accept; --accepted tells why"
-    )
+    shown, more = render([*findings, accepted]).splitlines()
+    assert shown == line
+    assert re.search(r"^1 finding more .* --accepted", more)
+    assert re.search(r"^nothing was found .*\b2 findings .* --accepted", render([accepted, accepted]))
     told = line.replace("warning", "accepted") + ": for later"
     assert render([*findings, accepted], accepted=True) == f"{line}\n{told}"
     assert render([accepted], accepted=True) == told
@@ -443,29 +440,26 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("reply", "sentence"),
+    ("reply", "named"),
     [
-        (
-            "{about: is lazy, program: 'def task_program(): 0'}",
-            "is said to pass, but it fails by SayAtLocation in the world",
-        ),
+        ("{about: is lazy, program: 'def task_program(): 0'}", ["pass, ", "by SayAtLocation", "world"]),
         (
             "{about: is lazy, fails: Location, program: 'def task_program(): 0'}",
-            "is said to fail by Location, but it fails by SayAtLocation in the world",
+            ["by Location, ", "by SayAtLocation", "world"],
         ),
         (
             "{about: greets, fails: Location, program: 'def task_program(): go_to(`kitchen`); say(`hello`)'}",
-            "is said to fail by Location, but it passes; mend it",
+            ["by Location, ", "passes"],
         ),
     ],
 )
 def test_a_recorded_program_that_ends_otherwise_than_it_is_said_to(
-    linted: Lint, reply: str, sentence: str
+    linted: Lint, reply: str, named: list[str]
 ) -> None:
     recorded = RECORDED + f"    - {reply}\n".replace("`", '"')
     found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded, untripped=True)
     (finding,) = (one for one in found if one.kind == "misjudged")
-    assert sentence in finding.message
+    assert all(name in finding.message for name in named), finding
 
 
 # --- recorded programs for what nobody asks
@@ -475,10 +469,8 @@ def test_programs_for_an_instruction_that_is_no_prompt(linted: Lint) -> None:
     recorded = RECORDED + RECORDED.replace("Say hello", "Say helo").replace("pass", "0")
     (finding,) = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded)
     assert finding.name == "unasked: Say helo in the kitchen."
-    assert finding.message == (
-        'programs are recorded for "Say helo in the kitchen.", which no prompt of the task is, so that they '
-        'are left out; the closest is "Say hello in the kitchen."'
-    )
+    for name in ('"Say helo in the kitchen."', '"Say hello in the kitchen."'):
+        assert name in finding.message
     assert (finding.path.parent.name, finding.path.name) == ("careful", "Hello.yaml")
     assert finding.line == 7
 
@@ -521,20 +513,16 @@ FACTS = "prompts: [Say hello in the kitchen.]\nfacts: [{fact: where, words: [%s]
 
 
 @pytest.mark.parametrize(
-    ("word", "commonsense", "message"),
+    ("word", "commonsense", "named"),
     [
         ("Kitchen", "false", None),
         ("lab", "true", None),
-        ("lab", "false", 'prompt 0 does not say "where", by none of its words; say it'),
-        (
-            "kit.hen",
-            "true",
-            'prompt 0 says "where" by "kit.hen", but that is to be common sense; leave it out',
-        ),
+        ("lab", "false", ["prompt 0", '"where"']),
+        ("kit.hen", "true", ["prompt 0", '"where"', '"kit.hen"', "common sense"]),
     ],
 )
 def test_a_fact_that_a_prompt_does_not_say(
-    tmp_path: Path, word: str, commonsense: str, message: str | None
+    tmp_path: Path, word: str, commonsense: str, named: list[str] | None
 ) -> None:
     path = new_task(tmp_path, "MakeTea")
     head, _, _ = path.read_text().partition("prompts:")
@@ -542,7 +530,8 @@ def test_a_fact_that_a_prompt_does_not_say(
     path.write_text(head + FACTS % (word, commonsense) + "checks:" + rest)
     task = load_suite(tmp_path).task("MakeTea")
     found = [one for one in lint(task, []) if one.kind == "unsaid"]
-    assert [(one.name, one.message) for one in found] == [("unsaid: where", message)] * (message is not None)
+    assert [one.name for one in found] == ["unsaid: where"] * (named is not None)
+    assert all(name in one.message for one in found for name in named or [])
     assert all(path.read_text().splitlines()[(one.line or 0) - 1].startswith("facts:") for one in found)
     assert not any(one.kind == "unsaid" for one in lint(replace(task, borrows=True), []))
 

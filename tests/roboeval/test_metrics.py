@@ -68,17 +68,17 @@ def test_pass_at_k_is_exact_for_many(n: int, c: int, k: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("n", "c", "k", "sentence"),
+    ("n", "c", "k", "named"),
     [
-        (5, 1, 6, "pass@6 cannot be estimated from 5 completions"),
-        (5, 1, 0, "pass@0 cannot be estimated from 5 completions"),
-        (0, 0, 1, "pass@1 cannot be estimated from 0 completions"),
-        (5, 6, 1, "6 of 5 completions cannot have passed"),
-        (5, -1, 1, "-1 of 5 completions cannot have passed"),
+        (5, 1, 6, "pass@6 .* 5 completions"),
+        (5, 1, 0, "pass@0 .* 5 completions"),
+        (0, 0, 1, "pass@1 .* 0 completions"),
+        (5, 6, 1, "6 of 5 completions"),
+        (5, -1, 1, "-1 of 5 completions"),
     ],
 )
-def test_pass_at_k_out_of_range(n: int, c: int, k: int, sentence: str) -> None:
-    with pytest.raises(ValueError, match=f"^{sentence}$"):
+def test_pass_at_k_out_of_range(n: int, c: int, k: int, named: str) -> None:
+    with pytest.raises(ValueError, match=f"^{named}"):
         pass_at_k(n, c, k)
 
 
@@ -110,7 +110,7 @@ def test_t_quantile_of_the_brief() -> None:
 
 @pytest.mark.parametrize(("p", "df"), [(0, 1), (1, 1), (0.5, 0), (math.nan, 3)])
 def test_t_quantile_out_of_range(p: float, df: int) -> None:
-    with pytest.raises(ValueError, match=r"^Student's t has no quantile"):
+    with pytest.raises(ValueError, match="Student's t"):
         t_quantile(p, df)
 
 
@@ -187,11 +187,11 @@ def test_prompts_count_the_same_however_many_completions_they_have() -> None:
 
 def test_a_prompt_with_too_few_completions_is_named() -> None:
     b, a = score_by_prompt(ROWS)
-    sentence = "^B, prompt 0: pass@3 cannot be estimated from 2 completions$"
+    named = "^B, prompt 0: pass@3 .* 2 completions"
     for score in (b.pass_at, b.lowest, b.highest, lambda k: overall([a, b], k) if k < 3 else b.pass_at(k)):
-        with pytest.raises(ValueError, match=sentence):
+        with pytest.raises(ValueError, match=named):
             score(3)
     with pytest.raises(ValueError, match=r"^A, prompt 0: "):
         overall([a, b], 3)
-    with pytest.raises(ValueError, match=r"^there is no mean of no prompts$"):
+    with pytest.raises(ValueError, match="no prompts"):
         overall([], 1)

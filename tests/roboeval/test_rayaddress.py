@@ -41,12 +41,12 @@ def answering(monkeypatch: pytest.MonkeyPatch, status: int) -> None:
 )
 def test_what_is_no_address_is_refused(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RAY_ADDRESS", address)
-    with pytest.raises(BadInput, match=r"is no address of a Ray cluster: write HOST:PORT"):
+    with pytest.raises(BadInput, match=r"^RAY_ADDRESS: .*HOST:PORT"):
         expect_cluster()
 
 
 def test_ray_client_is_refused_by_its_name() -> None:
-    with pytest.raises(BadInput, match=r"Ray Client is not supported; write HOST:PORT"):
+    with pytest.raises(BadInput, match=r"Ray Client .*HOST:PORT"):
         expect_listener("ray://127.0.0.1:10001")
 
 
@@ -58,14 +58,18 @@ def test_where_nothing_listens_a_sentence_says_so_at_once() -> None:
     with pytest.raises(BadInput) as refused:
         expect_listener(f"127.0.0.1:{port}")
     assert monotonic() - started < rayaddress.PATIENCE_S
-    assert str(refused.value) == (
-        f"RAY_ADDRESS: there is no Ray cluster at 127.0.0.1:{port} (Connection refused); start its head with "
-        "`ray start --head`, or set RAY_ADDRESS=local to use the cores of this machine"
-    )
+    for said in (
+        "RAY_ADDRESS: ",
+        f"127.0.0.1:{port}",
+        "Connection refused",
+        "`ray start --head`",
+        "RAY_ADDRESS=local",
+    ):
+        assert said in refused.value.sentence
 
 
 def test_a_host_that_has_no_address_is_no_cluster() -> None:
-    with pytest.raises(BadInput, match=r"there is no Ray cluster at x\.\.y:6379 "):
+    with pytest.raises(BadInput, match=r"no Ray cluster .*x\.\.y:6379 "):
         expect_listener("x..y:6379")  # no name at all, so that nobody is asked for it
 
 
@@ -87,7 +91,7 @@ def test_what_listens_and_never_answers_is_waited_for_so_long(monkeypatch: pytes
     with socket.create_server(("127.0.0.1", 0)) as server:
         monkeypatch.setenv("RAY_ADDRESS", f"127.0.0.1:{server.getsockname()[1]}")
         started = monotonic()
-        with pytest.raises(BadInput, match=r"what listens at .* does not answer as a Ray cluster; start"):
+        with pytest.raises(BadInput, match="does not answer"):
             expect_cluster()
     assert monotonic() - started < 30
 
@@ -95,9 +99,9 @@ def test_what_listens_and_never_answers_is_waited_for_so_long(monkeypatch: pytes
 @pytest.mark.parametrize(
     ("status", "sentence"),
     [
-        (SILENT, r"does not answer as a Ray cluster"),
-        (LOCKED, r"wants its token: set RAY_AUTH_MODE=token"),
-        (OUTSIDE, r"this machine is no node of the Ray cluster at .*; join it with `ray start --address="),
+        (SILENT, "does not answer"),
+        (LOCKED, "RAY_AUTH_MODE=token"),
+        (OUTSIDE, "`ray start --address="),
     ],
 )
 def test_what_a_cluster_answers_is_told(status: int, sentence: str, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,9 +121,8 @@ def test_a_cluster_that_is_only_remembered_is_told(monkeypatch: pytest.MonkeyPat
     note = remember(tmp_path)
     with pytest.raises(BadInput) as refused:
         expect_cluster()
-    assert str(refused.value).startswith(
-        f"{note}: the Ray cluster of this machine does not answer; `ray stop`"
-    )
+    assert str(refused.value).startswith(f"{note}: ")
+    assert "`ray stop`" in refused.value.sentence
     answering(monkeypatch, LOCKED)
     expect_cluster()  # Ray looks for the token of this machine's cluster itself
     answering(monkeypatch, SILENT)

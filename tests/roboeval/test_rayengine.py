@@ -67,7 +67,7 @@ def test_shards_are_small_at_first() -> None:
 def test_another_version_does_not_judge() -> None:
     told = call_all(lambda _, key: key, [1], ("0.0.1", "3.9"))
     assert told.values == ()
-    assert "and not codebotler 0.0.1 with Python 3.9" in str(told.complaint)
+    assert re.search(r"codebotler 0\.0\.1 .*Python 3\.9", str(told.complaint))
     assert call_all(lambda _, key: key, [1], OURS).values == (1,)
 
 
@@ -77,7 +77,7 @@ def test_a_wall_that_is_missing_is_told_once_or_refused(caplog: pytest.LogCaptur
     for _ in range(3):
         lenient._look_at_walls(bare)
     assert caplog.messages == [f"far: {NO_SECCOMP}"]
-    with pytest.raises(EngineError, match=r"^far: programs are less isolated"):
+    with pytest.raises(EngineError, match=r"^far: .*isolated"):
         Cluster(require_isolation=True)._look_at_walls(bare)
     Cluster(require_isolation=True)._look_at_walls(Told((1,)))
 
@@ -112,13 +112,13 @@ def alone(folder: str, address: str = "") -> subprocess.CompletedProcess[str]:
 def test_ray_that_was_imported_before_would_let_others_in(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(LOOPBACK_ONLY, "1")
     monkeypatch.setenv("RAY_ADDRESS", "localhost:6379")
-    with pytest.raises(BadInput, match=f"set {LOOPBACK_ONLY}=0 before it is imported"):
+    with pytest.raises(BadInput, match=f"{LOOPBACK_ONLY}=0"):
         Cluster()
 
 
 def test_where_ray_cannot_start_there_is_a_sentence(tmp_path: Path) -> None:
     ended = alone(str(tmp_path / ("long" * 20)))
-    assert "BadInput: Ray cannot be started here: " in ended.stderr.splitlines()[-1]
+    assert "BadInput: Ray cannot be started" in ended.stderr.splitlines()[-1]
 
 
 @pytest.mark.parametrize("address", ["", "local"])
@@ -149,7 +149,7 @@ def test_a_server_that_is_no_cluster_is_not_waited_for(monkeypatch: pytest.Monke
         threading.Thread(target=server.serve_forever, daemon=True).start()
         monkeypatch.setenv("RAY_ADDRESS", f"{HERE}:{server.server_port}")
         started = time.monotonic()
-        with pytest.raises(BadInput, match=r"does not answer as a Ray cluster"):
+        with pytest.raises(BadInput, match="does not answer"):
             Cluster()
         assert time.monotonic() - started < 2 * PING_PATIENCE_S
         server.shutdown()
@@ -211,13 +211,13 @@ def test_a_cluster_that_wants_its_token_says_so(nodes: Nodes, tmp_path: Path) ->
             environment={**environment(nodes), **token},
         )
         assert (ended.status, ended.out) == (2, "")
-        assert re.fullmatch(r"roboeval: RAY_ADDRESS: .* wants its token: set RAY_AUTH_MODE=.*\n", ended.err)
+        assert re.fullmatch(r"roboeval: RAY_ADDRESS: .* RAY_AUTH_MODE=.*\n", ended.err)
         assert not list(tmp_path.iterdir())
 
 
 def test_what_is_of_ray_and_no_head_is_not_waited_for(nodes: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RAY_ADDRESS", f"{HERE}:{nodes.port_of_a_node}")
-    with pytest.raises(BadInput, match=r"does not answer as a Ray cluster"):
+    with pytest.raises(BadInput, match="does not answer"):
         Cluster()
 
 
@@ -315,5 +315,5 @@ def test_a_cluster_without_a_core_ends_with_a_sentence(nodes: Nodes, monkeypatch
         results = cluster.map_distinct(
             lambda _, key: key, [1, 2], name=lambda key: str(key).encode(), then=abs
         )
-        with pytest.raises(EngineError, match="has no core left"):
+        with pytest.raises(EngineError, match="no core"):
             list(results)

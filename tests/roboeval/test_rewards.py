@@ -4,7 +4,6 @@ import gc
 import logging
 import multiprocessing
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -164,44 +163,45 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
 
 
 def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
-    with pytest.raises(BadInput, match="put it into a list"):
+    with pytest.raises(BadInput, match="a list"):
         reward("SayGoodDay", 0, RIGHT)
-    with pytest.raises(BadInput, match='no task "Sing"'):
+    with pytest.raises(BadInput, match='"Sing"'):
         reward("Sing", 0, [RIGHT], suite=paper)
     with pytest.raises(BadInput, match="prompts 0 to 4"):
         reward("SayGoodDay", 5, [RIGHT])
     with pytest.raises(BadInput, match="written by hand"):
         reward("SayGoodDay", 0, [RIGHT], worlds=3)
-    with pytest.raises(BadInput, match="the number of worlds is 0, but it must be at least 1"):
+    with pytest.raises(BadInput, match=r"worlds is 0, .* 1"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=0)
-    with pytest.raises(BadInput, match="the number of worlds is 1000000000, but it must be at most 10,000"):
+    with pytest.raises(BadInput, match=r"worlds is 1000000000, .* 10,000"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=10**9)
     wrong: Any = "7"
-    with pytest.raises(BadInput, match="the seed is '7', not a whole number"):
+    with pytest.raises(BadInput, match="seed is '7'"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", seed=wrong)
     wrong = None
-    with pytest.raises(BadInput, match="the suite's name is None, not a text"):
+    with pytest.raises(BadInput, match=r"suite.* is None"):
         reward("SayGoodDay", 0, [RIGHT], suite=wrong)
     assert reward("SayGoodDay", 0, []) == []
 
 
 @pytest.mark.parametrize(
-    ("task", "prompt", "programs", "sentence"),
+    ("task", "prompt", "programs", "named"),
     [
-        ("LunchTime", 0, [None], "one of the programs is None, not a text"),
-        ("LunchTime", 0, None, "the programs are None, not a list of texts"),
-        ("LunchTime", "0", [], "the prompt is '0', not a whole number; the task has prompts 0 to 4"),
-        ("LunchTime", True, [], "the prompt is True, not a whole number; the task has prompts 0 to 4"),
-        ("LunchTime", -1, [], "LunchTime/-1/0: the task has prompts 0 to 4"),
-        (["LunchTime"], 0, [], 'the suite "paper" has no task'),
+        ("LunchTime", 0, [None], ["programs is None"]),
+        ("LunchTime", 0, None, ["programs are None", "list"]),
+        ("LunchTime", "0", [], ["prompt is '0'", "0 to 4"]),
+        ("LunchTime", True, [], ["prompt is True", "0 to 4"]),
+        ("LunchTime", -1, [], ["LunchTime/-1/0", "0 to 4"]),
+        (["LunchTime"], 0, [], ['"paper"', "no task"]),
     ],
 )
 def test_arguments_of_another_kind_are_refused(
-    task: object, prompt: object, programs: object, sentence: str
+    task: object, prompt: object, programs: object, named: list[str]
 ) -> None:
     wrong: Any = (task, prompt, programs)
-    with pytest.raises(BadInput, match=f"^{re.escape(sentence)}"):
+    with pytest.raises(BadInput) as error:
         reward(*wrong)
+    assert all(name in error.value.sentence for name in named), error.value
 
 
 # --- processes

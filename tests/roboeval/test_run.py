@@ -186,9 +186,9 @@ def test_a_program_that_was_changed_is_refused_unless_all_is_redone(tmp_path: Pa
     kept = run.completions.read_bytes()
     run.completions.write_bytes(kept.replace(b"#1", b"#one"))
     before = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
-    changed = r"line 2: the program of SayGoodDay/0/1 has changed since it was judged; --redo starts over"
-    with pytest.raises(BadInput, match=changed):
+    with pytest.raises(BadInput, match=r"SayGoodDay/0/1 .* --redo") as error:
         judged(run, paper)
+    assert (error.value.file, error.value.line) == (run.rows("paper"), 2)
     assert before == (run.rows("paper").read_bytes(), run.programs("paper").read_bytes())
     run.completions.write_bytes(kept)
     assert len(judged(run, paper)) == 3
@@ -208,7 +208,7 @@ def test_a_program_that_is_changed_while_it_waits_is_tied_to_what_was_judged(
     assert len(list(rows)) == 299
     assert len(judged(run, paper)) == 300
     run.completions.write_bytes(kept)
-    with pytest.raises(BadInput, match="SayGoodDay/0/299 has changed"):
+    with pytest.raises(BadInput, match="SayGoodDay/0/299 "):
         judged(run, paper)
 
 
@@ -242,7 +242,7 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
     ) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        with pytest.raises(BadInput, match="another process is writing this run"):
+        with pytest.raises(BadInput, match="another process"):
             judged(run, paper)
         process.kill()
     assert len(judged(run, paper)) == 1
@@ -251,10 +251,10 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
 @pytest.mark.parametrize(
     ("name", "value", "what"),
     [
-        ("digest", "0" * 64, "content of the suite ("),
-        ("python", "2.7", 'version of Python ("2.7", now "3.'),
-        ("codebotler", "0.0.1", 'version of this tool ("0.0.1", now '),
-        ("tasks", ["LunchTime", "GetDrink"], "selection of tasks (LunchTime, GetDrink, now all)"),
+        ("digest", "0" * 64, "suite ("),
+        ("python", "2.7", 'Python ("2.7", now "3.'),
+        ("codebotler", "0.0.1", 'tool ("0.0.1", now '),
+        ("tasks", ["LunchTime", "GetDrink"], "tasks (LunchTime, GetDrink, now all)"),
         ("ablation", True, "ablation (true, now false)"),
     ],
 )
@@ -265,7 +265,7 @@ def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
     judged(run, paper)
     about = json.loads(run.head("paper").read_text())
     run.head("paper").write_text(json.dumps(about | {name: value}))
-    with pytest.raises(BadInput, match=rf"with another {re.escape(what)}.*; --redo starts over$"):
+    with pytest.raises(BadInput, match=rf"{re.escape(what)}.* --redo"):
         judged(run, paper)
     assert len(judged(run, paper, redo=True)) == 1
     assert json.loads(run.head("paper").read_text()) == about
@@ -285,14 +285,14 @@ def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> 
     judged(run, paper)
     rows = run.completions.read_bytes().splitlines(keepends=True)
     run.completions.write_bytes(rows[1] + rows[0])
-    with pytest.raises(BadInput, match="judges SayGoodDay/0/0 where the completions have SayGoodDay/0/1"):
+    with pytest.raises(BadInput, match=r"SayGoodDay/0/0 .* SayGoodDay/0/1"):
         judged(run, paper)
 
 
 def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS])
     before = run.completions.read_bytes()
-    with pytest.raises(BadInput, match="this run holds other completions"):
+    with pytest.raises(BadInput, match="other completions"):
         careful_run(run.path, paper)
     assert run.completions.read_bytes() == before
 
@@ -301,7 +301,7 @@ def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> 
 def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more: str | None) -> None:
     run = a_run(tmp_path / "run", [GREETS, "#"])
     other = a_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
-    with pytest.raises(BadInput, match="this run holds other completions"):
+    with pytest.raises(BadInput, match="other completions"):
         run.keep(open_source(str(other.path), paper))
     assert run.keep(open_source(str(run.path), paper)) == 2
 
@@ -333,17 +333,18 @@ def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Pat
     (folder / "SayGoodDay_0_3.py").write_text(f"name = 'x'\nprompt = 'p'\ncompletion = {GREETS!r}\n")
     assert [c.key for c in open_source(str(folder), paper).read()] == [("SayGoodDay", 0, 3)]
     assert len(list(open_source("recorded:hasty", paper).read())) >= 160
-    with pytest.raises(BadInput, match="no such file or folder"):
+    with pytest.raises(BadInput, match="no such file or folder") as error:
         open_source(str(tmp_path / "nothing"), paper)
+    assert str(error.value.file) == str(tmp_path / "nothing")
 
 
 def test_only_tasks_with_an_ablation_are_ablated(paper: Suite) -> None:
     kept, left = tasks_to_judge(paper, "LunchTime,SayGoodDay", ablated=True)
     assert kept == frozenset({"LunchTime"})
     assert left == ("SayGoodDay",)
-    with pytest.raises(BadInput, match="none of SayGoodDay has an ablation"):
+    with pytest.raises(BadInput, match=r"SayGoodDay .* ablation"):
         tasks_to_judge(paper, "SayGoodDay", ablated=True)
-    with pytest.raises(BadInput, match='has no task "Nonsense"'):
+    with pytest.raises(BadInput, match='"Nonsense"'):
         tasks_to_judge(paper, "Nonsense", ablated=False)
 
 
@@ -380,8 +381,9 @@ def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> No
     run = a_run(tmp_path / "run", ["def task_program(): pass\n"])
     judged(run, paper)
     run.head("paper").unlink()
-    with pytest.raises(BadInput, match="nobody knows by what the rows were judged; --redo starts over"):
+    with pytest.raises(BadInput, match="--redo") as error:
         judged(run, paper)
+    assert error.value.file == run.head("paper")
 
 
 def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(

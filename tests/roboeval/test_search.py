@@ -108,16 +108,18 @@ def test_the_command(runs: Path) -> None:
     assert sum(group["size"] for group in data["groups"]) == failed > 0
     assert all(group["why"] for group in data["groups"])
     few = roboeval("find", runs, "--groups", "1").out
-    assert "smaller groups; --groups shows more" in few
+    assert "--groups" in few
 
 
 def test_what_is_refused(runs: Path) -> None:
-    said = refused("find", runs, 'tr.Exist(goto("lab"))')
-    assert said == "this is no formula: column 4: unknown test Exist; did you mean Exists?"
-    assert refused("find", runs, "--not").startswith("--not is about a formula")
-    assert refused("find", runs, "--task", "Nothing").startswith('the suite "paper" has no task "Nothing"')
-    said = refused("find", runs, "--task", "SayGoodDay", "--world", "99")
-    assert said.startswith('SayGoodDay has no world "99"')
+    said = refused("find", runs, 'tr.Exist(goto("lab"))').sentence
+    for name in ("column 4", "Exist;", "Exists?"):
+        assert name in said
+    assert refused("find", runs, "--not").sentence.startswith("--not ")
+    assert '"Nothing"' in refused("find", runs, "--task", "Nothing").sentence
+    said = refused("find", runs, "--task", "SayGoodDay", "--world", "99").sentence
+    assert "SayGoodDay" in said
+    assert '"99"' in said
 
 
 def test_rows_about_other_programs_are_refused(runs: Path) -> None:
@@ -127,4 +129,5 @@ def test_rows_about_other_programs_are_refused(runs: Path) -> None:
     ended = roboeval("find", runs)
     file.write_text(kept)
     assert ended.status == 2
-    assert "judge another program than stands in" in ended.err
+    assert "run/completions.jsonl" in ended.err
+    assert "--redo" in ended.err

@@ -2,7 +2,6 @@
 
 import copy
 import pickle
-import re
 from pathlib import Path
 
 import pytest
@@ -51,118 +50,137 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "sentence"),
+    ("old", "new", "line", "named"),
     [
-        ("summary: s\n", "", 'line 1: the key "summary" is missing'),
-        ("name: T", "name: U", 'line 1: the task is named "U", but its file "T.yaml"'),
-        ("prompts: [p]", "prompts: []", 'line 3: "prompts" has too few entries'),
-        ("category: Location", "category: Place", "line 5: \"category\" is 'Place', but it should be"),
-        ("goes:", "2 goes:", 'line 5: "2 goes" is no head of a check; write name or name(p1, p2)'),
+        ("summary: s\n", "", 1, '"summary"'),
+        ("name: T", "name: U", 1, 'named "U"'),
+        ("prompts: [p]", "prompts: []", 3, '"prompts"'),
+        ("category: Location", "category: Place", 5, "'Place'"),
+        ("goes:", "2 goes:", 5, '"2 goes"'),
         (
             "says(what)",
             '"says(what, )"',
-            'line 6: "says(what, )" is no head of a check; write name or name(p1, p2)',
+            6,
+            '"says(what, )"',
         ),
         (
             "says(what)",
             '"says(what, what)"',
-            'line 6: the check "says" has two parameters "what"; name them apart',
+            6,
+            'two parameters "what"',
         ),
-        ('"kitchen"))', '"kitchen")', 'line 5: the check "goes" is no valid formula'),
-        ("goto(", "gote(", 'line 5: the check "goes" is no valid formula'),
-        ("[goes,", "[gose,", 'line 11: there is no check "gose"; add it under checks'),
-        ("[goes,", '[goes("x"),', 'line 11: the check "goes" takes no argument, but "goes("x")" gives 1'),
-        ('says("bye")', "says(bye)", "is no requirement; write check, check"),
-        ('says("bye")', 'says(what="bye")', "is no requirement; write check, check"),
+        ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is no valid formula'),
+        ("goto(", "gote(", 5, 'the check "goes" is no valid formula'),
+        ("[goes,", "[gose,", 11, 'no check "gose"'),
+        ("[goes,", '[goes("x"),', 11, 'the check "goes" takes no argument'),
+        ('says("bye")', "says(bye)", 11, "no requirement"),
+        ('says("bye")', 'says(what="bye")', 11, "no requirement"),
         (
             'says("bye")]\n',
             'says("bye")]\n    ablation: []\n  - {about: b, robot: r, rooms: [r], require: [goes]}\n',
-            "line 7: some worlds have an ablation and some have none",
+            7,
+            "ablation",
         ),
         (
             'say("{what}")',
             'say("{waht}")',
-            'line 6: the check "says" has no parameter "waht"; its parameters are: what',
+            6,
+            '"waht"',
         ),
-        ("tr.Exists(goto(", 'tr.Exists(goto("{room}",', 'line 5: the check "goes" has no parameter "room"'),
+        ("tr.Exists(goto(", 'tr.Exists(goto("{room}",', 5, '"room"'),
         (
             'say("{what}")',
             'say("x{3}")',
-            'line 6: the check "says" does not use its parameter "what"; write {what} in its rtl',
+            6,
+            "{what}",
         ),
         (
             'says("bye")]\n',
             'says("bye")]\n  - robot: r\n    about: one\n    rooms: [r]\n    require: [goes]\n',
-            'line 13: world 2 is about "one", as world 1 is; say what is special in each',
+            13,
+            'world 2 is about "one"',
         ),
         (
             'says("bye")]\n',
             'says("bye")]\n  - robot: r\n    about: " One "\n    rooms: [r]\n    require: [goes]\n',
-            'line 13: world 2 is about " One ", as world 1 is; say what is special in each',
+            13,
+            'world 2 is about " One "',
         ),
-        ("require: [goes,", "demand: [goes,", 'line 8: the key "require" is missing'),
-        ("robot: kitchen", "robot: hall", 'line 9: the robot starts in "hall", but the rooms are: kitchen'),
+        ("require: [goes,", "demand: [goes,", 8, '"require" is missing'),
+        ("robot: kitchen", "robot: hall", 9, '"hall"'),
         (
             "prompts: [p]",
             'prompts: [p]\nfacts:\n  - {fact: f, words: ["("]}',
-            'line 5: "(" is no valid regular expression: missing ), unterminated subpattern at position 0',
+            5,
+            '"(" is no valid regular expression',
         ),
-        ("summary: s", "summary: s\nsummary: t", 'line 3: the key "summary" stands here a second time'),
-        ("summary: s", "summary: [s", "line 3: this is no valid YAML"),
+        ("summary: s", "summary: s\nsummary: t", 3, '"summary"'),
+        ("summary: s", "summary: [s", 3, "YAML"),
     ],
 )
-def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
+def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, line: int, named: str) -> None:
     assert old in TASK
     with pytest.raises(BadInput) as caught:
         load_suite(a_suite(tmp_path, TASK.replace(old, new, 1)))
-    assert str(caught.value).startswith(f"{tmp_path}/tasks/T.yaml, ")
-    assert sentence in str(caught.value)
+    assert (caught.value.file, caught.value.line) == (tmp_path / "tasks" / "T.yaml", line)
+    assert named in caught.value.sentence
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    ("suite", "sentence"),
+    ("suite", "line", "named"),
     [
-        ("name: mine\nversion: one\n", 'line 2: "version" is a text, not a whole number'),
+        ("name: mine\nversion: one\n", 2, ['"version"', "whole number"]),
         (
             "name: mine\nversion: 1\nrules: {limits: {seconds: .inf}}\n",
-            'line 3: "seconds" is no finite number',
+            3,
+            ['"seconds"', "finite"],
         ),
-        (SUITE + "rules: {limits: {calls: yes}}\n", 'line 3: "calls" is a truth value, not a whole number'),
+        (SUITE + "rules: {limits: {calls: yes}}\n", 3, ['"calls"', "whole number"]),
         (
             SUITE + "rules: {limits: {ticks: 1000000001}}\n",
-            'line 3: "ticks" is 1000000001, but it should be less than or equal to 1000000000',
+            3,
+            ['"ticks"', "1000000001", "1000000000"],
         ),
         (
             SUITE + "worlds: 10001\n",
-            'line 3: "worlds" is 10001, but it should be less than or equal to 10000',
+            3,
+            ['"worlds"', "10001", "10000"],
         ),
         (
             SUITE + "rules: {clock_starts: 5}\n",
-            'line 3: "clock_starts" is 5, but it should be a time from 1970',
+            3,
+            ['"clock_starts" is 5', "1970"],
         ),
         (
             SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00\n",
-            'line 4: "clock_starts" is 2024-01-01 12:00:00, but it should be a time from 1970 to 2099',
+            4,
+            ['"clock_starts" is 2024-01-01 12:00:00', "1970 to 2099"],
         ),
         (
             SUITE + "rules:\n  clock_starts: 9999-12-31T23:59:59Z\n",
-            "but it should be a time from 1970 to 2099",
+            4,
+            ['"clock_starts" is 9999-12-31', "1970 to 2099"],
         ),
-        (SUITE + "rules: {literals: loud}\n", "line 3: \"literals\" is 'loud', but it should be"),
-        (SUITE + "rules: {gravity: 9.81}\n", 'line 3: the key "gravity" means nothing here'),
-        (SUITE + "rules: {skill_seconds: 2}\n", 'line 3: "skill_seconds" is 2, but it should be 0'),
-        (SUITE + "rules: {limits: {calls: 0}}\n", 'line 3: "calls" is 0, but it should be greater than 0'),
+        (SUITE + "rules: {literals: loud}\n", 3, ['"literals"', "'loud'"]),
+        (SUITE + "rules: {gravity: 9.81}\n", 3, ['"gravity"']),
+        (SUITE + "rules: {skill_seconds: 2}\n", 3, ['"skill_seconds" is 2']),
+        (SUITE + "rules: {limits: {calls: 0}}\n", 3, ['"calls" is 0']),
         (
             "version: 1\nname: my-ablation\n",
-            'line 2: "my-ablation" ends as the files of an ablation do; choose a name without "-ablation"',
+            2,
+            ['"my-ablation"', '"-ablation"'],
         ),
-        ("", "suite.yaml: the file is empty"),
+        ("", None, ["empty"]),
     ],
 )
-def test_a_rule_that_is_not_known_gets_a_sentence(tmp_path: Path, suite: str, sentence: str) -> None:
-    with pytest.raises(BadInput, match=re.escape(sentence)):
+def test_a_rule_that_is_not_known_gets_a_sentence(
+    tmp_path: Path, suite: str, line: int | None, named: list[str]
+) -> None:
+    with pytest.raises(BadInput) as caught:
         load_suite(a_suite(tmp_path, suite=suite))
+    assert (caught.value.file, caught.value.line) == (tmp_path / "suite.yaml", line)
+    assert all(name in caught.value.sentence for name in named), caught.value
 
 
 def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
@@ -171,7 +189,7 @@ def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
 
 
 def test_an_unknown_suite_gets_a_sentence() -> None:
-    with pytest.raises(BadInput, match='no suite "nonsense": neither one of paper, plus nor a folder'):
+    with pytest.raises(BadInput, match=r'"nonsense": .*paper, plus'):
         load_suite("nonsense")
 
 
@@ -194,14 +212,14 @@ def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) 
     required = [[r.text for r in scenario.require] for scenario in suite.task("MakeTea").scenarios]
     assert required == [["announces_tea"], ['visits("kitchen")', "not announces_tea"]]
     (folder / "tasks" / "MakeTea.yaml").write_text("mine")
-    with pytest.raises(BadInput, match="is there already"):
+    with pytest.raises(BadInput, match="already"):
         new_task(folder, "MakeTea")
     assert (folder / "tasks" / "MakeTea.yaml").read_text() == "mine"
 
 
 @pytest.mark.parametrize("name", ["../x", "", "makeTea", "Make Tea", "Make-Tea", "Tee\n", "T\u00e4ufer"])
 def test_a_bad_name_for_a_task(tmp_path: Path, name: str) -> None:
-    with pytest.raises(BadInput, match="is no name for a task; write words together"):
+    with pytest.raises(BadInput, match="name for a task"):
         new_task(tmp_path, name)
     assert not [*tmp_path.iterdir()]
 
@@ -219,8 +237,9 @@ def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
 
 def test_a_suite_is_not_started_within_another(tmp_path: Path) -> None:
     new_task(tmp_path / "lab", "MakeTea")
-    with pytest.raises(BadInput, match=r"lab/tasks: lies within a suite; name the folder around it$"):
+    with pytest.raises(BadInput, match="within a suite") as error:
         new_task(tmp_path / "lab" / "tasks", "MakeCoffee")
+    assert error.value.file == tmp_path / "lab" / "tasks"
     assert [path.name for path in (tmp_path / "lab" / "tasks").iterdir()] == ["MakeTea.yaml"]
 
 

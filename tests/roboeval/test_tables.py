@@ -69,21 +69,21 @@ def test_a_selection_is_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "named"),
     [
-        ("Dance", 'the suite "small" has no task "Dance"; its tasks are Visit, Wait'),
-        ("Visit/2", "Visit has prompts 0 to 1, so Visit/2 selects nothing"),
-        ("Visit/-1", '"Visit/-1" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'),
-        ("Visit/0/x", '"Visit/0/x" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'),
-        ("Visit//0", '"Visit//0" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'),
-        ("Visit/0/0/0", '"Visit/0/0/0" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'),
-        ("Visit/\u0661", '"Visit/\u0661" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX'),
+        ("Dance", ['"small"', '"Dance"', "Visit, Wait"]),
+        ("Visit/2", ["Visit/2", "0 to 1"]),
+        ("Visit/-1", ['"Visit/-1"', "TASK/PROMPT/INDEX"]),
+        ("Visit/0/x", ['"Visit/0/x"', "TASK/PROMPT/INDEX"]),
+        ("Visit//0", ['"Visit//0"', "TASK/PROMPT/INDEX"]),
+        ("Visit/0/0/0", ['"Visit/0/0/0"', "TASK/PROMPT/INDEX"]),
+        ("Visit/\u0661", ['"Visit/\u0661"', "TASK/PROMPT/INDEX"]),
     ],
 )
-def test_a_wrong_selection_is_explained(text: str, sentence: str) -> None:
+def test_a_wrong_selection_is_explained(text: str, named: list[str]) -> None:
     with pytest.raises(BadInput) as error:
         parse_selection(text, SUITE)
-    assert str(error.value) == sentence
+    assert all(name in error.value.sentence for name in named), error.value
 
 
 def test_a_selection_finds_its_rows() -> None:
@@ -93,13 +93,12 @@ def test_a_selection_finds_its_rows() -> None:
 
 
 @pytest.mark.parametrize(
-    ("selection", "sentence"),
+    ("selection", "named"),
     [
-        (Selection("Wait"), "no completion of Wait has been judged in this run"),
-        (Selection("Visit", 0, 9), "no completion Visit/0/9 has been judged in this run"),
+        (Selection("Wait"), "no completion of Wait "),
+        (Selection("Visit", 0, 9), "no completion Visit/0/9 "),
     ],
 )
-def test_a_selection_without_rows_is_an_error(selection: Selection, sentence: str) -> None:
-    with pytest.raises(BadInput) as error:
+def test_a_selection_without_rows_is_an_error(selection: Selection, named: str) -> None:
+    with pytest.raises(BadInput, match=named):
         selection.rows(ROWS)
-    assert str(error.value) == sentence

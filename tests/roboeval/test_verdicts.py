@@ -1,6 +1,5 @@
 """What is right and wrong: errors, limits, worlds that may wait, options that cannot be judged."""
 
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -188,26 +187,26 @@ OURS = Completion(task="Visit", prompt=0, index=0, program="")
 
 
 @pytest.mark.parametrize(
-    ("wrong", "sentence"),
+    ("wrong", "named"),
     [
-        (replace(OURS, task="Vist"), 'has no task "Vist"; its tasks are '),
-        (replace(OURS, prompt=9), "/9/0: the task has prompts 0 to "),
-        (OURS.row, "a completion is of the type dict; make it a Completion"),
+        (replace(OURS, task="Vist"), '"Vist"'),
+        (replace(OURS, prompt=9), "/9/0: .* prompts 0 to "),
+        (OURS.row, "dict.* Completion"),
     ],
 )
-def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: object, sentence: str) -> None:
+def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: object, named: str) -> None:
     task = next(iter(paper.tasks))
     if isinstance(wrong, Completion) and wrong.task == OURS.task:
         wrong = replace(wrong, task=task)
     completion: Any = wrong
-    with pytest.raises(BadInput, match=re.escape(sentence)):
+    with pytest.raises(BadInput, match=named):
         list(evaluate([completion], paper))
 
 
 def test_evaluating_takes_workers_and_an_ablation(paper: Suite) -> None:
-    with pytest.raises(BadInput, match="the number of workers is 0, but it must be at least 1"):
+    with pytest.raises(BadInput, match=r"workers is 0, .* 1"):
         evaluate([], paper, workers=0)
     task = next(task.name for task in paper.tasks.values() if task.ablation is None)
     completion = replace(OURS, task=task)
-    with pytest.raises(BadInput, match=f'the task "{task}" has no ablation'):
+    with pytest.raises(BadInput, match=f'"{task}" .*ablation'):
         list(evaluate([completion], paper, ablated=True))

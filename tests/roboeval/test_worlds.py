@@ -1,6 +1,7 @@
 """Drawn worlds: what a description may say, what is drawn from it, and what each world then requires."""
 
 import ast
+import re
 from pathlib import Path
 from random import Random
 
@@ -108,10 +109,9 @@ def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:
 
 def test_more_worlds_than_fit_into_memory_are_not_drawn(tmp_path: Path) -> None:
     mine, most = load_suite(suite(tmp_path)), MOST_WORLDS
-    sentence = f"the number of worlds is {most + 1}, but it must be at most {most:,}"
-    with pytest.raises(BadInput, match=sentence):
+    with pytest.raises(BadInput, match=f"{most + 1}.* {most:,}"):
         mine.with_worlds(most + 1)
-    with pytest.raises(BadInput, match=sentence):
+    with pytest.raises(BadInput, match=f"{most + 1}.* {most:,}"):
         worlds_of(mine, mine.tasks["Tea"], most + 1, 1)
 
 
@@ -133,45 +133,46 @@ def test_checks_name_phrases(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("good", "bad", "problem"),
+    ("good", "bad", "named"),
     [
-        ("some:", "people:", '"people" cannot name phrases; choose another word'),
-        ("some:", "two words:", '"two words" cannot name phrases'),
-        ('{some}"', 'tea"', 'no check uses the phrases "some"; write {some} in one'),
-        ("[tea,", """['"tea"',""", '"tea" has a quotation mark'),
-        ("[tea, cups? for]", "[]", '"some" has too few entries'),
+        ("some:", "people:", ['"people"', "phrases"]),
+        ("some:", "two words:", ['"two words"', "phrases"]),
+        ('{some}"', 'tea"', ['"some"', "{some}"]),
+        ("[tea,", """['"tea"',""", ['"tea"', "quotation mark"]),
+        ("[tea, cups? for]", "[]", ['"some"', "too few"]),
     ],
 )
-def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, problem: str) -> None:
+def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list[str]) -> None:
     assert good in PHRASES
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(BadInput) as error:
         load_suite(str(suite(tmp_path, PHRASES.replace(good, bad))))
-    assert problem in str(caught.value)
-    assert "line" in str(caught.value)
+    assert all(name in error.value.sentence for name in named), error.value
+    assert error.value.line is not None
 
 
 @pytest.mark.parametrize(
-    ("good", "bad", "problem"),
+    ("good", "bad", "line", "named"),
     [
-        ("in: lab,", "in: attic,", 'line 9: there is no room "attic"'),
-        ('"*.in": nowhere', '"kim.in": hall', 'nothing that "kim.in" names can be "hall"'),
-        ("counts(cups) if cups", "counts(cup) if cups", 'nothing is called "cup"'),
-        ("not counts(3)", "not counts(here)", "an argument of a check is a text or a number"),
-        ("not counts(3)", "not 3", "is no requirement"),
-        ("not counts(3)", "counts(3", "cannot be read as an expression"),
-        ("not counts(3)", "missing(3)", 'there is no check "missing"'),
-        ('p.topics["tea"]', 'p.topics["milk"]', "cannot be computed"),
-        ("if p.room]'", "if p.age]'", '".age" is nothing that can be known'),
-        ("{option: -1}", "{option: 0}", "there is no option 0; 1 is the first, and -1 the last"),
+        ("in: lab,", "in: attic,", 9, '"attic"'),
+        ('"*.in": nowhere', '"kim.in": hall', 14, '"kim.in" names can be "hall"'),
+        ("counts(cups) if cups", "counts(cup) if cups", 31, '"cup"'),
+        ("not counts(3)", "not counts(here)", 32, "argument"),
+        ("not counts(3)", "not 3", 32, "no requirement"),
+        ("not counts(3)", "counts(3", 32, "cannot be read"),
+        ("not counts(3)", "missing(3)", 32, '"missing"'),
+        ('p.topics["tea"]', 'p.topics["milk"]', 18, "cannot be computed"),
+        ("if p.room]'", "if p.age]'", 17, '".age"'),
+        ("{option: -1}", "{option: 0}", 8, "no option 0"),
     ],
 )
-def test_mistakes_are_told_with_their_line(tmp_path: Path, good: str, bad: str, problem: str) -> None:
+def test_mistakes_are_told_with_their_line(
+    tmp_path: Path, good: str, bad: str, line: int, named: str
+) -> None:
     assert good in TASK
-    folder = str(suite(tmp_path, TASK.replace(good, bad)))
-    with pytest.raises(BadInput) as error:
-        load_suite(folder)
-    assert problem in str(error.value)
-    assert "line " in str(error.value)
+    folder = suite(tmp_path, TASK.replace(good, bad))
+    with pytest.raises(BadInput, match=re.escape(named)) as error:
+        load_suite(str(folder))
+    assert (error.value.file, error.value.line) == (folder / "tasks" / "Tea.yaml", line)
 
 
 @pytest.mark.parametrize("sizes", [{"a": 3, "b": 2, "c": 4, "d": 2}, {"a": 2, "b": 2}, {"a": 5}, {}])

@@ -222,7 +222,7 @@ def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_sma
     sizes, apart = run(ask(2))
     assert sizes == [6, 3, 1, 2, 3, 1, 2]
     assert [reply.text for reply in apart] == [reply.text for reply in together]
-    with pytest.raises(ModelError, match="the memory is too small for this prompt") as caught:
+    with pytest.raises(ModelError, match="memory is too small") as caught:
         run(ask(0))
     assert not caught.value.may_pass
 
@@ -255,25 +255,25 @@ def test_prompt_that_is_too_long_is_told(babbler: str) -> None:
     async def ask() -> None:
         await open_model(babbler, Settings()).reply(prompt_for("Go. " * 5_000), number=0)
 
-    with pytest.raises(ModelError, match=r"the prompt has [\d,]+ tokens, but the model takes only 4,096"):
+    with pytest.raises(ModelError, match=r"[\d,]+ tokens.* 4,096"):
         run(ask())
 
 
 @pytest.mark.parametrize(
-    ("path", "sentence"),
+    ("path", "named"),
     [
-        ("./nowhere", "./nowhere: there is no such folder of a model"),
-        ("{empty}", "hf:{empty} cannot be loaded: "),
+        ("./nowhere", ["./nowhere", "no such folder"]),
+        ("{empty}", ["hf:{empty}", "loaded"]),
     ],
 )
-def test_what_is_no_model_is_told_in_a_sentence(tmp_path: Path, path: str, sentence: str) -> None:
+def test_what_is_no_model_is_told_in_a_sentence(tmp_path: Path, path: str, named: list[str]) -> None:
     with pytest.raises(BadInput) as caught:
         open_model("hf:" + path.format(empty=tmp_path), Settings())
-    assert str(caught.value).startswith(sentence.format(empty=tmp_path))
+    assert all(name.format(empty=tmp_path) in str(caught.value) for name in named), caught.value
 
 
 def test_base_url_means_nothing_here(babbler: str) -> None:
-    with pytest.raises(BadInput, match="runs on this machine and takes no --base-url"):
+    with pytest.raises(BadInput, match="--base-url"):
         open_model(babbler, Settings(base_url="http://localhost:1/v1"))
 
 

@@ -8,7 +8,6 @@ from codebotler.badinput import BadInput
 from codebotler.models.base import Settings
 from codebotler.models.open import open_model
 
-KNOWN = "name one that pydantic-ai knows, such as openai-chat, anthropic or google"
 COMMAND = 'pip install "pydantic-ai-slim[groq]"'
 URL = "http://127.0.0.1:9/v1"
 
@@ -26,48 +25,32 @@ def _without_keys(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "url", "sentence"),
+    ("name", "url", "named"),
     [
-        ("openai-chat:m", None, "openai-chat:m needs OPENAI_API_KEY in the environment"),
-        ("openai:m", None, "openai:m needs OPENAI_API_KEY in the environment"),
-        ("anthropic:m", None, "anthropic:m needs ANTHROPIC_API_KEY in the environment"),
-        ("google:m", None, "google:m needs GOOGLE_API_KEY in the environment"),
-        ("openay-chat:m", None, 'there is no provider "openay-chat"; is "openai-chat" meant?'),
-        (
-            "nobody:m",
-            None,
-            f'there is no provider "nobody"; {KNOWN}',
-        ),
-        (
-            "groq:m",
-            None,
-            f"groq:m needs a library that is not installed; install it with: {COMMAND}",
-        ),
-        (
-            "deepseek:m",
-            URL,
-            'the provider "deepseek" takes no base URL; for a server of your own name openai-chat:MODEL',
-        ),
-        (
-            "completions:m",
-            None,
-            "completions:m needs --base-url, or OPENAI_API_KEY in the environment for OpenAI's own",
-        ),
+        ("openai-chat:m", None, ["openai-chat:m", "OPENAI_API_KEY"]),
+        ("openai:m", None, ["openai:m", "OPENAI_API_KEY"]),
+        ("anthropic:m", None, ["anthropic:m", "ANTHROPIC_API_KEY"]),
+        ("google:m", None, ["google:m", "GOOGLE_API_KEY"]),
+        ("openay-chat:m", None, ['"openay-chat"', '"openai-chat"']),
+        ("nobody:m", None, ['"nobody"', "openai-chat, anthropic or google"]),
+        ("groq:m", None, ["groq:m", COMMAND]),
+        ("deepseek:m", URL, ['"deepseek"', "base URL", "openai-chat:MODEL"]),
+        ("completions:m", None, ["completions:m", "--base-url", "OPENAI_API_KEY"]),
     ],
 )
-def test_what_is_missing_is_told_in_a_sentence(name: str, url: str | None, sentence: str) -> None:
+def test_what_is_missing_is_told_in_a_sentence(name: str, url: str | None, named: list[str]) -> None:
     with pytest.raises(BadInput) as caught:
         open_model(name, Settings(base_url=url))
-    assert str(caught.value) == sentence
+    assert all(each in caught.value.sentence for each in named), caught.value
 
 
 def test_missing_extra_is_told_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
     monkeypatch.delitem(sys.modules, "codebotler.models.local", raising=False)
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(BadInput, match="torch and transformers") as caught:
         open_model("hf:some/model", Settings())
-    needs, command = "hf:some/model needs torch and transformers", 'pip install "codebotler[transformers]"'
-    assert str(caught.value) == f"{needs}; install them with: {command}"
+    for named in ("hf:some/model", 'pip install "codebotler[transformers]"'):
+        assert named in caught.value.sentence
 
 
 @pytest.mark.parametrize("name", ["openai-chat:m", "vllm:m", "ollama:m", "completions:m", "anthropic:m"])
@@ -112,10 +95,10 @@ def test_key_that_cannot_be_sent_is_refused(
     monkeypatch.setenv(variable, key)
     with pytest.raises(BadInput) as caught:
         open_model(name, Settings(base_url=url))
-    assert str(caught.value) == (
-        f"the key in {variable} cannot be sent: it has a line break, a space at an end, or what is no "
-        "printable ASCII; set it again"
-    )
+    sentence = caught.value.sentence
+    assert f"key in {variable} " in sentence
+    assert key.strip() not in sentence
+    assert sentence.isprintable()
 
 
 def test_key_of_another_provider_is_no_matter(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -139,7 +122,8 @@ def test_blank_key_is_a_missing_one(
     monkeypatch.setenv(variable, key)
     with pytest.raises(BadInput) as caught:
         open_model(name, Settings())
-    assert str(caught.value) == f"{name} needs {variable} in the environment"
+    assert name in caught.value.sentence
+    assert variable in caught.value.sentence
 
 
 @pytest.mark.parametrize(
@@ -165,6 +149,6 @@ def test_base_url_that_is_refused_is_not_quoted(url: str) -> None:
     with pytest.raises(BadInput) as caught:
         Settings(base_url=url)
     sentence = str(caught.value)
-    assert sentence.startswith("the base URL ")
+    assert "base URL" in sentence
     assert not any(part in sentence for part in ("topsec", "retpw", "user:", "key="))
     assert caught.value.__cause__ is None

@@ -95,7 +95,7 @@ def test_that_the_first_request_is_tried_again_is_told_once(
     server.faults.extend([Fault.HUNG_UP, Fault.HUNG_UP])
     use(server, one)
     (told,) = caplog.messages
-    assert told.startswith("trying again, up to ")
+    assert "again" in told
     assert told.endswith("(Server disconnected without sending a response)")
 
 
@@ -223,7 +223,8 @@ def test_spent_budget_stops_before_a_request(name: str, server: Server) -> None:
     each = paced.spent // replies
     assert replies == -(-5_000 // each)
     assert (error.budget, error.used) == (5_000, paced.spent)
-    assert error.sentence == f"the token budget of 5,000 is spent: {paced.spent:,} tokens are used"
+    for named in ("token budget", "5,000", f"{paced.spent:,}"):
+        assert named in error.sentence
     assert len(server.requests) == paced.requests == replies
 
 
@@ -373,15 +374,15 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
 
 
 @pytest.mark.parametrize(
-    ("limits", "sentence"),
+    ("limits", "named"),
     [
-        ({"concurrency": 0}, "the concurrency is 0, but it must be at least 1"),
-        ({"requests_per_minute": 0.0}, "the requests a minute are 0, but must be above 0"),
-        ({"retries": -1}, "the retries are -1, but must be at least 0"),
-        ({"token_budget": 0}, "the token budget is 0, but it must be at least 1"),
+        ({"concurrency": 0}, ["concurrency", " 0,", " 1"]),
+        ({"requests_per_minute": 0.0}, ["requests a minute", "above 0"]),
+        ({"retries": -1}, ["retries", " -1,", " 0"]),
+        ({"token_budget": 0}, ["token budget", " 0,", " 1"]),
     ],
 )
-def test_limits_out_of_range_are_told(limits: dict[str, Any], sentence: str) -> None:
+def test_limits_out_of_range_are_told(limits: dict[str, Any], named: list[str]) -> None:
     with pytest.raises(BadInput) as caught:
         Paced(open_model("recorded", Settings()), **limits)
-    assert str(caught.value) == sentence
+    assert all(name in caught.value.sentence for name in named), caught.value

@@ -28,11 +28,8 @@ def test_careful_model_is_the_one_that_is_meant_by_recorded(name: str) -> None:
 
 
 def test_unknown_recorded_model_is_told_in_a_sentence() -> None:
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(BadInput, match=r'"recorded:lazy".* recorded:careful, recorded:hasty'):
         recorded_model("recorded:lazy")
-    assert str(caught.value) == (
-        'there is no recorded model "recorded:lazy"; there are recorded:careful, recorded:hasty'
-    )
 
 
 def test_replies_come_round_again() -> None:
@@ -84,7 +81,8 @@ def test_file_of_replies_is_read_and_its_faults_are_told_with_their_line(tmp_pat
     path = write(tmp_path / "b.yaml", good + "    - about: b\n")
     with pytest.raises(BadInput) as caught:
         read_replies(path)
-    assert str(caught.value) == f'{path}, line 6: the key "program" is missing'
+    assert (caught.value.file, caught.value.line) == (path, 6)
+    assert '"program"' in caught.value.sentence
 
 
 def test_file_that_is_no_list_is_no_file_without_replies(tmp_path: Path) -> None:
@@ -164,49 +162,50 @@ def test_unknown_instruction_is_told_with_the_closest_that_are_known_and_how_to_
     with pytest.raises(base.ModelError) as caught:
         reply_to("Fetch me a coffee from the kitchen")
     sentence = caught.value.sentence
-    assert sentence.startswith('recorded:careful has no program for "Fetch me a coffee from the kitchen"; ')
+    assert "recorded:careful" in sentence
+    assert '"Fetch me a coffee from the kitchen"' in sentence
     assert '"Go to the lobby and ask the visitor there whether they want water' in sentence
-    assert sentence.endswith("such as --model openai-chat:gpt-5.1")
+    assert "--model openai-chat:gpt-5.1" in sentence
     assert not caught.value.may_pass
     assert "\n" not in sentence
 
 
 @pytest.mark.parametrize("name", ["", "gpt-5.1", ":a", "hf:", "completions: ", "openai-chat:"])
 def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
-    with pytest.raises(BadInput, match="names no model; write recorded"):
+    with pytest.raises(BadInput, match=r"no model.* recorded"):
         open_model(name, Settings())
 
 
 @pytest.mark.parametrize(
-    ("wrong", "sentence"),
+    ("wrong", "named"),
     [
-        ({"temperature": -0.1}, "the temperature is -0.1, but it must be between 0 and 100"),
-        ({"temperature": float("nan")}, "the temperature is nan, but it must be between 0 and 100"),
-        ({"top_p": 0.0}, "top-p is 0, but it must be above 0 and at most 1"),
-        ({"top_p": 1.5}, "top-p is 1.5, but it must be above 0 and at most 1"),
-        ({"max_tokens": 0}, "the limit of tokens is 0, but it must be at least 1"),
-        ({"timeout": 0.0}, "the timeout is 0 seconds, but it must be above 0"),
-        ({"base_url": "localhost:8000"}, "the base URL does not begin with http:// or https:// and a host; "),
-        ({"base_url": "http://a:99999/v1"}, "the base URL has no valid host and port; write one like http"),
-        ({"base_url": "http://me:sk-secret@a/v1"}, "the base URL has a user name, a password, a query "),
-        ({"base_url": "http://a/v1?key=sk-secret"}, "the base URL has a user name, a password, a query "),
+        ({"temperature": -0.1}, ["temperature", " -0.1,", "0 and 100"]),
+        ({"temperature": float("nan")}, ["temperature", " nan,", "0 and 100"]),
+        ({"top_p": 0.0}, ["top-p", " 0,", " 1"]),
+        ({"top_p": 1.5}, ["top-p", " 1.5,", " 1"]),
+        ({"max_tokens": 0}, ["tokens", " 0,", " 1"]),
+        ({"timeout": 0.0}, ["timeout", " 0 seconds"]),
+        ({"base_url": "localhost:8000"}, ["base URL", "http:// or https://"]),
+        ({"base_url": "http://a:99999/v1"}, ["base URL", "host and port"]),
+        ({"base_url": "http://me:sk-secret@a/v1"}, ["base URL", "password"]),
+        ({"base_url": "http://a/v1?key=sk-secret"}, ["base URL", "query"]),
     ],
 )
-def test_settings_out_of_range_are_told(wrong: dict[str, Any], sentence: str) -> None:
+def test_settings_out_of_range_are_told(wrong: dict[str, Any], named: list[str]) -> None:
     with pytest.raises(BadInput) as caught:
         Settings(**wrong)
-    assert str(caught.value).startswith(sentence)
+    assert all(name in caught.value.sentence for name in named), caught.value
     assert "sk-secret" not in str(caught.value)
 
 
 def test_recorded_programs_have_no_base_url() -> None:
-    with pytest.raises(BadInput, match=r"^a base URL is given, but recorded runs on no server; name a model"):
+    with pytest.raises(BadInput, match=r"base URL .*recorded"):
         open_model("recorded", Settings(base_url="http://localhost:8000/v1"))
 
 
 def test_of_several_models_one_is_enough_for_a_base_url() -> None:
     expect_server("recorded", "openai-chat:mine")
-    with pytest.raises(BadInput, match="but recorded and recorded:hasty run on no server"):
+    with pytest.raises(BadInput, match="recorded and recorded:hasty"):
         expect_server("recorded", "recorded:hasty")
 
 

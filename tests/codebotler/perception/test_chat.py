@@ -82,18 +82,18 @@ def test_name_that_is_an_order_arrives_as_a_text(server: Server, detector: Detec
 
 
 @pytest.mark.parametrize(
-    ("label", "sentence"),
+    ("label", "named"),
     [
-        ("", "nothing is named that could be looked for"),
-        (" \n\t", "nothing is named that could be looked for"),
-        ("mug " * 2_500, "has 9,999 characters; name it in at most 200"),
-        ("mug\x1b[2J", r'"mug\\x1b[2J" has characters that no name has'),
+        ("", ["nothing"]),
+        (" \n\t", ["nothing"]),
+        ("mug " * 2_500, ["9,999 characters", "200"]),
+        ("mug\x1b[2J", [r'"mug\x1b[2J"', "characters"]),
     ],
 )
-def test_what_is_no_name_is_refused(server: Server, detector: Detector, label: str, sentence: str) -> None:
+def test_what_is_no_name_is_refused(server: Server, detector: Detector, label: str, named: list[str]) -> None:
     with pytest.raises(BadInput) as error:
         detector.look(PICTURE, label)
-    assert sentence.replace("\\\\", "\\") in str(error.value)
+    assert all(name in error.value.sentence for name in named), error.value
     assert not server.requests
 
 
@@ -123,30 +123,30 @@ def boxed(*numbers: object) -> str:
 @pytest.mark.parametrize(
     ("reply", "fault"),
     [
-        ("", "it is no JSON"),
-        ("Yes, I see a mug.", "it is no JSON"),
-        (f"Here it is: {FOUND}", "it is no JSON"),
-        (FOUND + FOUND, "it is no JSON"),
-        ("[" * 5_000, "it is no JSON"),
-        ("1" * 6_000, "it is no JSON"),
-        ("true", "it is no JSON object"),
-        ("{}", '"found" is neither true nor false'),
-        ('{"found": "true", "score": 1, "box": [0, 0, 1, 1]}', '"found" is neither true nor false'),
-        ('{"found": true, "score": "high", "box": [0, 0, 1, 1]}', '"score" is no number'),
-        ('{"found": true, "score": true, "box": [0, 0, 1, 1]}', '"score" is no number'),
-        ('{"found": true, "score": NaN, "box": [0, 0, 1, 1]}', '"score" is no number'),
-        ('{"found": true, "score": 1e999, "box": [0, 0, 1, 1]}', '"score" is no number'),
-        ('{"found": true, "score": 1.5, "box": [0, 0, 1, 1]}', "the score is 1.5"),
-        ('{"found": false, "score": -0.1}', "the score is -0.1"),
-        ('{"found": true, "score": 1}', '"box" is no list of four numbers'),
-        ('{"found": true, "score": 1, "box": null}', '"box" is no list of four numbers'),
-        (boxed(0, 0, 1), '"box" is no list of four numbers'),
-        (boxed(0, 0, 1, "1"), '"box" is no list of four numbers'),
-        (boxed(12, 40, 300, 200), "its numbers must be between 0 and 1"),
-        (boxed(-0.1, 0, 1, 1), "its numbers must be between 0 and 1"),
-        (boxed(0.8, 0, 0.2, 1), "left must be less than right"),
-        (boxed(0, 0.5, 1, 0.5), "top less than bottom"),
-        (" " * (LONGEST_REPLY + 1), "it has 20,001 characters"),
+        ("", "no JSON"),
+        ("Yes, I see a mug.", "no JSON"),
+        (f"Here it is: {FOUND}", "no JSON"),
+        (FOUND + FOUND, "no JSON"),
+        ("[" * 5_000, "no JSON"),
+        ("1" * 6_000, "no JSON"),
+        ("true", "no JSON object"),
+        ("{}", '"found"'),
+        ('{"found": "true", "score": 1, "box": [0, 0, 1, 1]}', '"found"'),
+        ('{"found": true, "score": "high", "box": [0, 0, 1, 1]}', '"score"'),
+        ('{"found": true, "score": true, "box": [0, 0, 1, 1]}', '"score"'),
+        ('{"found": true, "score": NaN, "box": [0, 0, 1, 1]}', '"score"'),
+        ('{"found": true, "score": 1e999, "box": [0, 0, 1, 1]}', '"score"'),
+        ('{"found": true, "score": 1.5, "box": [0, 0, 1, 1]}', "1.5"),
+        ('{"found": false, "score": -0.1}', "-0.1"),
+        ('{"found": true, "score": 1}', '"box"'),
+        ('{"found": true, "score": 1, "box": null}', '"box"'),
+        (boxed(0, 0, 1), '"box"'),
+        (boxed(0, 0, 1, "1"), '"box"'),
+        (boxed(12, 40, 300, 200), "between 0 and 1"),
+        (boxed(-0.1, 0, 1, 1), "between 0 and 1"),
+        (boxed(0.8, 0, 0.2, 1), "left"),
+        (boxed(0, 0.5, 1, 0.5), "top"),
+        (" " * (LONGEST_REPLY + 1), "20,001 characters"),
     ],
 )
 def test_replies_that_cannot_be_used(reply: str, fault: str) -> None:
@@ -162,8 +162,8 @@ def test_model_is_told_what_was_wrong_and_asked_again(server: Server, detector: 
     assert shown(first) == shown(second) == shown(third)
     _, _, said, again = second.body["messages"]
     assert said["content"] == boxed(12, 40, 300, 200)
-    assert again["content"].startswith("That cannot be used: the box is [12.0, 40.0, 300.0, 200.0], but")
-    assert "it is no JSON" in json.dumps(third.body["messages"][2:])
+    assert "[12.0, 40.0, 300.0, 200.0]" in again["content"]
+    assert "no JSON" in json.dumps(third.body["messages"][2:])
 
 
 def test_model_that_never_answers_as_asked_is_an_error_in_a_sentence(
@@ -173,7 +173,7 @@ def test_model_that_never_answers_as_asked_is_an_error_in_a_sentence(
     with pytest.raises(PerceptionError) as error:
         detector.look(PICTURE, "mug")
     assert len(server.requests) == TRIES
-    assert error.value.sentence.startswith("openai-chat:eyes was asked 3 times and gave no usable answer: ")
+    assert re.match("openai-chat:eyes .* 3 times", error.value.sentence)
     assert "[bold]I can't" in error.value.sentence
     assert KEY not in error.value.sentence
     server.answer = lambda _: FOUND
@@ -184,7 +184,7 @@ def test_model_that_never_answers_as_asked_is_an_error_in_a_sentence(
     ("fault", "times", "sentence"),
     [
         (Fault.UNAUTHORIZED, 1, "status 401 (Incorrect API key provided: Bearer [key removed])"),
-        (Fault.NOT_FOUND, 1, "the server answered with status 404"),
+        (Fault.NOT_FOUND, 1, "status 404"),
         (Fault.SERVER_ERROR, 3, "status 500 (Something went wrong) (tried 3 times)"),
         (Fault.HUNG_UP, 3, "(tried 3 times)"),
         (Fault.CUT, 3, "peer closed connection without sending complete message body"),
@@ -210,10 +210,10 @@ def test_server_that_is_busy_is_asked_again(server: Server, detector: Detector) 
 @pytest.mark.parametrize(
     ("name", "sentence"),
     [
-        ("recorded", "recorded sees no pictures; name a chat model that does"),
+        ("recorded", "recorded sees no pictures"),
         ("completions:m", "completions:m sees no pictures"),
-        ("", "names no model"),
-        ("nobody:m", 'there is no provider "nobody"'),
+        ("", "no model"),
+        ("nobody:m", '"nobody"'),
     ],
 )
 def test_model_that_cannot_look_is_refused(name: str, sentence: str) -> None:

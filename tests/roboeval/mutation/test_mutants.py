@@ -110,8 +110,10 @@ def test_a_suite_of_ones_own_has_right_programs_of_its_own(tmp_path: Path) -> No
     (variant,) = variants(task)
     assert (variant.name, variant.style) == ("01-short", "As short as can be.")
     path.write_text("def task_program(): go_to('kitchen')\n")
-    with pytest.raises(BadInput, match=r"01-short\.py, line 1: say the program's style in its first line"):
+    with pytest.raises(BadInput, match="style") as error:
         variants(task)
+    assert (error.value.file, error.value.line) == (path, 1)
     path.write_bytes(b"# \xff\n")
-    with pytest.raises(BadInput, match=r"01-short\.py: this right program cannot be read"):
+    with pytest.raises(BadInput, match="cannot be read") as error:
         variants(task)
+    assert error.value.file == path

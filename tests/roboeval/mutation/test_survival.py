@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -122,13 +123,11 @@ def test_the_score_is_the_share_of_wrong_mutants_that_are_killed() -> None:
 
 def test_what_makes_a_score_doubtful() -> None:
     assert score(*[Fate.KILLED] * 60).complaints == ()
-    assert score(*[Fate.KILLED] * 59, Fate.SAME).complaints == (
-        "T: only 59 mutants do something else than their original",
-    )
+    (few,) = score(*[Fate.KILLED] * 59, Fate.SAME).complaints
+    assert re.match(r"T: .*\b59 mutants\b", few)
     assert score(*[Fate.KILLED] * 51, *[Fate.STILL_RIGHT] * 9).complaints == ()
-    assert score(*[Fate.KILLED] * 50, *[Fate.STILL_RIGHT] * 10).complaints == (
-        "T: 10 of 60 mutants are still right, more than 15%",
-    )
+    (many,) = score(*[Fate.KILLED] * 50, *[Fate.STILL_RIGHT] * 10).complaints
+    assert re.match(r"T: 10 of 60 mutants\b.*\b15%", many)
 
 
 # --- the list of those that are still right
@@ -173,22 +172,20 @@ FILLED = to_yaml([GREETS]).replace("because: ''", "because: It does no harm.")
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "line", "named"),
     [
-        (to_yaml([GREETS]), r'T\.yaml, line 11: "because" is empty'),
-        (
-            FILLED + FILLED.removeprefix("mutants:\n"),
-            r"T\.yaml, line 12: this mutant stands on the list already",
-        ),
-        ("mutants: []\n", r'T\.yaml, line 1: "mutants" has too few entries'),
-        ("mutants: [{operator: x, diff: y, because: z, why: w}]", r'T\.yaml, line 1: .*"why".*'),
+        (to_yaml([GREETS]), 11, '"because" is empty'),
+        (FILLED + FILLED.removeprefix("mutants:\n"), 12, "already"),
+        ("mutants: []\n", 1, '"mutants"'),
+        ("mutants: [{operator: x, diff: y, because: z, why: w}]", 1, '"why"'),
     ],
     ids=["without a reason", "twice", "empty", "unknown key"],
 )
-def test_a_list_that_is_wrong(task: Task, text: str, sentence: str) -> None:
+def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> None:
     a_list(task, text)
-    with pytest.raises(BadInput, match=sentence):
+    with pytest.raises(BadInput, match=named) as error:
         reasons(task)
+    assert (error.value.file, error.value.line) == (list_of(task), line)
 
 
 # --- worlds
@@ -196,7 +193,7 @@ def test_a_list_that_is_wrong(task: Task, text: str, sentence: str) -> None:
 
 def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
     assert worlds_of(suite, task, None, 1) == task.scenarios
-    with pytest.raises(BadInput, match='the worlds of the suite "mine" are written out'):
+    with pytest.raises(BadInput, match=r'"mine".* written out'):
         worlds_of(suite, task, 200, 1)
 
 

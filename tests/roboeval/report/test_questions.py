@@ -1,5 +1,6 @@
 """What a careful reader asks: abilities, coming back, phrasing, cost, differences, groups of failures."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -106,8 +107,9 @@ def test_coming_back_by_hand() -> None:
     table = coming_back_sheet([replace(run, rows=rows)], ABLE)
     assert table is not None
     (said,) = coming_back_said(table)
-    assert said.startswith("Of 3 failures of a in tasks that end with a report, 1 left and never came back")
-    assert said.endswith("and 1 went to a room that does not exist.")
+    assert re.search(
+        r"^Of 3 failures of a .*\b1 .*\bnever came back\b.*\b1 .*\broom that does not exist", said
+    )
     assert coming_back_sheet([run], SUITE) is None
 
 
@@ -198,12 +200,12 @@ def test_a_budget_by_hand() -> None:
 def test_prices() -> None:
     assert price_from("openai-chat:gpt=1.5/6") == Price("openai-chat:gpt", 1.5, 6.0)
     for wrong in ("gpt", "gpt=1", "=1/2", "gpt=a/b", "gpt=-1/2", "gpt=nan/1", "gpt=1/2/3"):
-        with pytest.raises(BadInput, match="is no price; write MODEL=INPUT/OUTPUT"):
+        with pytest.raises(BadInput, match="MODEL=INPUT/OUTPUT"):
             price_from(wrong)
     run = made_up("a", {"Visit": (1,)})
-    with pytest.raises(BadInput, match='--price names "x", but the runs are a'):
+    with pytest.raises(BadInput, match=r'--price .*"x".*\ba$'):
         expect_known([Price("x", 1, 1)], [run])
-    with pytest.raises(BadInput, match='--price names "a" twice'):
+    with pytest.raises(BadInput, match=r'--price .*"a" twice'):
         expect_known([Price("a", 1, 1), Price("a", 2, 2)], [run])
 
 
@@ -269,7 +271,8 @@ def test_pairs_that_were_asked_otherwise_are_told() -> None:
     )
     found = difference_sheet([one, other])
     assert found is not None
-    assert found[0].notes == ("a and b: temperature differs: 0 and 1.",)
+    (note,) = found[0].notes
+    assert re.search(r"^a and b: temperature\b.* 0 and 1", note)
 
 
 def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -283,7 +286,7 @@ def test_groups_of_failures_and_what_is_left_out(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("roboeval.report.failures.MOST", 2)
     monkeypatch.setattr("roboeval.report.failures.FEWEST", 2)
     (note,) = failures([run], SUITE).notes
-    assert note.startswith("a: 5 smaller groups with 5 completions are left out; `roboeval find` shows")
+    assert re.search(r"^a: 5 smaller groups with 5 completions .*`roboeval find`", note)
 
 
 def test_where_it_comes_from() -> None:

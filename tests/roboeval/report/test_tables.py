@@ -1,6 +1,7 @@
 """The tables of a report: hand-computed numbers, the paper's beside ours, and CSV that holds them all."""
 
 import csv
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -59,15 +60,16 @@ def test_intervals_of_prompts_and_of_tasks() -> None:
 
 def test_an_unfinished_run_says_so() -> None:
     run = replace(made_up("a", {"Visit": (1,)}), total=99)
-    assert overall_sheet([run]).notes[-1] == "a: only 10 of 99 completions are judged, and only these count."
+    assert re.match(r"a: .*\b10 of 99 completions\b", overall_sheet([run]).notes[-1])
 
 
 def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
     few, enough = (made_up(name, {f"T{n}": (1,) for n in range(of)}) for name, of in (("a", 7), ("b", 8)))
     assert overall_sheet([enough]).notes == ()
-    too_narrow = "draws from fewer than 8 tasks, for which it is too narrow; quote the formula."
-    assert overall_sheet([few]).notes == (f"The bootstrap {too_narrow}",)
-    assert overall_sheet([few, enough]).notes == (f"The bootstrap of a {too_narrow}",)
+    (note,) = overall_sheet([few]).notes
+    assert re.search(r"bootstrap .*\b8 tasks\b.* narrow", note)
+    (note,) = overall_sheet([few, enough]).notes
+    assert "bootstrap of a " in note
 
 
 def test_causes_are_counted() -> None:
@@ -135,8 +137,7 @@ def test_a_folder_names_a_model_only_where_nobody_else_does() -> None:
 
 def test_the_page_says_which_model_a_run_is_taken_for() -> None:
     runs = [paper_run("openai:gpt-4-0613"), paper_run("mine")]
-    said = "By their names, these are taken for models of the paper: openai:gpt-4-0613 for GPT-4."
-    assert said in beside_notes(runs)
+    assert any("openai:gpt-4-0613 for GPT-4" in note for note in beside_notes(runs))
     assert paper.taken_for(runs[1:]) == []
 
 
@@ -177,12 +178,11 @@ def test_published_causes_only_where_asked_for() -> None:
     assert [one.name for one in all_causes(runs, published=False)] == ["gpt-4", "mine"]
     assert [one.name for one in all_causes(runs, published=True)] == ["gpt-4", "gpt-4, published", "mine"]
     table = causes_sheet(all_causes(runs, published=True))
-    assert beside_notes(runs) == [
-        *paper.taken_for(runs),
-        paper.TWO_SUMS,
-        "Published causes are of all 16 tasks of the paper, which is more than gpt-4 did.",
-    ]
-    assert "None of these runs" in beside_notes(runs[1:])[0]
+    taken, sums, causes = beside_notes(runs)
+    assert ([taken], sums) == (paper.taken_for(runs), paper.TWO_SUMS)
+    assert "16 tasks" in causes
+    assert "gpt-4" in causes
+    assert "None of these" in beside_notes(runs[1:])[0]
     shares = {row[2]: row[4] for row in table.rows if row[:2] == ("gpt-4, published", "TaskCompletionError")}
     assert shares["SayAtLocation"] == pytest.approx(0.682)
     assert shares["InitialTerminal"] == pytest.approx(0.317)

@@ -1,5 +1,6 @@
 """What the linter says of the suites that ship: nothing that their task files do not accept."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -22,8 +23,7 @@ def of_paper() -> list[Finding]:
 
 def test_the_papers_suite_has_no_open_finding(of_paper: list[Finding]) -> None:
     assert [one.name for one in of_paper if one.accepted is None] == []
-    told = f"nothing was found but {len(of_paper)} findings that the task files accept; --accepted tells why"
-    assert render(of_paper) == told
+    assert re.search(rf"^nothing was found .*\b{len(of_paper)} findings\b.* --accepted", render(of_paper))
 
 
 def test_a_finding_of_the_papers_suite_comes_back(paper: Suite) -> None:

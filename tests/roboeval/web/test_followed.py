@@ -81,7 +81,7 @@ def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: by
     rows.write_bytes(b"".join([*lines[:10], content, *lines[11:]]))
     seen = followed(runs / "hasty").wait()
     assert seen.fault_count == 1
-    assert seen.faults[0].startswith("paper.jsonl, line 11: this line is no row of an evaluation")
+    assert seen.faults[0].startswith("paper.jsonl, line 11: ")
     assert len(seen.judged) == 44
     assert seen.stale_count == 0, "the rows after it are still held against their own programs"
     assert state_of(seen, 45) is State.DAMAGED
@@ -116,7 +116,7 @@ def test_many_damaged_lines_are_counted(runs: Path) -> None:
     seen = followed(runs / "hasty").wait()
     assert seen.fault_count == 13
     assert len(seen.faults) == 5
-    assert "8 more lines are damaged." in notes(seen, None)
+    assert any("8 more lines" in note for note in notes(seen, None))
     assert seen.written_count == 45
 
 
@@ -140,7 +140,7 @@ def test_a_run_that_is_written_anew_is_read_anew(runs: Path) -> None:
     assert len(run.wait().judged) == 0
     rows.write_bytes(b"".join(lines[:5]))
     assert len(run.wait().judged) == 5
-    with pytest.raises(ValueError, match="was written anew meanwhile; reload the page"):
+    with pytest.raises(ValueError, match="reload"):
         run.row(entry)
 
 
@@ -148,8 +148,9 @@ def test_a_run_that_is_deleted_is_gone(runs: Path) -> None:
     run = followed(runs / "hasty")
     run.wait()
     shutil.rmtree(runs / "hasty")
-    with pytest.raises(GoneError, match=r"^hasty: is gone: its folder was deleted or renamed$"):
+    with pytest.raises(GoneError, match="is gone") as error:
         run.look()
+    assert error.value.file == "hasty"
 
 
 def test_who_writes_a_run_is_seen_and_not_disturbed(runs: Path) -> None:

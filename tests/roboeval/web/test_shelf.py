@@ -32,7 +32,7 @@ def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytes
         assert shelf.names() == ["hasty"]
         assert shelf.open("hasty").wait().name == "hasty"
         for name in ("other", "..", "../other"):
-            with pytest.raises(BadInput, match="there is no run"):
+            with pytest.raises(BadInput, match="no run"):
                 shelf.open(name)
 
 
@@ -42,7 +42,7 @@ def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytes
 )
 def test_no_name_leads_out(runs: Path, name: str) -> None:
     shutil.copytree(runs / "hasty", runs.parent / "secret")
-    with pytest.raises(BadInput, match="there is no run"):
+    with pytest.raises(BadInput, match="no run"):
         Shelf(runs).open(name)
 
 
@@ -50,7 +50,7 @@ def test_no_link_leads_out(runs: Path) -> None:
     secret = runs.parent / "secret"
     shutil.copytree(runs / "hasty", secret)
     (runs / "link").symlink_to(secret)
-    with pytest.raises(BadInput, match="leads out of the folder of runs, where nothing is read"):
+    with pytest.raises(BadInput, match="leads out"):
         Shelf(runs).open("link")
     for path in ("completions.jsonl", "evaluations/paper.jsonl"):
         copy = runs / path.replace("/", "-")
@@ -58,7 +58,7 @@ def test_no_link_leads_out(runs: Path) -> None:
         (copy / path).unlink()
         (copy / path).symlink_to(secret / path)
         seen = Shelf(runs).open(copy.name).wait()
-        assert "leads out of the folder of runs" in seen.faults[0]
+        assert "leads out" in seen.faults[0]
     about = runs / "about"
     shutil.copytree(runs / "hasty", about)
     (about / "run.json").unlink()
@@ -81,7 +81,9 @@ def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(runs: Path) -> None:
     rows = Run(runs / "hasty").rows("paper")
     rows.unlink()
     os.mkfifo(rows)
-    assert Shelf(runs).open("hasty").wait().faults == ("paper.jsonl: is no file",)
+    (fault,) = Shelf(runs).open("hasty").wait().faults
+    assert fault.startswith("paper.jsonl: ")
+    assert "no file" in fault
 
 
 def test_evaluations_are_found_by_name(runs: Path) -> None:
