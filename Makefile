@@ -3,6 +3,7 @@
 #
 #   make test       what to run before each commit; TESTS names files or folders to run instead of all
 #   make test-all   that, and everything below
+#     test-slow            tests that take seconds of a processor each
 #     test-suites          the tasks of both suites as data: linted, and judged on programs with known verdicts
 #     test-guide           README, guides and examples: every command on them runs, and prints what they say
 #     test-ros1            robots on ROS 1, for which the system's Python must have rospy (`codebotler robots` tells)
@@ -40,7 +41,7 @@ APART = tests/browser tests/guide tests/ros1 tests/roboeval/suites tests/codebot
 	tests/codebotler/perception/test_zeroshot.py tests/codebotler/robots/test_pyrobosim.py \
 	tests/roboeval/test_inspecting.py tests/roboeval/test_rayengine.py
 
-.PHONY: demo serve docs test test-all test-suites test-guide test-ros1 test-browser pictures test-transformers \
+.PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-browser pictures test-transformers \
 	test-pyrobosim test-inspect test-ray test-faulty-server faults fuzz lint bench clean
 
 demo: $(VENV)/installed
@@ -60,10 +61,13 @@ serve: $(VENV)/installed
 	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler serve --world examples/office.yaml --speed 5
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 3 --dist worksteal $(addprefix --ignore ,$(APART)) $(TESTS)
+	$(BIN)/python -m pytest --numprocesses 3 --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)
 
-test-all: test test-suites test-guide test-ros1 test-browser test-faulty-server test-transformers test-pyrobosim \
+test-all: test test-slow test-suites test-guide test-ros1 test-browser test-faulty-server test-transformers test-pyrobosim \
 	test-inspect test-ray
+
+test-slow: $(VENV)/tested
+	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m slow $(addprefix --ignore ,$(APART))
 
 test-suites: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/roboeval/suites

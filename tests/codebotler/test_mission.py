@@ -524,6 +524,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
     assert "by the test" in mission.summary.reason
 
 
+@pytest.mark.slow
 def test_stop_at_any_moment_ends_as_stopped(home: Path) -> None:
     for number in range(8):
         with Reservation(Answering(), home) as reserved, ready(home, STUBBORN) as mission:

@@ -103,6 +103,7 @@ def test_the_functions_that_read_texts_take_linear_time(name: str) -> None:
     assert slow(FUNCTIONS[name], texts) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suite", ["paper", "plus"])
 def test_the_regexes_of_a_suite_take_linear_time(suite: str) -> None:
     tasks = load_suite(suite).tasks.values()

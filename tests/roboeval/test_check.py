@@ -19,6 +19,7 @@ def lanes() -> Iterator[Lanes]:
         yield started
 
 
+@pytest.mark.slow
 def test_rates_on_real_programs(
     corpus: Path, paper: Suite, lanes: Lanes, monkeypatch: pytest.MonkeyPatch
 ) -> None:

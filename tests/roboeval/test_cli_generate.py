@@ -34,21 +34,21 @@ def served(url: str, *more: str, model: str = "completions:tiny", tasks: str = T
 
 
 def test_from_nothing_to_tables_and_a_report(tmp_path: Path) -> None:
-    words = ["run", "--model", "recorded:hasty", "--num-completions", "3"]
+    words = ["run", "--model", "recorded:hasty", "--num-completions", "3", "--tasks", TASKS]
     ended = roboeval(*words, cwd=tmp_path)
     assert ended.status == 0
     assert "runs/recorded-hasty (programs written by hand)" in ended.out
-    assert re.search(r"pass@1 over all prompts: 0\.\d{3} \(95% interval .*, 80 prompts\)", ended.out)
+    assert re.search(r"pass@1 over all prompts: 0\.\d{3} \(95% interval .*, 10 prompts\)", ended.out)
     run = tmp_path / "runs" / "recorded-hasty"
-    assert len(set(keys(run))) == 240
-    assert (run / "evaluations" / "paper.jsonl").read_bytes().count(b"\n") == 240
+    assert len(set(keys(run))) == 30
+    assert (run / "evaluations" / "paper.jsonl").read_bytes().count(b"\n") == 30
     assert ended.err.endswith("the report is in runs/recorded-hasty/report/index.html\n")
     text = (run / "report" / "index.html").read_text()
     assert "roboeval report runs/recorded-hasty --out runs/recorded-hasty/report" in text
     shutil.rmtree(run / "report")
     again = roboeval(*words, "--no-report", cwd=tmp_path)
     assert (again.status, again.out) == (0, ended.out)
-    assert "240 of 240 completions" in again.err
+    assert "30 of 30 completions" in again.err
     assert not (run / "report").exists()
 
 

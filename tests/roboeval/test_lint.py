@@ -232,7 +232,8 @@ def test_a_regex_that_matches_something(linted: Lint, text: str) -> None:
     ],
 )
 def test_words_of_which_a_regex_says_only_that_they_stand_apart(linted: Lint, text: str) -> None:
-    assert linted({"says": f'tr.Exists(say(r"{text}"))'}, ["says"]) == []
+    found = linted({"says": f'tr.Exists(say(r"{text}"))'}, ["says"])
+    assert {one.kind for one in found} <= {"slow-regex"}
 
 
 @pytest.mark.parametrize("option", ["^ yes", "yes $", "^ yes $"])

@@ -137,6 +137,7 @@ def interrupt(asked: int) -> None:
 
 @pytest.mark.usefixtures("uncollected")
 def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # in the place of polars' own
     lanes = warm()
     gate, patience = threading.Event(), 60
     here, plain_submit = lanes.here, lanes.submit

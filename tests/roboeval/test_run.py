@@ -113,6 +113,7 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
     assert said[0].startswith("<object object at 0x")
 
 
+@pytest.mark.slow
 def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: Suite) -> None:
     whole = careful_run(tmp_path / "whole", paper)
     judged(whole, paper)

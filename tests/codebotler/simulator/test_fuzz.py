@@ -183,6 +183,7 @@ def test_recursion_through_anything_ends_alike_in_every_run(lanes: Lanes, other_
     check()
 
 
+@pytest.mark.slow
 def test_broken_texts_end_alike_in_every_run_and_break_nothing(lanes: Lanes, other_lanes: Lanes) -> None:
     @FUZZ
     @given(broken_programs(), st.sampled_from(WORLDS))

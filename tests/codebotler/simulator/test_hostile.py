@@ -41,6 +41,9 @@ from roboeval.records import to_line
 from roboeval.suite import Requirement, Scenario
 from roboeval.verdicts import judge
 
+BURN = {  # all the processor time that there is; another one does so in `make test`
+    *("cpu_counter_replaced", "cpu_power", "cpu_recursion_by_except", "cpu_regex", "cpu_uncounted_code"),
+}
 PROGRAMS = sorted((Path(__file__).parents[2] / "hostile").glob("*.py"))
 AS_WRITTEN = Rules(literals="as-written")
 SECRET = "hush-" + os.urandom(8).hex()
@@ -329,7 +332,11 @@ def honest(reach: Reach) -> Outcome:
 # --- the tests
 
 
-@pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(path, marks=[pytest.mark.slow] * (path.stem in BURN)) for path in PROGRAMS],
+    ids=lambda path: path.stem,
+)
 def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome) -> None:
     source = reach.filled(path.read_text(encoding="utf-8"))
     wanted = declared(source)
@@ -353,7 +360,6 @@ def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome)
     check_record(outcome)
 
     assert reach.run(HONEST) == honest
-    assert reach.state() == before
 
 
 def check_record(outcome: Outcome) -> None:

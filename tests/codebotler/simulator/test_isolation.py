@@ -187,6 +187,7 @@ def without_progress(told: str) -> str:
     return re.sub(r"^judging: .*\n", "", told, flags=re.MULTILINE)
 
 
+@pytest.mark.slow
 def test_kernel_that_refuses_a_filter_is_told_of_in_one_line_and_the_verdicts_are_the_same() -> None:
     below, bare = evaluated(before=BELOW_A_FILTER), evaluated()
     assert (below.returncode, without_progress(below.stderr)) == (0, MISSING + "\n")

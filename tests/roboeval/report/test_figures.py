@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -29,7 +30,8 @@ DRAWINGS: dict[str, Callable[[list[JudgedRun], Look], Figure | None]] = {
     "rejection-sampling": limits,
     "accepted": at_the_limit,
 }
-KEPT = [*(("usual", name) for name in DRAWINGS), *(("40 models", name) for name in DRAWINGS)]
+KEPT: list[Any] = [*(("usual", name) for name in DRAWINGS)]
+KEPT += [pytest.param("40 models", name, marks=pytest.mark.slow) for name in DRAWINGS]
 KEPT += [("one prompt", "tasks"), ("all failures", "causes"), ("no failures", "causes")]
 SIZE = (480, 480)
 TOLERANCE = 0.012  # of the whole range, on average over all points
@@ -51,7 +53,9 @@ def drawn_anew(case: str, name: str) -> Image.Image | None:
 
 
 @pytest.mark.parametrize("name", DRAWINGS)
-@pytest.mark.parametrize("case", cases())
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=[pytest.mark.slow] * (case == "40 models")) for case in cases()]
+)
 def test_nothing_breaks_a_figure(case: str, name: str) -> None:
     drawn = picture(case, name)
     if drawn is None:
