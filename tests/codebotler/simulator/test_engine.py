@@ -56,10 +56,10 @@ def links_in(folder: Path) -> list[Path]:
     return [link for link in list(folder.iterdir()) if link.is_symlink()]
 
 
-def held() -> tuple[set[str], set[int], set[str]]:
+def held() -> tuple[set[object], ...]:
     """What this process holds: file descriptors, children and threads."""
     descriptors = {f"{link.name} {link.readlink()}" for link in links_in(Path("/proc/self/fd"))}
-    return descriptors, children_of(os.getpid()), {thread.name for thread in threading.enumerate()}
+    return {*descriptors}, {*children_of(os.getpid())}, {thread.name for thread in threading.enumerate()}
 
 
 @pytest.fixture
