@@ -230,65 +230,65 @@ for wrong in ({"retries": -1}, {"model": "nobody"}, {"temperature": -1}):
 
 
 @pytest.mark.parametrize(
-    ("rooms", "sentence"),
+    ("rooms", "named"),
     [
-        ("kitchen", "the rooms are one text; put it into a list"),
-        ([1, 2], "one of the rooms is 1, not a text"),
-        ({"hall"}, "the rooms are {'hall'}, not a list of texts"),
-        (5, "the rooms are 5, not a list of texts"),
+        ("kitchen", "rooms .* list"),
+        ([1, 2], "rooms is 1, .* text"),
+        ({"hall"}, "rooms are {'hall'}, .* list"),
+        (5, "rooms are 5, .* list"),
     ],
 )
-def test_rooms_that_are_no_names_are_refused(rooms: object, sentence: str) -> None:
+def test_rooms_that_are_no_names_are_refused(rooms: object, named: str) -> None:
     wrong: Any = rooms
-    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+    with pytest.raises(codebotler.BadInput, match=named):
         codebotler.check("def task_program():\n    go_to('kitchen')\n", rooms=wrong)
-    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+    with pytest.raises(codebotler.BadInput, match=named):
         codebotler.generate("Go to the kitchen.", rooms=wrong)
-    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+    with pytest.raises(codebotler.BadInput, match=named):
         codebotler.prompt_for("Go to the kitchen.", rooms=wrong)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "sentence"),
+    ("wrong", "named"),
     [
-        ({"samples": 0}, "the number of samples is 0, but it must be at least 1"),
-        ({"samples": 10**9}, "the number of samples is 1000000000, but it must be at most 10,000"),
-        ({"samples": "5"}, "the number of samples is '5', not a whole number"),
-        ({"seed": None}, "the seed is None, not a whole number"),
-        ({"workers": -1}, "the number of workers is -1, but it must be at least 1"),
-        ({"workers": 0}, "the number of workers is 0, but it must be at least 1"),
-        ({"workers": 1.5}, "the number of workers is 1.5, not a whole number"),
-        ({"start": 3}, "the start is 3, not a text"),
-        ({"behaviours": {"fly": print}}, 'no behaviour says what the skill "get_current_location" does'),
+        ({"samples": 0}, "samples is 0, .* 1$"),
+        ({"samples": 10**9}, "samples is 1000000000, .* 10,000$"),
+        ({"samples": "5"}, "samples is '5', .*whole number"),
+        ({"seed": None}, "seed is None, .*whole number"),
+        ({"workers": -1}, "workers is -1, .* 1$"),
+        ({"workers": 0}, "workers is 0, .* 1$"),
+        ({"workers": 1.5}, r"workers is 1\.5, .*whole number"),
+        ({"start": 3}, "start is 3, .*text"),
+        ({"behaviours": {"fly": print}}, 'behaviour .*"get_current_location"'),
     ],
 )
-def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], named: str) -> None:
+    with pytest.raises(codebotler.BadInput, match=named):
         codebotler.check("def task_program():\n    say('hello')\n", **wrong)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "sentence"),
+    ("wrong", "named"),
     [
-        ({"retries": -1}, "the number of retries is -1, but it must be at least 0"),
-        ({"temperature": "hot"}, "the temperature is 'hot', not a number"),
-        ({"top_p": "all"}, "top-p is 'all', not a number"),
-        ({"timeout": None}, "the timeout is None, not a number"),
-        ({"max_tokens": True}, "the limit of tokens is True, not a whole number"),
-        ({"seed": 1.5}, "the seed is 1.5, not a whole number"),
-        ({"model": None}, "the model's name is None, not a text"),
+        ({"retries": -1}, "retries is -1, .* 0$"),
+        ({"temperature": "hot"}, "temperature is 'hot', .*number"),
+        ({"top_p": "all"}, "top-p is 'all', .*number"),
+        ({"timeout": None}, "timeout is None, .*number"),
+        ({"max_tokens": True}, "tokens is True, .*whole number"),
+        ({"seed": 1.5}, r"seed is 1\.5, .*whole number"),
+        ({"model": None}, "model.* is None, .*text"),
     ],
 )
-def test_settings_of_another_kind_are_refused(wrong: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+def test_settings_of_another_kind_are_refused(wrong: dict[str, Any], named: str) -> None:
+    with pytest.raises(codebotler.BadInput, match=named):
         codebotler.generate("Say hello.", **wrong)
 
 
 def test_what_is_no_text_has_no_program_and_no_prompt() -> None:
     wrong: Any = None
-    with pytest.raises(codebotler.BadInput, match=r"^the reply is None, not a text$"):
+    with pytest.raises(codebotler.BadInput, match="reply is None"):
         codebotler.program_of(wrong)
-    with pytest.raises(codebotler.BadInput, match=r"^the instruction is None, not a text$"):
+    with pytest.raises(codebotler.BadInput, match="instruction is None"):
         codebotler.prompt_for(wrong)
 
 
@@ -296,25 +296,25 @@ def test_skills_are_a_table() -> None:
     wrong: Any = None
     for call in (codebotler.check, codebotler.prompt_for, roboeval.load_suite):
         function: Any = call
-        with pytest.raises(codebotler.BadInput, match=r"^the skills are None, not a SkillTable$"):
+        with pytest.raises(codebotler.BadInput, match=r"skills are None, .*SkillTable"):
             function("paper", skills=wrong)
 
 
 @pytest.mark.parametrize(
-    ("wrong", "sentence"),
+    ("wrong", "named"),
     [
-        ({"task": 3}, "the task is 3, not a text"),
-        ({"prompt": "0"}, "the prompt is '0', not a whole number"),
-        ({"index": -1}, "the index is -1, but it must be at least 0"),
-        ({"index": 10**9}, "the index is 1000000000, but it must be below 1,000,000,000"),
-        ({"program": None}, "the program is None, not a text"),
-        ({"instruction": 1}, "the instruction is 1, not a text"),
-        ({"model": 1}, "the model is 1, not a text"),
+        ({"task": 3}, "task is 3, .*text"),
+        ({"prompt": "0"}, "prompt is '0', .*whole number"),
+        ({"index": -1}, "index is -1, .* 0$"),
+        ({"index": 10**9}, "index is 1000000000, .* 1,000,000,000$"),
+        ({"program": None}, "program is None, .*text"),
+        ({"instruction": 1}, "instruction is 1, .*text"),
+        ({"model": 1}, "model is 1, .*text"),
     ],
 )
-def test_a_completion_of_what_is_none_is_refused(wrong: dict[str, Any], sentence: str) -> None:
+def test_a_completion_of_what_is_none_is_refused(wrong: dict[str, Any], named: str) -> None:
     right: dict[str, Any] = {"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}
-    with pytest.raises(codebotler.BadInput, match=f"^{sentence}$"):
+    with pytest.raises(codebotler.BadInput, match=named):
         roboeval.Completion(**(right | wrong))
 
 
@@ -354,33 +354,34 @@ def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: st
 
 def test_the_name_of_a_suite_is_none() -> None:
     wrong: Any = "paper"
-    sentence = "^the suite is 'paper', but it must be one that load_suite has read$"
+    sentence = "suite is 'paper', .*load_suite"
     with pytest.raises(codebotler.BadInput, match=sentence):
         roboeval.evaluate([], wrong)
     with pytest.raises(codebotler.BadInput, match=sentence):
         next(roboeval.recorded_completions("recorded", wrong))
     with pytest.raises(codebotler.BadInput, match=sentence):
         next(roboeval.read_completions("x.jsonl", wrong))
-    with pytest.raises(codebotler.BadInput, match=r"^x\.jsonl: there is no such file$"):
+    with pytest.raises(codebotler.BadInput, match="no such file") as error:
         next(roboeval.read_completions("x.jsonl"))
+    assert str(error.value.file) == "x.jsonl"
     number: Any = 5
-    with pytest.raises(codebotler.BadInput, match=r"^the path is 5, not a text$"):
+    with pytest.raises(codebotler.BadInput, match="path is 5"):
         next(roboeval.read_completions(number))
 
 
 def test_a_suite_is_named_by_a_text_or_a_folder(tmp_path: Path) -> None:
     wrong: Any = 3
-    with pytest.raises(codebotler.BadInput, match=r"^the suite's name is 3, not a text$"):
+    with pytest.raises(codebotler.BadInput, match="suite's name is 3"):
         roboeval.load_suite(wrong)
-    with pytest.raises(codebotler.BadInput, match=f'^there is no suite "{tmp_path}": '):
+    with pytest.raises(codebotler.BadInput, match=f'"{tmp_path}"'):
         roboeval.load_suite(tmp_path)
 
 
 def test_a_program_and_an_instruction_are_texts() -> None:
     nothing: Any = None
-    with pytest.raises(codebotler.BadInput, match="the program is None, not a text"):
+    with pytest.raises(codebotler.BadInput, match="program is None"):
         codebotler.check(nothing)
-    with pytest.raises(codebotler.BadInput, match="the instruction is None, not a text"):
+    with pytest.raises(codebotler.BadInput, match="instruction is None"):
         codebotler.generate(nothing)
 
 
@@ -388,6 +389,6 @@ def test_generate_works_in_a_notebook_and_refuses_what_makes_no_sense(paper: Sui
     code = NOTEBOOK.replace("INSTRUCTION", repr(paper.tasks["LunchTime"].prompts[0]))
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     retries, model, temperature = ended.stdout.splitlines()
-    assert retries == "the number of retries is -1, but it must be at least 0"
-    assert model.startswith('"nobody" names no model')
-    assert temperature.startswith("the temperature is -1")
+    assert re.search("retries is -1, .* 0$", retries)
+    assert '"nobody"' in model
+    assert "temperature is -1" in temperature

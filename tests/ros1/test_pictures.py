@@ -6,6 +6,7 @@ import base64
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -188,7 +189,7 @@ def test_mission_keeps_what_the_robot_saw(graph: Graph, model: Server, tmp_path:
     shown = tool("missions", "last")
     for text in (watched, shown):
         assert "picture: pictures/1.jpg" in text
-    assert f"its pictures lie in {folder / 'pictures'}" in shown
+    assert str(folder / "pictures") in shown
     tool("missions", "last", "--mcap", "look.mcap")
     messages = make_reader(io.BytesIO((tmp_path / "look.mcap").read_bytes())).iter_messages(
         ["/skill/is_in_room/picture"]
@@ -209,10 +210,10 @@ def test_picture_may_come_from_a_file(graph: Graph, model: Server, tmp_path: Pat
         assert found
         assert len(told) == 1
         path.write_bytes(encoded("PNG")[:90])
-        with pytest.raises(RobotError, match=r"room.png cannot be read, it is broken or cut off"):
+        with pytest.raises(RobotError, match=r"room\.png .*broken or cut off"):
             asked(graph, "mug")
         path.unlink()
-        with pytest.raises(RobotError, match=r"room.png: there is no such file"):
+        with pytest.raises(RobotError, match=r"room\.png: .*no such file"):
             asked(graph, "mug")
 
 
@@ -221,11 +222,11 @@ def test_no_picture_yet_and_no_picture_any_more_are_said(graph: Graph, model: Se
         with pytest.raises(RobotError) as error:
             asked(graph, "mug")
         assert error.value.kind == "IsInRoomFailed"
-        assert str(error.value) == f"no picture has come on {TOPIC} yet; does the camera's node run?"
+        assert f"no picture has come on {TOPIC}" in str(error.value)
         camera(graph, "sensor_msgs/Image", raw("rgb8"), seconds=1.0)
         assert asked(graph, "mug")[0]
         time.sleep(2.0)
-        with pytest.raises(RobotError, match=rf"the last picture on {TOPIC} came \d s ago; has the camera"):
+        with pytest.raises(RobotError, match=rf"{TOPIC} came \d s ago"):
             asked(graph, "mug")
 
 
@@ -234,16 +235,13 @@ def test_what_is_no_picture_is_said(graph: Graph, model: Server) -> None:
     camera(graph, "sensor_msgs/Image", {**raw("rgb8"), "encoding": "16UC1"}, topic="/depth")
     camera(graph, "sensor_msgs/CompressedImage", {"format": "jpeg", "data": "00ff"}, topic="/noise")
     for topic, sentence in (
-        (
-            "/words",
-            "/words has messages of std_msgs/String; name one of sensor_msgs/Image or sensor_msgs/Comp",
-        ),
-        ("/depth", 'the picture on /depth has the encoding "16UC1", not one of rgb8'),
-        ("/noise", "the picture on /noise is no JPEG, PNG or WebP file"),
+        ("/words", "/words .*std_msgs/String.* sensor_msgs/Image or sensor_msgs/Comp"),
+        ("/depth", '/depth .*"16UC1", not one of rgb8'),
+        ("/noise", "/noise .*no JPEG, PNG or WebP file"),
     ):
         with looking(graph, model, "--topic", topic, "--oldest", "1"), pytest.raises(RobotError) as error:
             asked(graph, "mug")
-        assert sentence in str(error.value)
+        assert re.search(sentence, str(error.value))
 
 
 def test_model_that_is_down_is_said_and_may_come_back(graph: Graph, model: Server) -> None:
@@ -252,16 +250,11 @@ def test_model_that_is_down_is_said_and_may_come_back(graph: Graph, model: Serve
         model.fault = lambda _: Fault.NOT_FOUND
         with pytest.raises(RobotError) as error:
             asked(graph, "mug")
-        assert (
-            error.value.kind,
-            "openai-chat:eyes: the server answered with status 404" in str(error.value),
-        ) == (
-            "IsInRoomFailed",
-            True,
-        )
+        assert error.value.kind == "IsInRoomFailed"
+        assert re.search("openai-chat:eyes: .*status 404", str(error.value))
         model.fault = lambda _: None
         assert asked(graph, "mug")[0]
-        with pytest.raises(RobotError, match="nothing is named that could be looked for"):
+        with pytest.raises(RobotError, match="nothing"):
             asked(graph, "")
 
 
@@ -284,15 +277,15 @@ def test_look_that_is_cancelled_ends_at_once(graph: Graph, model: Server) -> Non
 
 
 @pytest.mark.parametrize(
-    ("arguments", "sentence"),
+    ("arguments", "named"),
     [
-        (["recorded"], "error: recorded sees no pictures; name a chat model that does, or hf:PATH"),
-        (["openai-chat:eyes"], "error: no ROS master answers at http://localhost:"),
-        (["openai-chat:eyes", "--oldest", "nan"], "error: --oldest is nan, but must be a number of seconds"),
-        (["openai-chat:eyes", "--oldest", "0"], "error: --oldest is 0, but must be a number of seconds"),
+        (["recorded"], ["recorded sees no pictures", "hf:PATH"]),
+        (["openai-chat:eyes"], ["no ROS master", "http://localhost:"]),
+        (["openai-chat:eyes", "--oldest", "nan"], ["--oldest is nan", "seconds"]),
+        (["openai-chat:eyes", "--oldest", "0"], ["--oldest is 0", "seconds"]),
     ],
 )
-def test_what_keeps_it_from_serving_is_said(arguments: list[str], sentence: str) -> None:
+def test_what_keeps_it_from_serving_is_said(arguments: list[str], named: list[str]) -> None:
     command = [sys.executable, str(EXAMPLE), "--base-url", "http://localhost:1/v1", "--model", *arguments]
     master = f"http://localhost:{free_port()}"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "ROS_MASTER_URI": master}
@@ -300,7 +293,7 @@ def test_what_keeps_it_from_serving_is_said(arguments: list[str], sentence: str)
         [*command, "--topic", TOPIC], env=environment, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr.count("Traceback")) == (2, 0)
-    assert sentence in done.stderr
+    assert all(name in done.stderr for name in ["error: ", *named]), done.stderr
 
 
 # --- what a robot shows
@@ -355,7 +348,10 @@ def test_any_server_may_show_what_it_sees(graph: Graph, tmp_path: Path) -> None:
 
     assert told("late") == [Picture(b"no picture at all")]
     assert told("three") == [Picture(b"no picture at all")] * 3
-    assert told("huge") == ["a picture was left out, for it has 3,000,000 bytes, not 2,000,000 or less"]
+    (left_out,) = told("huge")
+    assert isinstance(left_out, str)
+    assert "3,000,000 bytes" in left_out
+    assert "2,000,000" in left_out
     began = time.monotonic()
     assert told("nothing") == []
     assert time.monotonic() - began < 1.0

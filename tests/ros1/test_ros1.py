@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -43,16 +44,16 @@ def test_goal_is_executed_and_the_result_comes_back(graph: Graph) -> None:
         ("abort", "GoToInvalidLocation", "the door is shut"),
         ("reject", "GoToInvalidLocation", "not in this gown"),
         ("abort, named", "DoorIsShut", "you have no key"),
-        ("abort without a word", "GoToInvalidLocation", "/go_to_server aborted the goal without a reason"),
+        ("abort without a word", "GoToInvalidLocation", "/go_to_server aborted .*without a reason"),
     ],
 )
 def test_rejected_or_aborted_goal_is_a_robot_error(graph: Graph, goal: str, kind: str, message: str) -> None:
     graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    with pytest.raises(RobotError) as error:
+    with pytest.raises(RobotError, match=f"^{message}$") as error:
         robot.perform("go_to", [goal])
-    assert (error.value.kind, str(error.value)) == (kind, message)
+    assert error.value.kind == kind
     robot.perform("go_to", ["the hall"])
 
 
@@ -67,27 +68,25 @@ def test_skill_that_fails_in_several_ways_names_itself(graph: Graph) -> None:
 
 def test_no_master_is_said_at_once() -> None:
     uri = f"http://localhost:{free_port()}"
-    with pytest.raises(NotReadyError, match=f"no ROS master answers at {uri}; start one"):
+    with pytest.raises(NotReadyError, match=f"no ROS master .*{uri}"):
         Ros1(uri).connect()
 
 
 @pytest.mark.parametrize("uri", ["robot", "http://robot", "http://robot:a", "ws://robot:9090"])
 def test_address_that_is_no_uri_is_refused(uri: str) -> None:
-    with pytest.raises(
-        BadInput, match=r"is no URI of a ROS master; write one such as http://localhost:11311"
-    ):
+    with pytest.raises(BadInput, match=r"ROS master.* http://localhost:11311"):
         open_robot("ros1", Options(address=uri))
 
 
 def test_no_rospy_is_said_with_the_mend(graph: Graph) -> None:
-    with pytest.raises(NotReadyError, match="has no ROS: No module named"):
+    with pytest.raises(NotReadyError, match="No module named"):
         Ros1(graph.uri, python=Path(sys.executable)).connect()
-    with pytest.raises(NotReadyError, match="name the robot's Python by --ros-python"):
+    with pytest.raises(NotReadyError, match="--ros-python"):
         Ros1(graph.uri, python=Path("/nowhere/python3")).connect()
 
 
 def test_robot_without_any_server_is_not_ready(graph: Graph) -> None:
-    with pytest.raises(NotReadyError, match=r"no action server at all: there is no action server at /"):
+    with pytest.raises(NotReadyError, match=r"no action server .*/"):
         graph.robot().connect()
 
 
@@ -96,8 +95,8 @@ def test_missing_server_is_known_before_motion_and_looked_for_again(graph: Graph
     robot = graph.robot()
     robot.connect()
     assert set(robot.missing) == set(SKILLS) - {"go_to"}
-    assert robot.missing["say"] == "there is no action server at /say_server; start it"
-    with pytest.raises(RobotLostError, match="there is no action server at /say_server; start it"):
+    assert "/say_server" in robot.missing["say"]
+    with pytest.raises(RobotLostError, match=r"no action server .*/say_server"):
         robot.perform("say", ["hello"])
     server = graph.serve(SAY)
     robot.perform("say", ["hello"])
@@ -117,7 +116,7 @@ def test_server_with_another_definition_is_told_from_a_missing_one(graph: Graph)
     graph.serve(SAY, replace(GO_TO, ros=replace(GO_TO.ros, goal=("string place",))))
     robot = graph.robot()
     robot.connect()
-    assert "its definition of robot_actions_pkg/GoToAction differs (another md5" in robot.missing["go_to"]
+    assert re.search("robot_actions_pkg/GoToAction .*another md5", robot.missing["go_to"])
     assert "say" not in robot.missing
     with pytest.raises(RobotLostError, match="another md5"):
         robot.perform("go_to", ["the hall"])
@@ -128,14 +127,14 @@ def test_server_that_died_long_ago_is_said_to_have_died(graph: Graph) -> None:
     graph.serve(GO_TO).kill()
     robot = graph.robot()
     robot.connect()
-    assert "has died; start it again" in robot.missing["go_to"]
+    assert "has died" in robot.missing["go_to"]
 
 
 def test_server_that_dies_in_a_goal_is_noticed_and_may_come_back(graph: Graph) -> None:
     graph.serve(GO_TO)
     robot = graph.robot()
     robot.connect()
-    with pytest.raises(RobotLostError, match="the action server at /go_to_server has died: no status"):
+    with pytest.raises(RobotLostError, match="/go_to_server has died"):
         robot.perform("go_to", ["die"])
     server = graph.serve(GO_TO)
     robot.perform("go_to", ["the hall"])
@@ -143,20 +142,19 @@ def test_server_that_dies_in_a_goal_is_noticed_and_may_come_back(graph: Graph) -
 
 
 @pytest.mark.parametrize(
-    ("goal", "sentence"),
+    ("goal", "named"),
     [
-        ("never", "/go_to_server did not end within 1 s; the goal was cancelled"),
-        ("no result", "/go_to_server ended the goal, but sent no result within 1.5 s"),
+        ("never", r"/go_to_server .*\b1 s\b.*cancelled"),
+        ("no result", r"/go_to_server .*no result .*1\.5 s"),
     ],
 )
-def test_goal_that_does_not_end_is_cancelled(graph: Graph, goal: str, sentence: str) -> None:
+def test_goal_that_does_not_end_is_cancelled(graph: Graph, goal: str, named: str) -> None:
     server = graph.serve(GO_TO)
     longest = 1.0 if goal == "never" else 20.0
     robot = graph.robot(waits=Waits(patience=1.5, silence=3.0, longest=longest))
     robot.connect()
-    with pytest.raises(RobotLostError) as error:
+    with pytest.raises(RobotLostError, match=named):
         robot.perform("go_to", [goal])
-    assert error.value.sentence == sentence
     server.expect("goal", goal)
     if goal == "never":
         server.expect("cancel", goal)
@@ -166,7 +164,7 @@ def test_goal_of_which_the_server_takes_no_notice(graph: Graph) -> None:
     graph.serve(GO_TO, DEAF="1")
     robot = graph.robot()
     robot.connect()
-    with pytest.raises(RobotLostError, match=r"/go_to_server did not take the goal within 1.5 s"):
+    with pytest.raises(RobotLostError, match=r"/go_to_server .*take the goal .*1\.5 s"):
         robot.perform("go_to", ["the hall"])
 
 
@@ -245,9 +243,7 @@ def test_robot_that_does_not_stop_is_said_not_to(graph: Graph) -> None:
         server.expect("goal", "never, whatever you say")
         robot.cancel()
     assert isinstance(ended["error"], RobotLostError)
-    assert ended["error"].sentence == (
-        "/go_to_server was told to stop, and did not say within 1.5 s that it has"
-    )
+    assert re.search(r"/go_to_server .*told to stop.*1\.5 s", ended["error"].sentence)
 
 
 def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None:
@@ -260,9 +256,7 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None
         os.kill(robot._worker.pid, signal.SIGKILL)
         server.expect("cancel", "never")
     assert isinstance(ended["error"], RobotLostError)
-    assert ended["error"].sentence == (
-        "the worker of ros1 has died (signal 9); another one has cancelled all goals"
-    )
+    assert re.search(r"\bros1 has died \(signal 9\).*cancelled", ended["error"].sentence)
     robot.connect()
     robot.perform("go_to", ["the hall"])
 
@@ -304,9 +298,7 @@ def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
         os.kill(robot._worker.pid, signal.SIGSTOP)
         server.expect("cancel", "never")
     assert isinstance(ended["error"], RobotLostError)
-    assert ended["error"].sentence == (
-        "the worker of ros1 does not answer; another one has cancelled all goals"
-    )
+    assert re.search(r"\bros1 does not answer.*cancelled", ended["error"].sentence)
 
 
 TOOL = """
@@ -403,7 +395,7 @@ def test_second_tool_is_refused_and_the_first_goes_on(graph: Graph) -> None:
     graph.serve(GO_TO)
     first, second = graph.robot(), graph.robot()
     first.connect()
-    with pytest.raises(NotReadyError, match="another codebotler has this robot: the node /codebotler at"):
+    with pytest.raises(NotReadyError, match="node /codebotler at"):
         second.connect()
     first.perform("go_to", ["the hall"])
     first.disconnect()
@@ -456,7 +448,7 @@ def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_pa
     environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(SCRIPT.parent)}
     robot = RosRobot(Ros("ros1", script, PYTHON, environment, graph.uri), waits=Waits(patience=LONG))
     began = time.monotonic()
-    with pytest.raises(NotReadyError, match=r"^another node called /codebotler has"):
+    with pytest.raises(NotReadyError, match="node called /codebotler"):
         robot.connect()
     assert time.monotonic() - began < LONG / 2, "no server is waited for any more"
 
@@ -465,7 +457,7 @@ def test_text_that_no_message_can_hold_is_said(graph: Graph) -> None:
     server = graph.serve(SAY)
     robot = graph.robot()
     robot.connect()
-    with pytest.raises(RobotLostError, match=r"the goal of /say_server cannot be sent: .*surrogates"):
+    with pytest.raises(RobotLostError, match=r"/say_server .*surrogates"):
         robot.perform("say", ["\ud800"])
     robot.perform("say", ["hello"])
     server.expect("goal", "hello")
@@ -477,10 +469,10 @@ def test_master_that_was_started_anew_between_missions(graph: Graph) -> None:
     robot.connect()
     robot.perform("go_to", ["the hall"])
     graph.master.end()
-    with pytest.raises(NotReadyError, match="no ROS master answers"):
+    with pytest.raises(NotReadyError, match="no ROS master"):
         graph.robot().connect()
     graph.processes.pop().kill()
-    with pytest.raises(RobotLostError, match=r"and so is the ROS master|has died"):
+    with pytest.raises(RobotLostError, match=r"ROS master|has died"):
         robot.perform("go_to", ["the hall"])
     graph.start_master()
     server = graph.serve(GO_TO)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -111,25 +112,25 @@ def test_taken_port_and_distant_master_are_said() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-        with pytest.raises(NotReadyError, match=f"port {port} is taken by what is no ROS master"):
+        with pytest.raises(NotReadyError, match=f"port {port} .*no ROS master"):
             VirtualRobot(WORLD, port=port).start()
 
 
 def test_master_elsewhere_is_never_started(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.2:{free_port()}")
-    with pytest.raises(NotReadyError, match=r"no ROS master answers at http://127.0.0.2"):
+    with pytest.raises(NotReadyError, match=r"no ROS master .*http://127\.0\.0\.2"):
         VirtualRobot(WORLD).start()
 
 
 def test_second_virtual_robot_is_refused(graph: Graph, virtual: VirtualRobot) -> None:
-    with pytest.raises(NotReadyError, match="the node /virtual_robot at http"):
+    with pytest.raises(NotReadyError, match="node /virtual_robot at http"):
         VirtualRobot(WORLD, port=graph.port).start()
     assert virtual.pid
 
 
 def test_killed_worker_is_said(virtual: VirtualRobot) -> None:
     os.kill(virtual.pid, signal.SIGKILL)
-    with pytest.raises(RobotLostError, match=r"the worker of the virtual robot has died \(signal 9\)"):
+    with pytest.raises(RobotLostError, match=r"virtual robot has died \(signal 9\)"):
         virtual.wait()
 
 
@@ -145,9 +146,7 @@ def test_command_starts_a_master_that_ends_with_it(tmp_path: Path) -> None:
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2] / "src")},
     )
     assert process.stderr is not None
-    assert process.stderr.readline() == (
-        f"a ROS master was started at http://localhost:{port}; the robot is ready, Ctrl-C ends it\n"
-    )
+    assert re.search(rf"ROS master .*http://localhost:{port}\b.*Ctrl-C", process.stderr.readline())
     robot = Ros1(f"http://localhost:{port}")
     robot.connect()
     robot.perform("go_to", ["kitchen"])
@@ -156,12 +155,9 @@ def test_command_starts_a_master_that_ends_with_it(tmp_path: Path) -> None:
     robot.disconnect()
     process.send_signal(signal.SIGINT)
     said, errors = process.communicate(timeout=20)
-    assert said.splitlines() == [
-        "go_to(kitchen)",
-        "  succeed None",
-        "go_to(moon)",
-        '  abort GoToInvalidLocation: there is no room "moon"',
-    ]
+    *calls, failed = said.splitlines()
+    assert calls == ["go_to(kitchen)", "  succeed None", "go_to(moon)"]
+    assert re.match('  abort GoToInvalidLocation: .*"moon"', failed)
     assert (process.returncode, errors) == (130, "codebotler: stopped\n")
-    with pytest.raises(NotReadyError, match="no ROS master answers"):
+    with pytest.raises(NotReadyError, match="no ROS master"):
         robot.connect()

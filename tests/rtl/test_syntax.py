@@ -191,7 +191,7 @@ def test_50_are_deep_enough_and_51_too_deep(pattern: str, unit: str, column: int
     close = ")" * unit.endswith("(")
     text = pattern.format(unit * DEEPEST, close * DEEPEST)
     assert str(parse(text)) == text
-    with pytest.raises(RtlSyntaxError, match="this is nested more than 50 deep") as caught:
+    with pytest.raises(RtlSyntaxError, match="more than 50 deep") as caught:
         parse(pattern.format(unit * (DEEPEST + 1), close * (DEEPEST + 1)))
     assert caught.value.column == column
 
@@ -199,7 +199,7 @@ def test_50_are_deep_enough_and_51_too_deep(pattern: str, unit: str, column: int
 def test_each_part_of_a_constraint_may_be_deep() -> None:
     deep = "not " * (DEEPEST - 1) + 'tr.Exists(say("a"))'
     assert str(parse(f"{deep} and {deep}")) == f"{deep} and {deep}"
-    with pytest.raises(RtlSyntaxError, match="nested more than"):
+    with pytest.raises(RtlSyntaxError, match="nested"):
         parse(f"{deep} and not {deep}")
 
 
@@ -208,7 +208,7 @@ def test_a_number_may_be_the_largest_and_no_larger(test: str) -> None:
     text = f'tr.{test}(say("a"), 1000000000)'
     assert str(parse(text)) == text
     assert not holds(parse(text), (Event("say", "a"),))
-    with pytest.raises(RtlSyntaxError, match="expected a number of at most 1000000000") as caught:
+    with pytest.raises(RtlSyntaxError, match="at most 1000000000") as caught:
         parse(f'tr.{test}(say("a"), 1000000001)')
     assert caught.value.column == text.index("1000") + 1
 

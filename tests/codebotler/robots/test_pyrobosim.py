@@ -198,7 +198,7 @@ def test_pyrobosim_is_who_knows() -> None:
     stage = robot._stage
     assert stage is not None
     stage.robot.battery_level = 0.0
-    with pytest.raises(RobotError, match='the robot cannot pick up "laser": Out of battery') as error:
+    with pytest.raises(RobotError, match=r'"laser".*Out of battery') as error:
         robot.perform("pick", ["laser"])
     assert error.value.kind == "PickFailed"
     assert robot.perform("is_in_room", ["laser"]) is True, "it was not taken"
@@ -272,23 +272,24 @@ def test_closed_door_is_an_error_and_nothing_has_moved() -> None:
     with pytest.raises(RobotError) as error:
         robot.perform("go_to", ["kitchen"])
     assert error.value.kind == "GoToInvalidLocation"
-    assert str(error.value) == 'the robot cannot drive to "kitchen": Failed to plan a path.'
+    assert '"kitchen"' in str(error.value)
+    assert "Failed to plan a path." in str(error.value)
     assert (position(robot), robot.perform("get_current_location", [])) == (at, "hall")
 
 
 @pytest.mark.parametrize(
-    ("room", "sentence"),
+    ("room", "named"),
     [
-        (Room("b", footprint=((1, 1), (5, 1), (5, 5), (1, 5))), 'the rooms "a" and "b" overlap'),
-        (Room("b", footprint=((5, 0), (9, 0), (9, 0.5), (5, 0.5))), 'cannot pass everywhere in "b"'),
-        (Room("b", footprint=((5, 0), (9, 4), (9, 0), (5, 4))), "its edges must not cross"),
-        (Room("b", ("mug",), footprint=SMALL), 'no table has room in "b"'),
+        (Room("b", footprint=((1, 1), (5, 1), (5, 5), (1, 5))), '"a" and "b" overlap'),
+        (Room("b", footprint=((5, 0), (9, 0), (9, 0.5), (5, 0.5))), 'pass everywhere .*"b"'),
+        (Room("b", footprint=((5, 0), (9, 4), (9, 0), (5, 4))), "edges .*cross"),
+        (Room("b", ("mug",), footprint=SMALL), 'no table .*"b"'),
     ],
 )
-def test_rooms_that_cannot_be_are_said(room: Room, sentence: str) -> None:
+def test_rooms_that_cannot_be_are_said(room: Room, named: str) -> None:
     first = Room("a", footprint=((0, 0), (4, 0), (4, 4), (0, 4)))
     robot = Pyrobosim(World((first, room), "a"))
-    with pytest.raises(NotReadyError, match=sentence):
+    with pytest.raises(NotReadyError, match=named):
         robot.connect()
     robot.disconnect()
 
@@ -298,7 +299,7 @@ def test_nothing_can_be_put_down_where_no_table_has_room() -> None:
     robot = connected(World((first, Room("b", footprint=SMALL)), "a"))
     robot.perform("pick", ["mug"])
     robot.perform("go_to", ["b"])
-    with pytest.raises(RobotError, match='no table has room in "b"') as error:
+    with pytest.raises(RobotError, match=r'no table .*"b"') as error:
         robot.perform("place", ["mug"])
     assert error.value.kind == "PlaceFailed"
     robot.perform("go_to", ["a"])
@@ -425,7 +426,7 @@ def test_cancel_before_anything_goes_on_is_not_forgotten() -> None:
 def test_second_tool_is_refused(tmp_path: Path) -> None:
     with (
         Reservation(Pyrobosim(WORLD), tmp_path),
-        pytest.raises(NotReadyError, match="uses the robot pyrobosim"),
+        pytest.raises(NotReadyError, match="robot pyrobosim"),
         Reservation(Pyrobosim(WORLD), tmp_path),
     ):
         pass
@@ -453,7 +454,7 @@ def test_command_runs_a_program_and_ctrl_c_stops_it(tmp_path: Path) -> None:
     )
     told = done.stderr.removeprefix("connecting the robot pyrobosim ...\n")  # said where it takes its time
     assert (done.returncode, told) == (0, "")
-    assert "running on the robot pyrobosim" in done.stdout
+    assert "robot pyrobosim" in done.stdout
     assert 'puts down "cup"' in done.stdout
     with subprocess.Popen(
         [*command, "1"], cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True

@@ -414,7 +414,7 @@ def test_run_whose_zygote_is_killed_is_run_again() -> None:
 
 @pytest.mark.usefixtures("nothing_is_left")
 def test_zygote_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
-    with pytest.raises(EngineError, match="an isolated process was lost twice"):
+    with pytest.raises(EngineError, match="lost twice"):
         list(run([(saying("a"), WORLD)], workers=1, behaviours=doing(killing(99))))
 
 
@@ -591,9 +591,8 @@ def test_macos_is_less_isolated_and_says_so_with_the_platform_patched(
     monkeypatch.setattr(Lane, "has_seccomp", property(lambda _: False, lambda *_: None), raising=False)
     monkeypatch.setattr(sys, "platform", "darwin")
     assert said(next(run([(saying("a"), WORLD)], workers=1))) == ["a"]
-    assert [record.getMessage() for record in caplog.records] == [
-        "programs are less isolated here: only Linux has a list of allowed system calls (seccomp)"
-    ]
+    (record,) = caplog.records
+    assert "only Linux" in record.getMessage()
     with pytest.raises(EngineError, match="only Linux"):
         list(run([(saying("a"), WORLD)], workers=1, require_isolation=True))
 

@@ -126,8 +126,8 @@ def test_problems_need_a_word_about_them(desk: Desk) -> None:
     view = checked(desk, BAD)
     turn = desk.turn
     assert turn is not None
-    assert 'there is no room "cellar"' in view.problems[0]
-    with pytest.raises(MissionError, match="has problems"):
+    assert '"cellar"' in view.problems[0]
+    with pytest.raises(MissionError, match="problems"):
         turn.approve(view.digest)
     assert desk.view.state is State.CHECKED
     turn.approve(view.digest, despite_problems=True)
@@ -139,10 +139,10 @@ def test_only_the_program_that_was_seen_can_be_approved(desk: Desk) -> None:
     desk.edit(HELLO.replace("hello", "bye"))
     turn = desk.turn
     assert turn is not None
-    with pytest.raises(MissionError, match=r"was changed since|not checked yet"):
+    with pytest.raises(MissionError, match=r"changed|checked"):
         turn.approve(seen.digest)
     until(desk, lambda view: view.found is not None)
-    with pytest.raises(MissionError, match="was changed since"):
+    with pytest.raises(MissionError, match="changed"):
         turn.approve(seen.digest)
     assert desk.view.state is State.CHECKED
 
@@ -305,8 +305,8 @@ def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("order", "told"),
     [
-        (Order("   ", "author"), "nothing is asked for"),
-        (Order("say hello"), "nothing is asked for"),
+        (Order("   ", "author"), "nothing"),
+        (Order("say hello"), "nothing"),
         (Order(program="#" * (MOST_PROGRAM + 1)), "too many"),
     ],
 )
@@ -321,7 +321,7 @@ def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> Non
         checked(one)
         other.begin(Order(program=HELLO))
         view = until(other, lambda view: view.is_over)
-        assert "uses the robot simulated" in view.trouble
+        assert "robot simulated" in view.trouble
         assert view.id == ""
 
 

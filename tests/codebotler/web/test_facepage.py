@@ -105,7 +105,7 @@ def test_a_question_is_answered_from_the_face(server: PageServer) -> None:
             ]
             assert (ended["how"], ended["answer"]) == ("answered", "No")
         again = server.face("POST", "/api/face/answer", answer)
-        assert (again.status, again.data["detail"]) == (409, 'somebody has answered already: "No"')
+        assert (again.status, 'already: "No"' in again.data["detail"]) == (409, True)
         over = heard(one, lambda now: now["is_over"])
         assert [said["text"] for said in over["said"]] == ["Good morning", "She says No"]
     assert until(server, lambda now: now["screens"] == 0)
@@ -119,7 +119,7 @@ def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> Non
         for socket in (one, other):
             assert ending(socket, number)["how"] == "withdrawn"
         late = server.face("POST", "/api/face/answer", {"question": number, "option": 0})
-        assert (late.status, late.data["detail"]) == (409, "that is not asked any more: it was withdrawn")
+        assert (late.status, "withdrawn" in late.data["detail"]) == (409, True)
 
 
 def test_nobody_answers_in_time(tmp_path: Path) -> None:
@@ -127,9 +127,10 @@ def test_nobody_answers_in_time(tmp_path: Path) -> None:
         server.run(TEA)
         assert until(server, lambda now: now["is_over"])["ended"]["how"] == "unanswered"
         (mission,) = missions(server.home)
-        assert (mission.state, mission.reason) == ("failed", 'AskTimeout: nobody answered "Tea?" within 1 s')
+        assert mission.state == "failed"
+        assert re.match(r'AskTimeout: .*"Tea\?" .*1 s', mission.reason)
         events = events_of(server.home / "missions" / mission.id)
-        assert "no face is open" in [line.get("text") for line in events]
+        assert any("no face" in line.get("text", "") for line in events)
 
 
 def test_the_face_tells_what_the_robot_does_and_nothing_of_its_program(server: PageServer) -> None:
@@ -155,7 +156,7 @@ def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> 
     until(server, lambda now: now["doing"] == "moving")
     assert server.face("POST", "/api/face/stop?only_moving=false").data == {"stopping": True}
     assert until(server, lambda now: now["is_over"])["state"] == "stopped"
-    assert missions(server.home)[-1].reason == "stopped by somebody at the face"
+    assert "at the face" in missions(server.home)[-1].reason
     server.call("POST", "/api/missions", {"program": FAR})
     while server.call("GET", "/api/robot").data["state"] != "checked":
         time.sleep(0.01)
@@ -262,21 +263,21 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "named"),
     [
-        (["--face-token", "short"], f"take {SHORTEST_TOKEN} characters or more"),
-        (["--token", "x" * 20, "--face-token", "x" * 20], "would open the operator's page"),
+        (["--face-token", "short"], f"{SHORTEST_TOKEN} characters"),
+        (["--token", "x" * 20, "--face-token", "x" * 20], "operator's page"),
         (["--no-token", "--face-token", "x" * 20], "only for this machine"),
-        (["--face-timeout", "0"], "greater than or equal to 1"),
-        (["--stop-when-alone", "0"], "greater than or equal to 1"),
+        (["--face-timeout", "0"], "'--face-timeout'"),
+        (["--stop-when-alone", "0"], "'--stop-when-alone'"),
     ],
 )
-def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
+def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], named: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
     command = [sys.executable, "-m", "codebotler.cli", "serve", "--world", "world.yaml", "--face", *arguments]
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
     assert ended.returncode == 2
-    assert told in ended.stderr
+    assert named in ended.stderr
 
 
 def test_tokens_can_be_named_so_that_a_tablets_link_stays(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -50,8 +51,8 @@ def test_a_package_adds_pages_and_a_broken_one_is_left_out(
         assert server.call("GET", "/api/hello").data == "hello"
         assert server.ask("GET", "/hello").status == server.ask("GET", "/api/hello").status == 401
         assert "Hello" in server.call("GET", "/").text
-    assert 'the pages "broken_pages" cannot be added: No module named' in server.said
-    assert 'the pages "wrong_pages" cannot be added' in server.said
+    assert re.search('"broken_pages" .*: No module named', server.said)
+    assert '"wrong_pages"' in server.said
 
 
 def test_codebotler_needs_no_benchmark() -> None:

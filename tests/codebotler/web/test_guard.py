@@ -202,7 +202,7 @@ def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told
 def test_other_machines_need_the_token_and_that_is_said(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--host", "0.0.0.0") as server:
         assert server.token
-        assert "other machines get in as well, by this link only" in server.said
+        assert "other machines" in server.said
         for path in ("/", "/api/robot", "/static/page.css"):
             assert server.ask("GET", path).status == 401
             assert server.ask("GET", path, host=f"192.0.2.7:{server.port}").status == 401
@@ -417,7 +417,7 @@ def test_what_is_sent_without_its_length_has_the_same_limit(server: PageServer) 
         connection.send(b"%x\r\n%b\r\n" % (size, b"x" * size))
     answer = connection.getresponse()
     told = json.loads(answer.read())["detail"]
-    assert (answer.status, told) == (413, "at most 2,000,000 bytes are taken")
+    assert (answer.status, "2,000,000 bytes" in told) == (413, True)
     connection.close()
 
 
