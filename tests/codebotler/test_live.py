@@ -241,7 +241,7 @@ def test_error_after_a_stop_does_not_reach_the_program() -> None:
 
 def test_somebody_else_who_stops_the_robot_ends_the_mission() -> None:
     robot, notes = live(raising(CancelledError()))
-    with pytest.raises(RobotLostError, match="somebody else stopped the robot"):
+    with pytest.raises(RobotLostError, match="somebody else"):
         robot.perform("go_to", ["kitchen"])
     assert notes.kinds == ["skill", "feedback", "cancelled"]
 

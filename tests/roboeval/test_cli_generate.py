@@ -61,9 +61,9 @@ def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
     assert process.returncode == 130
-    assert err.endswith(
-        "roboeval: stopped; verdicts are in run; `roboeval report run --out run/report` writes the report\n"
-    ), err
+    last = err.splitlines()[-1]
+    assert last.startswith("roboeval: stopped; ")
+    assert "`roboeval report run --out run/report`" in last
     assert not (tmp_path / "run" / "report").exists()
     kept = checks.read_bytes()
     assert roboeval("resample", "run", cwd=tmp_path).status == 0
@@ -74,10 +74,9 @@ def test_a_report_that_is_interrupted_costs_nothing(tmp_path: Path) -> None:
 def test_generate_says_where_and_what_next(tmp_path: Path) -> None:
     ended = roboeval("generate", "--tasks", "LunchTime", "--num-completions", "1", cwd=tmp_path)
     assert (ended.status, ended.out) == (0, "")
-    assert ended.err == (
-        "the completions are in runs/recorded-careful; "
-        "`roboeval evaluate runs/recorded-careful` judges them\n"
-    )
+    assert ended.err.count("\n") == 1
+    assert " runs/recorded-careful; " in ended.err
+    assert "`roboeval evaluate runs/recorded-careful`" in ended.err
     assert sorted(path.name for path in (tmp_path / "runs" / "recorded-careful").iterdir()) == [
         ".lock",
         "completions.jsonl",

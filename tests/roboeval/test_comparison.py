@@ -112,9 +112,7 @@ def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
 
 
 def test_one_prompt_is_not_many() -> None:
-    assert "over 1 prompt that both have" in printed(
-        render(compared({("A", 0): 1}, {("A", 0): 0}), ("a", "b"))
-    )
+    assert "over 1 prompt " in printed(render(compared({("A", 0): 1}, {("A", 0): 0}), ("a", "b")))
 
 
 @pytest.fixture(scope="module")

@@ -113,20 +113,20 @@ def test_round_trip_of_raw_patterns(pattern: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "column", "words"),
+    ("text", "column", "named"),
     [
         ("", 1, "expected a formula"),
         ("tr", 1, "expected a test"),
         ("1 + 1", 1, "expected a test"),
         ('tr.Exists(say("a"))()', 1, "expected a test"),
-        ('tr.Exist(goto("a"))', 4, "unknown test Exist; did you mean Exists?"),
-        ('not tr.Exists(got("a"))', 15, "unknown element got; did you mean goto?"),
-        ('  tr.Exists(say(word("a")))', 17, "unknown text helper word; did you mean words?"),
-        ('tr.Exists(say("é"), 2)', 4, "Exists takes 1 argument, not 2"),
+        ('tr.Exist(goto("a"))', 4, "Exist; .*Exists"),
+        ('not tr.Exists(got("a"))', 15, "got; .*goto"),
+        ('  tr.Exists(say(word("a")))', 17, "word; .*words"),
+        ('tr.Exists(say("é"), 2)', 4, "Exists .*1 argument, .*2"),
         ('tr.Exists(say("é")) and tr.Exists(say(3))', 39, "expected a string"),
-        ('tr.Exists(ask("a"))', 11, "ask takes 2 arguments, not 1"),
-        ("tr.Exists(say(words()))", 15, "words needs at least one text"),
-        ('tr.Exists(say(without("a", "b")))', 15, "without takes 1 argument, not 2"),
+        ('tr.Exists(ask("a"))', 11, "ask .*2 arguments, .*1"),
+        ("tr.Exists(say(words()))", 15, "words .*at least one"),
+        ('tr.Exists(say(without("a", "b")))', 15, "without .*1 argument, .*2"),
         ('tr.Exists(say(without(words("a"))))', 23, "expected a string"),
         ('tr.Exists(say(text="a"))', 15, "arguments have no names"),
         ('tr.Exists(say(f"a"))', 15, "expected a string"),
@@ -134,15 +134,15 @@ def test_round_trip_of_raw_patterns(pattern: str) -> None:
         ("tr.Exists(*say)", 11, "expected an element"),
         ('tr.Exists(say("("))', 15, "no valid regex"),
         ('tr.ActAtFirst("(", say("a"))', 15, "no valid regex"),
-        ('tr.Exists(say(without("(?i)a")))', 23, "cannot be searched as a whole word"),
+        ('tr.Exists(say(without("(?i)a")))', 23, "whole word"),
         ('tr.Exists(say("\\bno"))', 15, 'write r"..."'),
         ('tr.Count(say("a"), -1)', 20, "cannot be negative"),
         ('tr.Count(say("a"), True)', 20, "expected a whole number"),
         ('tr.Count(say("a"), 1.0)', 20, "expected a whole number"),
         ('tr.Count(say("a"), 10000000000)', 20, "at most"),
-        ('tr.AfterFirst(say("a"))', 4, "must be followed by a test"),
-        ('tr.Exists(say("a")).Exists(say("a"))', 4, "Exists is a test, so nothing can follow it"),
-        ('tr.After(say("a")).Exists(say("a"))', 4, "unknown cut After; did you mean AfterLast?"),
+        ('tr.AfterFirst(say("a"))', 4, "followed by a test"),
+        ('tr.Exists(say("a")).Exists(say("a"))', 4, "Exists is a test"),
+        ('tr.After(say("a")).Exists(say("a"))', 4, "After; .*AfterLast"),
         ('trace.Exists(say("a"))', 1, "expected tr or a cut"),
         ('tr.Exists(say("a")) # or\n tr.Exists(say("b"))', 20, "no comments"),
         ('tr.Exists(say("a")', 10, "never closed"),
@@ -150,10 +150,9 @@ def test_round_trip_of_raw_patterns(pattern: str) -> None:
         ("\0", 1, "null"),
     ],
 )
-def test_says_what_is_wrong_and_where(text: str, column: int, words: str) -> None:
-    with pytest.raises(RtlSyntaxError) as caught:
+def test_says_what_is_wrong_and_where(text: str, column: int, named: str) -> None:
+    with pytest.raises(RtlSyntaxError, match=named) as caught:
         parse(text)
-    assert words in str(caught.value)
     assert caught.value.column == column
     assert str(caught.value).startswith(f"column {column}: ")
     assert "\n" not in str(caught.value)

@@ -90,8 +90,9 @@ def test_a_line_that_is_too_long_is_an_error_and_the_next_ones_are_read(path: Pa
     path.write_bytes(b"x" * 1001 + b"\nshort\n")
     tail = tail_of(path)
     tail.look()
-    with pytest.raises(BadInput, match=r"rows.jsonl, line 1: this row is longer than 1,000 bytes"):
+    with pytest.raises(BadInput, match="1,000 bytes") as error:
         list(tail.lines())
+    assert (str(error.value.file), error.value.line) == ("rows.jsonl", 1)
     assert list(tail.lines())[-1][1] == b"short\n"
 
 
@@ -102,11 +103,11 @@ def test_links_that_lead_out_are_not_followed(path: Path) -> None:
     link = inside / "rows.jsonl"
     link.symlink_to(path)
     tail = Tail(link, inside.resolve(), 1000)
-    with pytest.raises(BadInput, match="leads out of the folder of runs"):
+    with pytest.raises(BadInput, match="leads out"):
         tail.look()
 
 
 def test_what_is_no_file_is_not_waited_for(path: Path) -> None:
     os.mkfifo(path)
-    with pytest.raises(BadInput, match="is no file"):
+    with pytest.raises(BadInput, match="no file"):
         tail_of(path).look()
