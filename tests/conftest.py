@@ -98,6 +98,7 @@ def engine() -> Iterator[None]:
 def engine_of_its_own(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let tests of the engine itself start its processes as users do."""
     if request.path.parent.name == "simulator":
+        lanes.end_all()
         monkeypatch.setattr("codebotler.simulator.engine.Lane", Lane)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from command_line import roboeval
+from command_line import forked
 from made_up_runs import grown
 from pageserver import PageServer
 from roboeval.records import to_line
@@ -41,8 +41,8 @@ OWN_TAGS = "script, img, iframe, object, embed, a[href^='javascript'], svg [onlo
 def made(folder: Path, model: str, *arguments: str) -> Path:
     """A run that is made on the spot."""
     path = folder / model
-    ended = roboeval(
-        "run", "--model", f"recorded:{model}", "--num-completions", "3", *arguments, "--out", path
+    ended = forked(
+        "roboeval", "run", "--model", f"recorded:{model}", "--num-completions", "3", *arguments, "--out", path
     )
     assert ended.status == 0, ended.err
     return path
@@ -111,7 +111,7 @@ def test_from_all_runs_to_one_failed_check(served: PageServer, opened: OpenPage)
 
 
 def test_the_page_tells_what_show_tells(served: PageServer, real: Path, opened: OpenPage) -> None:
-    shown = json.loads(roboeval("show", real / "hasty", "CountSavory/0/1", "--json").out)
+    shown = json.loads(forked("roboeval", "show", real / "hasty", "CountSavory/0/1", "--json").out)
     page = opened(served, "runs/hasty/CountSavory/0/1")
     expect(page.locator(".instruction")).to_have_text(shown["instruction"])
     program = "\n".join(page.locator(".program .line .text").all_inner_texts())

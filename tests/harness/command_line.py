@@ -17,6 +17,7 @@ from typing import NamedTuple, Self
 import pytest
 
 from codebotler.cli import main as codebotler_main
+from forked import Forked
 from roboeval.cli import main as roboeval_main
 
 MAINS = {"codebotler": codebotler_main, "roboeval": roboeval_main}
@@ -111,6 +112,13 @@ def command(
             stream.flush()
         texts = [_text(file) for file in (out, err)]
     return Ended(status, texts[0], PROGRESS.sub("", texts[1]))
+
+
+def forked(name: str, *arguments: str | Path) -> Ended:
+    """Run a command in a process of its own where this one is taken, as by Playwright and its event loop."""
+    running = Forked(name, *arguments, cwd=Path.cwd(), environment=ENVIRONMENT)
+    out, err = running.communicate()
+    return Ended(running.wait(), out, PROGRESS.sub("", err))
 
 
 def process(
