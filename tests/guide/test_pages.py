@@ -190,7 +190,7 @@ class Reader:
         return ended.stdout
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def followed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Reader]]:
     """Follows a page, once for all tests, with a model that answers quickly."""
     readers: dict[str, Reader] = {}
