@@ -42,6 +42,16 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # noqa: ANN401 - xdist has no types
+    """Let `--dist loadgroup` go by parameters."""
+    if config.getoption("dist") != "loadgroup":
+        return None
+    from sharing import ByParameter  # noqa: PLC0415 - xdist need not be there
+
+    return ByParameter(config, log)
+
+
+@pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any) -> None:  # noqa: ANN401 - xdist has no types
     """Take over what was said in a process that has run a part of the tests."""
     SAID.update(getattr(node, "workeroutput", {}).get("messages", {}))

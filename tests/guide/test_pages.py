@@ -130,15 +130,10 @@ def blocks(page: str) -> list[Block]:
     return [Block(f["language"], f["text"], f["why"] or "", f["test"] or "") for f in found]
 
 
-def reading(page: str) -> pytest.MarkDecorator:
-    """Let one process follow a page, and those that it goes on from, for all tests."""
-    return pytest.mark.xdist_group(JOURNEY[0] if page in JOURNEY else page)
-
-
 def followed_for(is_meant: Callable[[Block], bool]) -> list[object]:
-    """The pages that have such a block and are followed."""
+    """The pages that have such a block and are followed; those of a journey by the same reader."""
     pages = [page for page in FOLLOWED if any(map(is_meant, blocks(page)))]
-    return [pytest.param(page, marks=reading(page)) for page in pages]
+    return [pytest.param(page, id=f"journey:{page}" if page in JOURNEY else page) for page in pages]
 
 
 @dataclass
@@ -316,9 +311,9 @@ def test_what_a_page_says_is_printed_is_printed(followed: Callable[[str], Reader
             assert any(is_printed(text, printed) for printed in followed(page).printed), text
 
 
-@reading("robots.md")
-def test_every_command_about_robots_does_what_it_should(followed: Callable[[str], Reader]) -> None:
-    reader = followed("robots.md")
+@pytest.mark.parametrize("page", ["robots.md"])
+def test_every_command_about_robots_does_what_it_should(followed: Callable[[str], Reader], page: str) -> None:
+    reader = followed(page)
     kinds, tea, *_, shown, code = reader.printed
     assert re.search(r"^sim +works", kinds, re.MULTILINE)
     assert 'looks for "ann"\n            → found' in tea
@@ -327,9 +322,9 @@ def test_every_command_about_robots_does_what_it_should(followed: Callable[[str]
     assert code.splitlines()[-1] == "done"
 
 
-@reading("index.md")
-def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reader]) -> None:
-    folder = followed("index.md").folder / "runs" / "hasty"
+@pytest.mark.parametrize("page", ["index.md"], ids=["journey:index.md"])
+def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reader], page: str) -> None:
+    folder = followed(page).folder / "runs" / "hasty"
     (listed,) = (b.text for b in blocks("index.md") if b.text.startswith("runs/hasty/"))
     names = set(re.findall(r"^  (\S+)", listed, re.MULTILINE))
     made = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
@@ -337,11 +332,12 @@ def test_a_run_folder_holds_what_the_guide_lists(followed: Callable[[str], Reade
     assert {"completions.jsonl", "evaluations/paper.jsonl"} <= made
 
 
-@reading("write-a-task.md")
+@pytest.mark.parametrize("page", ["write-a-task.md"])
 def test_a_task_that_is_written_by_the_guide_is_a_package_in_the_end(
     followed: Callable[[str], Reader],
+    page: str,
 ) -> None:
-    reader = followed("write-a-task.md")
+    reader = followed(page)
     assert "an umbrella is in the lobby" in reader.printed[-1]
     assert not (reader.folder / "office").exists()
     judged = next(printed for printed in reader.printed if "FetchUmbrella/1/0" in printed)
@@ -362,17 +358,17 @@ def test_states_and_events_of_missions_are_documented() -> None:
     assert set(re.findall(r"`(\w+)`", rows["event"])) == set(WORDS)
 
 
-@reading("report.md")
-def test_every_number_of_a_report_is_explained(followed: Callable[[str], Reader]) -> None:
-    report = followed("report.md").folder / "report"
-    page = (DOCS / "report.md").read_text()
+@pytest.mark.parametrize("page", ["report.md"])
+def test_every_number_of_a_report_is_explained(followed: Callable[[str], Reader], page: str) -> None:
+    report = followed(page).folder / "report"
+    text = (DOCS / page).read_text()
     made = {path.stem for path in report.glob("*/*")}
     assert len(made) > 10
-    assert set(re.findall(r"^\| `([\w-]+)` \|", page, re.MULTILINE)) >= made
+    assert set(re.findall(r"^\| `([\w-]+)` \|", text, re.MULTILINE)) >= made
     for path in (report / "tables").iterdir():
         with path.open(newline="") as file:
             heads = next(csv.reader(file))
-        assert all(f"*{head}*" in page or "recorded:" in head for head in heads), (path.name, heads)
+        assert all(f"*{head}*" in text or "recorded:" in head for head in heads), (path.name, heads)
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page not in {"README.md", "index.md"}])

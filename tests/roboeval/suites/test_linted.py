@@ -12,8 +12,6 @@ from roboeval.lint import lint
 from roboeval.suite import Suite, load_suite
 from roboeval.trials import tried
 
-pytestmark = pytest.mark.xdist_group("linted")
-
 
 @pytest.fixture(scope="module")
 def of_paper() -> list[Finding]:

@@ -19,7 +19,6 @@ TASKS = list(load_suite("paper").tasks.values())
 MODELS = ("careful", "hasty")
 
 each_task = pytest.mark.parametrize("task", TASKS, ids=lambda task: task.name)
-pytestmark = pytest.mark.xdist_group("paper")
 each_model = pytest.mark.parametrize("model", MODELS)
 
 

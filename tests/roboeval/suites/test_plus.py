@@ -23,10 +23,7 @@ from roboeval.verdicts import judge
 HERE = Path(__file__).parent
 KNOWN: list[dict[str, Any]] = yaml.safe_load((HERE / "known.yaml").read_text())
 TASKS = sorted(load_suite("paper").tasks)
-each_task = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in TASKS]
-)
-"""One process does all tests of a task, which share verdicts."""
+each_task = pytest.mark.parametrize("name", TASKS)
 
 
 @cache
