@@ -96,7 +96,7 @@ def test_every_prompt_has_recorded_programs(paper: Suite, model: str) -> None:
     assert all(len(replies[prompt]) >= (1 if model == "careful" else 2) for prompt in prompts)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Reply, dict[str, Any]]]]:
     def judged(model: str) -> Iterator[tuple[Completion, Reply, dict[str, Any]]]:
         completions = list(recorded_completions(f"recorded:{model}", paper))

@@ -31,6 +31,11 @@ def plus() -> Suite:
     return load_suite("plus")
 
 
+@cache
+def plus_of_another_seed() -> Suite:
+    return plus().with_worlds(40, 77)
+
+
 def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None) -> list[list[Verdict]]:
     """How each program does in all worlds of a task, or in changed ones with the same requirements."""
     scenarios = task.scenarios
@@ -186,8 +191,7 @@ def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> 
 
 @each_task
 def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
-    other = plus().with_worlds(40, 77)
-    task = other.tasks[name]
+    task = plus_of_another_seed().tasks[name]
     assert {s.world for s in task.scenarios} != {s.world for s in plus().tasks[name].scenarios}
     chosen = recorded_replies(task)[::9]
     judged = verdicts([reply.program for reply in chosen], task)
