@@ -13,10 +13,11 @@
 #     test-pyrobosim       the robot in pyrobosim, in an environment of its own
 #     test-inspect, -ray   the benchmark in Inspect and on a Ray cluster, which share an environment
 #
-# `make faults` tries 60 deliberate faults, which the tests must notice. `make fuzz` runs FUZZ_EXAMPLES random
-# programs, drawn with FUZZ_SEED (by default another one each night, which is printed); `make test` runs 200, always
-# the same. `make pictures` makes the screenshots of the guide anew, with figures of a report. `make docs` makes the
-# documentation as a site, in build/site.
+# `make faults` tries 60 deliberate faults, which the tests must notice. `make messages` writes every sentence that
+# an error says in a test into build/messages.md, once, and which ones no test has seen. `make fuzz` runs
+# FUZZ_EXAMPLES random programs, drawn with FUZZ_SEED (by default another one each night, which is printed); `make
+# test` runs 200, always the same. `make pictures` makes the screenshots of the guide anew, with figures of a report.
+# `make docs` makes the documentation as a site, in build/site.
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
@@ -42,7 +43,7 @@ APART = tests/browser tests/guide tests/ros1 tests/roboeval/suites tests/codebot
 	tests/roboeval/test_inspecting.py tests/roboeval/test_rayengine.py
 
 .PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-browser pictures test-transformers \
-	test-pyrobosim test-inspect test-ray test-faulty-server faults fuzz lint bench clean
+	test-pyrobosim test-inspect test-ray test-faulty-server messages faults fuzz lint bench clean
 
 demo: $(VENV)/installed
 	@echo "An instruction becomes a program, which is checked, and then run by a simulated robot, 40 times as fast:"
@@ -104,6 +105,11 @@ test-ray: $(EXTRAS_VENV)/tested
 
 test-faulty-server: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m
+
+messages: $(VENV)/tested
+	@mkdir -p build
+	$(BIN)/python -m pytest --numprocesses 3 --dist worksteal $(addprefix --ignore ,$(APART)) \
+		--messages build/messages.md
 
 faults: $(VENV)/tested
 	$(BIN)/python tests/faults/run.py
