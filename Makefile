@@ -125,6 +125,7 @@ lint: $(VENV)/linted
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python tests/faults/run.py --check
 
 docs: $(VENV)/documented
 	$(BIN)/python website/build.py
