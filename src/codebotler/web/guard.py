@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from http.cookies import CookieError, SimpleCookie
+from posixpath import normpath
 from typing import Any, TypeAlias
 from urllib.parse import parse_qsl, quote, urlencode
 
@@ -188,7 +189,7 @@ class Guard:
         path = "/" + scope["path"].strip("/")  # two slashes would begin the name of another host
         if CONTROL.search(path):
             raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
-        if not self._has_page(path):
+        if normpath(path) != path or not self._has_page(path):  # browsers follow ".."
             raise RefusedError(HTTPStatus.NOT_FOUND, "there is no such page")
         where = quote(path) + (f"?{urlencode(rest)}" if rest else "")
         headers = {**HEADERS, "location": where, "cache-control": "no-store"}

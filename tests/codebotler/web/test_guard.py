@@ -83,6 +83,8 @@ def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -
         ("/a%00b", 400),
         ("/%7f", 400),
         ("/missions/a%0d%0ab", 400),
+        ("/missions/..%2f..%2fetc", 404),
+        ("/missions/%2e%2e", 404),
         ("/%C2%85", 400),
     ],
 )
