@@ -38,9 +38,9 @@ SHELL = bash
 .SHELLFLAGS = -o pipefail -c
 
 # What `make test` leaves to a target of its own, since it takes long or needs more than is installed.
-APART = tests/browser tests/guide tests/ros1 tests/roboeval/suites tests/codebotler/models/test_local.py \
+APART = tests/browser tests/guide tests/ros1 tests/suites tests/codebotler/models/test_local.py \
 	tests/codebotler/perception/test_zeroshot.py tests/codebotler/robots/test_pyrobosim.py \
-	tests/roboeval/test_inspecting.py tests/roboeval/test_rayengine.py
+	tests/roboeval/evaluation/test_inspect.py tests/roboeval/evaluation/test_ray.py
 
 .PHONY: demo serve docs test test-all test-slow test-suites test-guide test-ros1 test-browser pictures test-transformers \
 	test-pyrobosim test-inspect test-ray test-faulty-server messages faults fuzz lint bench clean
@@ -71,7 +71,7 @@ test-slow: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m slow $(addprefix --ignore ,$(APART))
 
 test-suites: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/roboeval/suites
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/suites
 
 test-guide: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/guide
@@ -98,10 +98,10 @@ test-pyrobosim: $(PYROBOSIM_VENV)/tested
 	$(PYROBOSIM_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py
 
 test-inspect: $(EXTRAS_VENV)/tested
-	$(EXTRAS_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/test_inspecting.py
+	$(EXTRAS_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/evaluation/test_inspect.py
 
 test-ray: $(EXTRAS_VENV)/tested
-	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/roboeval/test_rayengine.py
+	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/roboeval/evaluation/test_ray.py
 
 test-faulty-server: $(VENV)/tested
 	$(BIN)/python bench/faulty_server.py 50 completions:m

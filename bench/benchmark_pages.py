@@ -22,7 +22,7 @@ from statistics import median
 from playwright.sync_api import Page, sync_playwright
 
 from report import made_up
-from roboeval.suite import load_suite
+from roboeval.suites.load import load_suite
 
 OPENS = int(os.environ.get("OPENS", "10"))
 AIM, AIM_OF_A_JUMP = 1_000.0, 100.0
@@ -96,7 +96,7 @@ def main() -> int:
         folder = Path(name)
         run = made_up(folder, 0, load_suite())
         size = sum(path.stat().st_size for path in run.path.rglob("*") if path.is_file())
-        command = [sys.executable, "-m", "roboeval.cli", "serve", str(folder), "--port", "0"]
+        command = [sys.executable, "-m", "roboeval", "serve", str(folder), "--port", "0"]
         with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tool:
             assert tool.stderr is not None
             link = next(line.strip() for line in tool.stderr if "token=" in line)

@@ -21,9 +21,9 @@ from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.imagined import ImaginedRobot, Plan
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.lots import Lot
-from roboeval.records import Completion, recorded_completions
-from roboeval.suite import Suite, load_suite
-from roboeval.verdicts import evaluate
+from roboeval.evaluation.completions import Completion, recorded_completions
+from roboeval.evaluation.judge import evaluate
+from roboeval.suites.load import Suite, load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))
 SEEDS = int(os.environ.get("SEEDS", "20"))

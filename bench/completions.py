@@ -15,9 +15,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from roboeval.records import read_completions, recorded_completions, to_line
-from roboeval.suite import Suite, load_suite
-from roboeval.verdicts import evaluate
+from codebotler.files import to_line
+from roboeval.evaluation.completions import read_completions, recorded_completions
+from roboeval.evaluation.judge import evaluate
+from roboeval.suites.load import Suite, load_suite
 
 ORIGINAL = 0.354  # seconds a run
 ROWS = tuple(int(n) for n in os.environ.get("ROWS", "1000,10000,100000").split(","))
@@ -29,7 +30,16 @@ PROGRAM = "def task_program():\n    say('this is {number}')\n    go_to('lobby')\
 
 def evaluated(file: Path) -> tuple[float, float]:
     """Judge a file of completions: seconds, and megabytes of the largest process."""
-    command = [sys.executable, "-m", "roboeval.cli", "evaluate", str(file), "--workers", WORKERS, "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "roboeval.cli.app",
+        "evaluate",
+        str(file),
+        "--workers",
+        WORKERS,
+        "--json",
+    ]
     measure = (
         "import resource, subprocess, sys\n"
         "subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)\n"

@@ -26,8 +26,8 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Status
 from codebotler.world import Room, World
 from in_process import Reused, compiled
-from roboeval.records import recorded_completions
-from roboeval.suite import load_suite
+from roboeval.evaluation.completions import recorded_completions
+from roboeval.suites.load import load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))
 PARTS, TIMES = 3, 3

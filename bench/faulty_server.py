@@ -47,7 +47,7 @@ def main() -> None:
             words += ["--num-completions", str(each), "--concurrency", str(CONCURRENCY)]
             start, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
             subprocess.run(
-                [sys.executable, "-m", "roboeval.cli", *words],
+                [sys.executable, "-m", "roboeval", *words],
                 check=True,
                 env=environment,
                 stderr=subprocess.DEVNULL,

@@ -57,7 +57,7 @@ def rechecked(page: Page, number: int) -> float:
 def served(home: Path) -> Iterator[str]:
     """The link to a page for a simulated robot whose missions are in a folder."""
     (home / "world.yaml").write_text(WORLD)
-    command = [sys.executable, "-m", "codebotler.cli", "serve", "--port", "0", "--world", "world.yaml"]
+    command = [sys.executable, "-m", "codebotler", "serve", "--port", "0", "--world", "world.yaml"]
     environment = {**os.environ, "CODEBOTLER_HOME": str(home)}
     with subprocess.Popen(command, cwd=home, stderr=subprocess.PIPE, text=True, env=environment) as tool:
         assert tool.stderr is not None

@@ -15,11 +15,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from codebotler.simulator.lane import Lane
-from roboeval.engines import Engine, Local
-from roboeval.rayengine import Cluster
-from roboeval.records import Completion, recorded_completions
-from roboeval.suite import Suite, load_suite
-from roboeval.verdicts import evaluate
+from roboeval.evaluation.completions import Completion, recorded_completions
+from roboeval.evaluation.engines import Engine, Local
+from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.ray import Cluster
+from roboeval.suites.load import Suite, load_suite
 
 ROUNDS = 3
 EMPTY = 20_000

@@ -16,16 +16,17 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-from roboeval.evaluation import Evaluation
-from roboeval.records import Completion, Row, recorded_completions, to_line
+from codebotler.files import to_line, to_text
+from roboeval.analysis.resample import Trial, by_prompt
+from roboeval.evaluation.completions import Completion, Row, recorded_completions
+from roboeval.evaluation.evaluation import Evaluation
+from roboeval.evaluation.judge import evaluate, head
+from roboeval.evaluation.run import Run
+from roboeval.evaluation.tables import key_of
 from roboeval.report.contents import Wishes, headline, sections
 from roboeval.report.reading import JudgedRun, named_apart, read_run
 from roboeval.report.writing import write_report
-from roboeval.resampling import Trial, by_prompt
-from roboeval.run import Run, to_text
-from roboeval.suite import Suite, load_suite
-from roboeval.tables import key_of
-from roboeval.verdicts import evaluate, head
+from roboeval.suites.load import Suite, load_suite
 
 MODELS = int(os.environ.get("MODELS", "5"))
 COMPLETIONS = int(os.environ.get("COMPLETIONS", "50"))  # of each prompt

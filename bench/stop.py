@@ -139,7 +139,7 @@ def by_signal(home: Path) -> Iterator[Times]:
     program, world = home / "program.py", home / "world.yaml"
     program.write_text(PROGRAM)
     world.write_text(WORLD.to_yaml())
-    command = [sys.executable, "-m", "codebotler.cli", "run", str(program), "--world", str(world), "--yes"]
+    command = [sys.executable, "-m", "codebotler", "run", str(program), "--world", str(world), "--yes"]
     environment = {**os.environ, "CODEBOTLER_HOME": str(home)}
     for _ in range(STOPS):
         with subprocess.Popen(

@@ -12,9 +12,9 @@ from functools import partial
 
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.robot import SimulatedRobot
-from roboeval.records import recorded_completions
-from roboeval.suite import Suite, load_suite
-from roboeval.verdicts import judge
+from roboeval.evaluation.completions import recorded_completions
+from roboeval.evaluation.judge import judge
+from roboeval.suites.load import Suite, load_suite
 
 ROUNDS = 3
 

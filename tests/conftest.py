@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, settings
 import lanes
 import messages
 from codebotler.simulator.lane import Lane
-from roboeval.suite import Suite, load_suite
+from roboeval.suites.load import Suite, load_suite
 
 # A busy machine is no fault of what is tested; and CI tries the same examples each time.
 settings.register_profile(

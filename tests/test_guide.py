@@ -13,8 +13,8 @@ from codebotler.simulator.engine import run
 from codebotler.simulator.sandbox.stdlib import LISTED
 from codebotler.trace import Status
 from codebotler.world import OptionFile, PersonFile, Room, RoomFile, World
-from roboeval.findings import Kind
-from roboeval.suitefile import (
+from roboeval.linting.findings import Kind
+from roboeval.suites.schema import (
     Ability,
     AcceptedFile,
     Category,

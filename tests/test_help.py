@@ -16,7 +16,7 @@ NARROW = 80
     [("codebotler", 7), ("roboeval", 13)],
 )
 def test_every_command_is_told_in_a_whole_sentence(name: str, least: int) -> None:
-    code = f"import sys, {name}.cli; sys.argv = ['{name}', '--help']; {name}.cli.main()"
+    code = f"import sys; from {name}.__main__ import main; sys.argv = ['{name}', '--help']; main()"
     ended = subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, "COLUMNS": str(NARROW)},

@@ -63,7 +63,7 @@ def test_using_the_names_imports_no_library_for_pages_figures_or_models(code: st
 @pytest.mark.parametrize("package", PACKAGES)
 def test_help_imports_nothing_that_a_command_works_with(package: str, arguments: list[str]) -> None:
     code = (
-        f"import sys\nsys.argv = {['x', *arguments]}\nfrom {package}.cli import main\n"
+        f"import sys\nsys.argv = {['x', *arguments]}\nfrom {package}.__main__ import main\n"
         "try:\n    main()\nexcept SystemExit:\n    pass"
     )
     imported = imported_by(code)
@@ -91,7 +91,8 @@ def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -
 
 def test_names_stay_what_they_are_whatever_else_is_imported() -> None:
     code = (
-        "import roboeval.verdicts, codebotler.checker, codebotler.generation, roboeval.cli, codebotler.cli\n"
+        "import roboeval.evaluation.judge, codebotler.checker, codebotler.generation\n"
+        "import roboeval.cli.app, codebotler.cli\n"
     )
     uses = "from roboeval import evaluate\nfrom codebotler import check, generate\n"
     imported_by(code + uses + "assert callable(evaluate) and callable(check) and callable(generate)")

@@ -13,8 +13,8 @@ from codebotler.badinput import BadInput, YamlFile
 from codebotler.models.recorded import FOLDER, RecordingFile
 from codebotler.tracefile import OutcomeFile
 from codebotler.world import WorldFile
-from roboeval.suite import SUITES, read_task
-from roboeval.suitefile import SuiteFile
+from roboeval.suites.load import SUITES, read_task
+from roboeval.suites.schema import SuiteFile
 
 WORLD = """\
 about: second floor, after lunch

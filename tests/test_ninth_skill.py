@@ -18,7 +18,7 @@ from codebotler.skills import SKILLS, Parameter, Recording, RosAction, Skill, Sk
 from codebotler.trace import Event, Option, Outcome, RunError, Status
 from codebotler.tracefile import outcome_yaml, read_outcome
 from codebotler.world import Person, Room, World
-from roboeval.suite import SUITES, load_suite
+from roboeval.suites.load import SUITES, load_suite
 
 TABLE = SKILLS.with_skill(
     Skill(

@@ -96,7 +96,7 @@ def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
         assert known in packed
     (entries,) = (text.decode() for name, text in packed.items() if name.endswith("entry_points.txt"))
     assert "codebotler = codebotler.cli:main" in entries
-    assert "roboeval = roboeval.cli:main" in entries
+    assert "roboeval = roboeval.cli.app:main" in entries
 
 
 def test_the_wheel_judges_where_it_is_installed(wheel: Path, tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_the_wheel_judges_where_it_is_installed(wheel: Path, tmp_path: Path) -> 
         "--target",
     ]
     subprocess.run([*pip, str(tmp_path / "site"), str(wheel)], check=True, capture_output=True)
-    code = "import roboeval, roboeval.cli as c; print(roboeval.__file__); c.main()"
+    code = "import roboeval, roboeval.cli.app as c; print(roboeval.__file__); c.main()"
     ended = subprocess.run(
         [sys.executable, "-c", code, "evaluate", "recorded:careful", "--tasks", "LunchTime"],
         cwd=tmp_path,
@@ -149,7 +149,7 @@ def test_the_wheel_judges_where_it_is_installed(wheel: Path, tmp_path: Path) -> 
 def test_a_shell_completes_commands_options_and_names(name: str, words: str, completed: list[str]) -> None:
     about = {"COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
     ended = subprocess.run(
-        [sys.executable, "-m", f"{name}.cli"],
+        [sys.executable, "-m", name],
         env={**os.environ, **about, f"_{name.upper()}_COMPLETE": "complete_bash"},
         capture_output=True,
         text=True,
@@ -206,7 +206,7 @@ def options(words: str) -> set[str]:
 
 def test_files_for_robots_use_options_that_there_are() -> None:
     said = subprocess.run(
-        [sys.executable, "-m", "codebotler.cli", "serve", "--help"],
+        [sys.executable, "-m", "codebotler", "serve", "--help"],
         capture_output=True,
         text=True,
         check=True,

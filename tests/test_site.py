@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from codebotler.cli import app as codebotler
-from roboeval.cli import app as roboeval
+from roboeval.cli.app import app as roboeval
 
 ROOT = Path(__file__).parent.parent
 MADE = {

@@ -18,7 +18,7 @@ from typing import Any
 import typer
 
 import codebotler.cli
-import roboeval.cli
+import roboeval.cli.app
 
 ROOT = Path(__file__).parent.parent
 PAGES, SITE = ROOT / "build" / "pages", ROOT / "build" / "site"
@@ -34,7 +34,12 @@ MODULES = {
         *("codebotler.robots.worker", "codebotler.models.base", "codebotler.models.open"),
         *("codebotler.models.paced", "codebotler.perception", "codebotler.web.further"),
     ),
-    "roboeval": ("roboeval", "roboeval.suite", "roboeval.records", "roboeval.metrics"),
+    "roboeval": (
+        "roboeval",
+        "roboeval.suites.load",
+        "roboeval.evaluation.completions",
+        "roboeval.analysis.metrics",
+    ),
 }
 """The packages, whose names are public, and the modules that are documented; see docs/library.md."""
 
@@ -50,7 +55,7 @@ def main() -> None:
         path.write_text(_within(path.read_text()))
     (PAGES / "changes.md").write_text((ROOT / "CHANGELOG.md").read_text())
     (PAGES / "examples.md").write_text(_examples())
-    for name, app in (("codebotler", codebotler.cli.app), ("roboeval", roboeval.cli.app)):
+    for name, app in (("codebotler", codebotler.cli.app), ("roboeval", roboeval.cli.app.app)):
         (PAGES / f"{name}.md").write_text(_commands(name, app))
         (PAGES / f"python-{name}.md").write_text(_python(name))
     command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]

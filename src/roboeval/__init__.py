@@ -18,23 +18,23 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from roboeval.records import Completion, Row, read_completions, recorded_completions
-    from roboeval.rewards import reward
-    from roboeval.suite import Suite, load_suite
-    from roboeval.verdicts import evaluate
+    from roboeval.evaluation.completions import Completion, Row, read_completions, recorded_completions
+    from roboeval.evaluation.judge import evaluate
+    from roboeval.evaluation.rewards import reward
+    from roboeval.suites.load import Suite, load_suite
 else:  # each name is imported when it is first used
     from codebotler.facade import facade
 
     __getattr__, __dir__ = facade(
         __name__,
         {
-            "Completion": "records",
-            "Row": "records",
-            "Suite": "suite",
-            "evaluate": "verdicts",
-            "load_suite": "suite",
-            "read_completions": "records",
-            "recorded_completions": "records",
-            "reward": "rewards",
+            "Completion": "evaluation.completions",
+            "Row": "evaluation.completions",
+            "Suite": "suites.load",
+            "evaluate": "evaluation.judge",
+            "load_suite": "suites.load",
+            "read_completions": "evaluation.completions",
+            "recorded_completions": "evaluation.completions",
+            "reward": "evaluation.rewards",
         },
     )

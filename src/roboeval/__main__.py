@@ -1,6 +1,6 @@
 """`python -m roboeval` is the command `roboeval`."""
 
-from roboeval.cli import main
+from roboeval.cli.app import main
 
 if __name__ == "__main__":
     main()

@@ -14,11 +14,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from codebotler.files import to_line
 from command_line import forked
 from made_up_runs import grown
 from pageserver import PageServer
-from roboeval.records import to_line
-from roboeval.run import Run
+from roboeval.evaluation.run import Run
 from runs_server import serving
 from seals import unseal
 from viewing import PHONE, SCREENS, OpenPage, Screen, expect_no_grave_fault
@@ -236,7 +236,7 @@ def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> N
         expect(page.get_by_text("There is no run here yet.")).to_be_visible()
         command = ["run", "--model", "recorded:hasty", "--num-completions", "2", "--tasks", TASKS]
         made = subprocess.Popen(
-            [sys.executable, "-m", "roboeval.cli", *command, "--out", folder / "new"],
+            [sys.executable, "-m", "roboeval", *command, "--out", folder / "new"],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )

@@ -59,7 +59,7 @@ def virtual(graph: Graph, tmp_path: Path) -> Iterator[Path]:
     """The virtual robot as a user starts it; what it prints."""
     (tmp_path / "house.yaml").write_text(WORLD)
     said = tmp_path / "virtual.txt"
-    command = [sys.executable, "-u", "-m", "codebotler.cli", "virtual-robot", "--world", "house.yaml"]
+    command = [sys.executable, "-u", "-m", "codebotler", "virtual-robot", "--world", "house.yaml"]
     with said.open("w") as file:
         robot = subprocess.Popen(
             [*command, "--port", str(graph.port), "--speed", "10"],

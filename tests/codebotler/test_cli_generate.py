@@ -11,14 +11,14 @@ import pytest
 
 import command_line
 from command_line import Ended, Refusal, command, process
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 from server import Fault, Request, Server
 
 KEY = "sk-verysecret0123456789abcdefghijkl"
 LOST = "```python\ndef task_program():\n    go_to('the moon')\n```\n"
 FINE = "```python\ndef task_program():\n    go_to('kitchen')\n```\n"
 LIMIT = 1 << 30  # bytes of a file, of which most take no room
-CODEBOTLER = shlex.join([sys.executable, "-m", "codebotler.cli"])
+CODEBOTLER = shlex.join([sys.executable, "-m", "codebotler"])
 WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
 
 

@@ -23,7 +23,7 @@ from codebotler.models.recorded import recorded_model
 from command_line import Ended, command
 from forked import Forked
 from processes import are_gone, children_of
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 GOOD = """def task_program():
     go_to("kitchen")
@@ -62,7 +62,7 @@ def started(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -
     if not wrapper:
         return Forked("codebotler", *arguments, cwd=folder, environment=variables(folder))
     return subprocess.Popen(
-        [*wrapper, sys.executable, "-m", "codebotler.cli", *map(str, arguments)],
+        [*wrapper, sys.executable, "-m", "codebotler", *map(str, arguments)],
         cwd=folder,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

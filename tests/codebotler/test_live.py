@@ -20,7 +20,7 @@ from codebotler.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.trace import Event, Option
 from codebotler.world import Person, Room, World
 from doubles import Answering, giving, raising
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 FOUND = True
 OPTIONS = (Option("Yes"), Option(" no "))

@@ -79,7 +79,7 @@ MODEL = "http://localhost:8000/v1"
 SHIM = """\
 #!{python}
 import os, re, signal, socket, subprocess, sys, urllib.error, urllib.request
-command = [sys.executable, "-m", "{name}.cli", *sys.argv[1:]]
+command = [sys.executable, "-m", "{name}", *sys.argv[1:]]
 if sys.argv[1:2] != ["serve"] or "--help" in sys.argv:
     os.execv(sys.executable, command)
 with socket.create_server(("127.0.0.1", 0)) as free:

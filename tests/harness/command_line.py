@@ -18,7 +18,7 @@ import pytest
 
 from codebotler.cli import main as codebotler_main
 from forked import Forked
-from roboeval.cli import main as roboeval_main
+from roboeval.cli.app import main as roboeval_main
 
 MAINS = {"codebotler": codebotler_main, "roboeval": roboeval_main}
 ENVIRONMENT = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
@@ -130,7 +130,7 @@ def process(
     environment: Mapping[str, str] = ENVIRONMENT,
 ) -> Ended:
     """Run a command in a process of its own, with something of bash before and after it."""
-    words = shlex.join([sys.executable, "-m", f"{name}.cli", *map(str, arguments)])
+    words = shlex.join([sys.executable, "-m", name, *map(str, arguments)])
     ended = subprocess.run(
         ["bash", "-c", f"{before} {words} {after}"],
         capture_output=True,

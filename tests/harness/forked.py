@@ -25,7 +25,7 @@ LONGEST = 1_000_000  # bytes of a request
 
 
 class Forked:
-    """A command in a process of its own, as `python -m NAME.cli ARGUMENTS` would be; pipes are its streams.
+    """A command in a process of its own, as `python -m NAME ARGUMENTS` would be; pipes are its streams.
 
     Args:
         name: `codebotler` or `roboeval`.
@@ -204,7 +204,7 @@ def become(request: Mapping[str, Any], descriptors: Sequence[int]) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    mains = {name: importlib.import_module(f"{name}.cli").main for name in ("codebotler", "roboeval")}
+    mains = {name: importlib.import_module(f"{name}.__main__").main for name in ("codebotler", "roboeval")}
     with socket.socket(fileno=int(sys.argv[1])) as door:
         words = serve(door)
     if words is not None:

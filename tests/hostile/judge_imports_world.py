@@ -10,8 +10,8 @@ def task_program():
         "codebotler.trace",
         "codebotler.simulator.robot",
         "codebotler.simulator.engine",
-        "roboeval.verdicts",
-        "roboeval.suite",
+        "roboeval.evaluation.judge",
+        "roboeval.suites.load",
         "pydantic",
         "yaml",
     ):

@@ -9,13 +9,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from codebotler.files import to_line
 from codebotler.simulator.rules import Rules
-from roboeval.records import to_line
+from roboeval.analysis.resample import Trial, by_prompt
+from roboeval.evaluation.run import Run
+from roboeval.evaluation.tables import RowData
 from roboeval.report.reading import JudgedRun, Written, scored
-from roboeval.resampling import Trial, by_prompt
-from roboeval.run import Run
-from roboeval.suite import Suite
-from roboeval.tables import RowData
+from roboeval.suites.load import Suite
 from seals import unseal
 from small_run import TASK
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from roboeval.run import Run, to_text
+from codebotler.files import to_text
+from roboeval.evaluation.run import Run
 
 
 def unseal(run: Path, key: str = "paper") -> None:

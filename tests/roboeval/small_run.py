@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console, RenderableType
 
 from codebotler.simulator.rules import Rules
-from roboeval.suite import Suite, Task
+from roboeval.suites.load import Suite, Task
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800\n"
 SHOWN = r"[red]x[/red]\x1b[2J\x07\u202e\ud800\n"

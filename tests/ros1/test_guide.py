@@ -51,7 +51,7 @@ def test_two_commands_are_the_whole_path(tmp_path: Path) -> None:
         "CODEBOTLER_HOME": str(tmp_path),
         "ROS_MASTER_URI": f"http://localhost:{port}",
     }
-    command = [sys.executable, "-m", "codebotler.cli"]
+    command = [sys.executable, "-m", "codebotler"]
     with subprocess.Popen(
         [*command, *robot, "--speed", "20"], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
     ) as virtual:

@@ -28,7 +28,7 @@ FAR = """def task_program():
 def begun(graph: Graph, folder: Path, program: str, *options: str) -> subprocess.Popen[str]:
     (folder / "program.py").write_text(program)
     return subprocess.Popen(
-        [sys.executable, "-m", "codebotler.cli", "run", "program.py", "--robot", "ros1", "--yes", *options],
+        [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", "ros1", "--yes", *options],
         cwd=folder,
         env={
             **os.environ,

@@ -167,7 +167,7 @@ def test_mission_keeps_what_the_robot_saw(graph: Graph, model: Server, tmp_path:
                    "ROS_MASTER_URI": graph.uri}  # fmt: skip
 
     def tool(*arguments: str) -> str:
-        command = [sys.executable, "-m", "codebotler.cli", *arguments]
+        command = [sys.executable, "-m", "codebotler", *arguments]
         done = subprocess.run(
             command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
         )

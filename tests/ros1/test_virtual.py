@@ -25,7 +25,7 @@ from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
 from codebotler.trace import Status
 from codebotler.world import Person, Room, World
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 from ros_graph import Graph, free_port, started
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
@@ -137,7 +137,7 @@ def test_killed_worker_is_said(virtual: VirtualRobot) -> None:
 def test_command_starts_a_master_that_ends_with_it(tmp_path: Path) -> None:
     world, port = tmp_path / "world.yaml", free_port()
     world.write_text(WORLD.to_yaml())
-    command = [sys.executable, "-m", "codebotler.cli", "virtual-robot", "--world", str(world)]
+    command = [sys.executable, "-m", "codebotler", "virtual-robot", "--world", str(world)]
     process = subprocess.Popen(
         [*command, "--port", str(port), "--speed", "100"],
         stdout=subprocess.PIPE,

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from codebotler.files import to_line, to_text, write_whole
 from roboeval.mutation.scores import Score
 from roboeval.mutation.stillright import to_yaml
-from roboeval.records import to_line
-from roboeval.run import to_text, write_whole
 
 
 def keep(scores: Sequence[Score], folder: Path) -> None:

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from itertools import chain, zip_longest
 
 from codebotler.cachedproperty import cached_property
+from roboeval.linting.trials import recorded_replies
 from roboeval.mutation.operator import Operator, Setting
 from roboeval.mutation.operators import OPERATORS
 from roboeval.mutation.rewriting import Source, changed, read
 from roboeval.mutation.variants import variants
-from roboeval.suite import Task
-from roboeval.trials import recorded_replies
+from roboeval.suites.load import Task
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from codebotler.simulator.rules import Rules
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.stillright import MOST, Reasons, key_of
 from roboeval.mutation.survival import CHANGED, Baseline, End, Fate
-from roboeval.suite import Scenario
+from roboeval.suites.load import Scenario
 
 ENOUGH = 60
 """How many mutants that change behaviour a task needs for its score to mean something."""

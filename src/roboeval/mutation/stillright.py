@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from codebotler.badinput import YamlFile
 from codebotler.world import Name, Text
 from roboeval.mutation.mutants import Mutant
-from roboeval.suite import Task
+from roboeval.suites.load import Task
 
 MOST = 0.15
 """The largest share of a task's mutants that may stand on the list."""

@@ -12,10 +12,10 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.trace import Outcome, Status
 from codebotler.world import World
+from roboeval.evaluation.failures import Verdict
+from roboeval.evaluation.judge import judge
 from roboeval.mutation.mutants import Mutant, Original
-from roboeval.suite import Scenario
-from roboeval.taxonomy import Verdict
-from roboeval.verdicts import judge
+from roboeval.suites.load import Scenario
 
 Run: TypeAlias = Callable[[str, World], Outcome]
 CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from codebotler.badinput import BadInput
-from roboeval.suite import Task
+from roboeval.suites.load import Task
 
 FOLDER = Path(__file__).with_name("right")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from codebotler.arguments import expect_whole
 from codebotler.badinput import BadInput
-from roboeval.suite import Scenario, Suite, Task
-from roboeval.suitefile import MOST_WORLDS
+from roboeval.suites.load import Scenario, Suite, Task
+from roboeval.suites.schema import MOST_WORLDS
 
 COUNT = 200
 """How many worlds a suite makes for mutants, if nobody says another number."""

@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from roboeval.clusters import Cluster
-from roboeval.records import Key, name_of
+from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.verdict_changes import (
+    Judged,
+    Reversals,
+    place,
+    reversals,
+    said,
+    said_of_order,
+    said_of_prompts,
+)
+from roboeval.evaluation.completions import Key, name_of
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.reversals import Judged, Reversals, place, reversals, said, said_of_order, said_of_prompts
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 SCORES = (
     "pass@1 by the checks of this report and by those beside it, prompt by prompt, with the interval of the "

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from matplotlib.figure import Figure
 
-from roboeval.records import how_many
+from roboeval.evaluation.completions import how_many
 from roboeval.report import (
     beside,
     causes,
@@ -29,7 +29,7 @@ from roboeval.report.drawing import Look
 from roboeval.report.failures import Failures
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Sheet
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from codebotler.badinput import BadInput
-from roboeval.records import Key
+from roboeval.analysis.resample import LIMITS, Prompt, chances
+from roboeval.evaluation.completions import Key
+from roboeval.evaluation.tables import key_of
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.resampling import LIMITS, Prompt, chances
-from roboeval.tables import key_of
 
 MILLION = 1_000_000
 ABOUT = (

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import combinations
 
 from codebotler.badinput import BadInput
-from roboeval.comparison import compared, told_of, unlike, verdict
+from roboeval.analysis.compare import compared, told_of, unlike, verdict
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
 

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from roboeval.clusters import Cluster, clusters, groups
-from roboeval.records import Key, how_many, name_of
+from roboeval.analysis.cluster import Cluster, clusters, groups
+from roboeval.evaluation.completions import Key, how_many, name_of
+from roboeval.evaluation.tables import key_of
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Column, Sheet, sheet
-from roboeval.suite import Suite
-from roboeval.tables import key_of
+from roboeval.suites.load import Suite
 
 MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups that are shown of a run, and of all runs
 ABOUT = (

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
 
-from roboeval.metrics import TaskScore
+from roboeval.analysis.metrics import TaskScore
+from roboeval.analysis.resample import LIMITS
 from roboeval.report import retries
 from roboeval.report.drawing import (
     DASHES,
@@ -27,8 +28,7 @@ from roboeval.report.drawing import (
 from roboeval.report.heat import Heat, draw_heat
 from roboeval.report.reading import JudgedRun
 from roboeval.report.scores import curve, tasks_of
-from roboeval.resampling import LIMITS
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 LOWEST = 1e-3  # where the paper ends its axis
 A_ROW = 8  # tasks that stand beside each other

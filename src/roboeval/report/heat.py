@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
+from roboeval.evaluation.failures import CLASSES, PYTHON, ROBOT, TASK
 from roboeval.report.causes import PASSED, Causes, kinds_in_order
 from roboeval.report.drawing import WIDE, Look, brief, new_figure, share_axis
-from roboeval.taxonomy import CLASSES, PYTHON, ROBOT, TASK
 
 FULL = "#00507d"  # the shade of a share of 1; one hue is read by every eye, and in print
 MOST_NUMBERS = 14  # rows or columns up to which each cell says its number

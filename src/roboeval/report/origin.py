@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 ABOUT = "How the completions were asked for, as far as their runs say it, and with what they were judged."
 

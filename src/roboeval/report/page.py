@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
-from roboeval.clusters import Cluster
-from roboeval.records import name_of
+from roboeval.analysis.cluster import Cluster
+from roboeval.evaluation.completions import name_of
 from roboeval.report.contents import Code, Part, Picture, Prose, Section
 from roboeval.report.failures import Failures, Shown
 from roboeval.report.sheets import Cell, Column, Sheet, told

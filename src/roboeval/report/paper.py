@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from roboeval.report.reading import JudgedRun
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 SUITE = "paper"
 NAMES: Mapping[str, tuple[str, ...]] = {

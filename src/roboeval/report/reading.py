@@ -10,15 +10,15 @@ from typing import Any
 
 from codebotler.cachedproperty import cached_property
 from codebotler.terminal import visible
-from roboeval.clusters import trimmed
-from roboeval.evaluation import Evaluation
-from roboeval.metrics import TaskScore, score_by_prompt
-from roboeval.records import Completion, Key
-from roboeval.resampling import Prompt
-from roboeval.reversals import Judged
-from roboeval.run import load_head
-from roboeval.suite import Suite
-from roboeval.tables import RowData
+from roboeval.analysis.cluster import trimmed
+from roboeval.analysis.metrics import TaskScore, score_by_prompt
+from roboeval.analysis.resample import Prompt
+from roboeval.analysis.verdict_changes import Judged
+from roboeval.evaluation.completions import Completion, Key
+from roboeval.evaluation.evaluation import Evaluation
+from roboeval.evaluation.run import load_head
+from roboeval.evaluation.tables import RowData
+from roboeval.suites.load import Suite
 
 MOST = 10**12  # tokens or seconds; a request of which more is told was not counted
 LONGEST_NAME = 100

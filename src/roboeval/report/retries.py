@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from roboeval.analysis.resample import LIMITS, Prompt, chances, resampled
 from roboeval.report.reading import JudgedRun
 from roboeval.report.scores import curve
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.resampling import LIMITS, Prompt, chances, resampled
 
 ABOUT = (
     "A program that the check rejects is asked for again, at most as often as the limit says. pass@1 and its "

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from roboeval.report.reading import JudgedRun
 from roboeval.report.scores import tasks_of
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 SPREAD = (
     "The best prompt of a task minus its worst. The words are those that stand only in the instruction of "

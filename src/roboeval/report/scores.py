@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboeval.certainty import FEW, by_bootstrap, by_formula
+from roboeval.analysis.resample import ROUNDING
+from roboeval.analysis.statistics import FEW, by_bootstrap, by_formula
 from roboeval.report import paper
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.resampling import ROUNDING
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 INTERVALS = (
     "pass@1 is the mean over all prompts of the share of completions that pass. Of 100 intervals made like "

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import polars as pl
 
-from roboeval.export import write
+from roboeval.analysis.export import write
 
 Kind: TypeAlias = Literal["text", "share", "difference", "count", "number"]
 Cell: TypeAlias = str | int | float | None

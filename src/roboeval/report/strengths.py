@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 from codebotler.simulator.robot import resolve_room
-from roboeval.certainty import by_formula
+from roboeval.analysis.statistics import by_formula
+from roboeval.evaluation.failures import PYTHON, ROBOT, TASK
+from roboeval.evaluation.tables import RowData
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.suite import Suite
-from roboeval.tables import RowData
-from roboeval.taxonomy import PYTHON, ROBOT, TASK
+from roboeval.suites.load import Suite
 
 REPORTS = "report-back"
 LOST = "GoToInvalidLocation"

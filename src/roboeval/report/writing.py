@@ -7,11 +7,11 @@ from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 from codebotler.badinput import BadInput
+from codebotler.files import write_whole
 from roboeval.report.contents import Picture, Section
 from roboeval.report.drawing import DARK, LIGHT, looking, written
 from roboeval.report.page import GENERATOR, Drawn, page
 from roboeval.report.sheets import Sheet, write_csv
-from roboeval.run import write_whole
 
 FORMATS = ("png", "pdf")
 PARTS = ("figures", "tables")

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.badinput import BadInput
+from codebotler.files import MAX_ROW
 from codebotler.terminal import shortened
-from roboeval.judgedrows import BROKEN, HASH_LINE, MAX_EVALUATION, NO_ROW, Seal, row_of
-from roboeval.records import MAX_ROW, Completion, Key, name_of
-from roboeval.run import Run, load_head
-from roboeval.tables import RowData, key_of
+from roboeval.evaluation.completions import Completion, Key, name_of
+from roboeval.evaluation.rows import BROKEN, HASH_LINE, MAX_EVALUATION, NO_ROW, Seal, row_of
+from roboeval.evaluation.run import Run, load_head
+from roboeval.evaluation.tables import RowData, key_of
 from roboeval.web.seen import Entry, Judged, Seen, Written
 from roboeval.web.tail import Change, Tail
 

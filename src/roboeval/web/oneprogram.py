@@ -17,11 +17,11 @@ from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import scenes
 from codebotler.web.words import Words
 from codebotler.world import World
-from roboeval.catalogue import person_told
-from roboeval.records import Key, name_of
-from roboeval.show import cut_told
-from roboeval.suite import ABLATED, Suite
-from roboeval.tables import NOT_RECORDED, by_hand
+from roboeval.evaluation.completions import Key, name_of
+from roboeval.evaluation.explanation import cut_told
+from roboeval.evaluation.tables import NOT_RECORDED, by_hand
+from roboeval.suites.catalogue import person_told
+from roboeval.suites.load import ABLATED, Suite
 from roboeval.web.api import Choice, Evaluation
 from roboeval.web.parts import Code, begin
 from roboeval.web.seen import Wanted

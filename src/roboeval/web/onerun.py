@@ -15,7 +15,7 @@ from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
 from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Press, Words
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 from roboeval.web.api import Choice, Evaluation
 from roboeval.web.followed import FollowedRun, GoneError
 from roboeval.web.overview import EVERY, GROWING, count_of, progress_of, score_of

@@ -9,7 +9,7 @@ from fastapi.responses import RedirectResponse
 from fastapi.staticfiles import StaticFiles
 
 from codebotler.web.further import Pages, Site
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 from roboeval.web import api, oneprogram, onerun, overview, sidebyside
 from roboeval.web.shelf import Shelf
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 from codebotler.cachedproperty import cached_property
-from roboeval.metrics import Estimate, PromptScore, TaskScore, overall
-from roboeval.records import Key
+from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, overall
+from roboeval.evaluation.completions import Key
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from typing import Any
 from urllib.parse import quote, urlencode
 
 from codebotler.terminal import shortened
-from roboeval.suite import Suite
-from roboeval.tables import by_hand
+from roboeval.evaluation.tables import by_hand
+from roboeval.suites.load import Suite
 from roboeval.web.seen import Cell, Seen, Wanted
 from roboeval.web.telling import order_of
 

@@ -11,9 +11,9 @@ from codebotler.badinput import BadInput
 from codebotler.cachedproperty import cached_property
 from codebotler.simulator.rules import Rules
 from codebotler.terminal import note, shortened
-from roboeval.installed import installed_suites
-from roboeval.run import Run
-from roboeval.suite import ABLATED, Suite, load_suite, shipped_suites
+from roboeval.evaluation.run import Run
+from roboeval.suites.installed import installed_suites
+from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
 from roboeval.web.followed import FollowedRun, GoneError
 from roboeval.web.seen import Seen
 

@@ -13,7 +13,7 @@ from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
 from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Words
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 from roboeval.web.overview import EVERY, count_of, score_of
 from roboeval.web.parts import Heat, begin
 from roboeval.web.seen import Seen, Wanted

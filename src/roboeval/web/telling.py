@@ -8,11 +8,11 @@ from typing import Any
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
-from roboeval.records import how_many, name_of
-from roboeval.show import GONE, completion_data
-from roboeval.suite import ABLATED, Suite
-from roboeval.tables import by_hand
-from roboeval.taxonomy import CLASSES
+from roboeval.evaluation.completions import how_many, name_of
+from roboeval.evaluation.explanation import GONE, completion_data
+from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.tables import by_hand
+from roboeval.suites.load import ABLATED, Suite
 from roboeval.web.followed import FollowedRun
 from roboeval.web.seen import Cell, Entry, Seen, Wanted
 from roboeval.web.shelf import unknown_suite

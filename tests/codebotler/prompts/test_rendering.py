@@ -13,7 +13,7 @@ from codebotler.simulator import run
 from codebotler.skills import SKILLS, Parameter, Skill
 from codebotler.trace import Event, Option, Status
 from codebotler.world import Person, Room, World
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 WAVE = Skill("wave", (Parameter("person"),), "None", "Wave at a person in the room.")
 PROMPT = prompt_for("Go to the lab.")

@@ -29,7 +29,7 @@ from codebotler.simulator.engine import run
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
 from codebotler.world import Person, Point, Room, World
-from roboeval.suite import Suite
+from roboeval.suites.load import Suite
 
 REASON = "pyrobosim is not installed; `make test-pyrobosim` has it"
 pytest.importorskip("pyrobosim", reason=REASON)
@@ -446,7 +446,7 @@ PROGRAM = """def task_program():
 def test_command_runs_a_program_and_ctrl_c_stops_it(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(WORLD.to_yaml())
     (tmp_path / "program.py").write_text(PROGRAM)
-    command = [sys.executable, "-m", "codebotler.cli", "run", "program.py", "--robot", "pyrobosim", "--yes"]
+    command = [sys.executable, "-m", "codebotler", "run", "program.py", "--robot", "pyrobosim", "--yes"]
     command += ["--world", "world.yaml", "--speed"]
     environment = {**os.environ, "CODEBOTLER_HOME": str(tmp_path / "home"), "NO_COLOR": "1"}
     done = subprocess.run(

@@ -29,6 +29,7 @@ from typing import IO
 
 import pytest
 
+from codebotler.files import to_line
 from codebotler.rtl import parse
 from codebotler.simulator.child import PROCESSOR_TIME
 from codebotler.simulator.lane import Lane
@@ -37,9 +38,8 @@ from codebotler.simulator.rules import Rules
 from codebotler.trace import Event, Outcome, Status
 from codebotler.tracefile import outcome_data
 from codebotler.world import Person, Room, World
-from roboeval.records import to_line
-from roboeval.suite import Requirement, Scenario
-from roboeval.verdicts import judge
+from roboeval.evaluation.judge import judge
+from roboeval.suites.load import Requirement, Scenario
 
 BURN = {  # all the processor time that there is; another one does so in `make test`
     *("cpu_counter_replaced", "cpu_power", "cpu_recursion_by_except", "cpu_regex", "cpu_uncounted_code"),

@@ -163,7 +163,7 @@ refuse_new_rights()
 install((header, bytes(instructions)))
 """
 EVALUATE = """
-from roboeval.cli import main
+from roboeval.cli.app import main
 sys.argv[0] = "roboeval"
 main()
 """

@@ -234,7 +234,7 @@ def test_before_there_is_a_mission_that_is_said(tmp_path: Path, method: str, pat
 def test_missions_that_cannot_be_kept_are_said_before_the_page_is_there(tmp_path: Path) -> None:
     (tmp_path / "world.yaml").write_text(WORLD)
     ended = subprocess.run(
-        [sys.executable, "-m", "codebotler.cli", *SERVE[1:], "--port", "0"],
+        [sys.executable, "-m", "codebotler", *SERVE[1:], "--port", "0"],
         cwd=tmp_path,
         env={**os.environ, "CODEBOTLER_HOME": "/sys/home"},
         capture_output=True,

@@ -274,7 +274,7 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
 )
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], named: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
-    command = [sys.executable, "-m", "codebotler.cli", "serve", "--world", "world.yaml", "--face", *arguments]
+    command = [sys.executable, "-m", "codebotler", "serve", "--world", "world.yaml", "--face", *arguments]
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
     assert ended.returncode == 2
     assert named in ended.stderr

@@ -195,7 +195,7 @@ def test_a_token_is_made_for_each_start() -> None:
 )
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
-    command = [sys.executable, "-m", "codebotler.cli", "serve", "--world", "world.yaml", *arguments]
+    command = [sys.executable, "-m", "codebotler", "serve", "--world", "world.yaml", *arguments]
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
     assert ended.returncode == 2
     assert told in ended.stderr

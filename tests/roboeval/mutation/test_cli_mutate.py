@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from command_line import ENVIRONMENT, Ended, refused, roboeval
-from test_suite import a_suite
+from small_suite import a_suite
 
 WIDE = {**ENVIRONMENT, "COLUMNS": "160"}
 LINE = re.compile(r"^(\w+) +(\d+) +(\d+) +(\d+) +(\d+) +0 +(\d+)  ([01]\.\d{3}) .*\d$", re.MULTILINE)

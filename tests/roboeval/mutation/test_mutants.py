@@ -13,8 +13,8 @@ from roboeval.mutation.mutants import Mutant, Original, drawn, mutants, original
 from roboeval.mutation.operator import Setting
 from roboeval.mutation.operators import OPERATORS
 from roboeval.mutation.variants import variants
-from roboeval.suite import Suite, load_suite
-from test_suite import a_suite
+from roboeval.suites.load import Suite, load_suite
+from small_suite import a_suite
 
 SETTING = Setting.of([World((Room("hall"), Room("lobby"), Room("kitchen")), "hall")])
 GOES = 'def task_program():\n    go_to("lobby")\n    say("hello")\n'

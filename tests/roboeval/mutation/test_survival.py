@@ -16,8 +16,8 @@ from roboeval.mutation.scores import Score, Trial, explained
 from roboeval.mutation.stillright import list_of, reasons, to_yaml
 from roboeval.mutation.survival import Baseline, End, Fate, baselines, ends
 from roboeval.mutation.worlds import worlds_of
-from roboeval.suite import Scenario, Suite, Task, load_suite
-from test_suite import a_suite
+from roboeval.suites.load import Scenario, Suite, Task, load_suite
+from small_suite import a_suite
 
 TASK = """\
 name: T

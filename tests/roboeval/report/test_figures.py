@@ -15,12 +15,12 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from made_up_runs import SUITE, cases, made_up
+from roboeval.analysis.resample import Prompt, Trial
 from roboeval.report.causes import all_causes
 from roboeval.report.drawing import DARK, LIGHT, WIDE, Look, looking, new_figure, written
 from roboeval.report.figures import LOWEST, at_the_limit, bars, limits, thresholds
 from roboeval.report.heat import Heat, causes_figure, draw_heat
 from roboeval.report.reading import JudgedRun
-from roboeval.resampling import Prompt, Trial
 
 PICTURES = Path(__file__).with_name("pictures")
 DRAWINGS: dict[str, Callable[[list[JudgedRun], Look], Figure | None]] = {

@@ -9,7 +9,8 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.world import Room, World
 from made_up_runs import SUITE, made_up, usual
-from roboeval.records import Completion
+from roboeval.analysis.resample import Prompt, Trial
+from roboeval.evaluation.completions import Completion
 from roboeval.report.cost import (
     Price,
     budget_sheet,
@@ -27,8 +28,7 @@ from roboeval.report.reading import JudgedRun, Written, _written
 from roboeval.report.robustness import only, phrasing_sheet, spread_sheet
 from roboeval.report.sheets import Sheet
 from roboeval.report.strengths import ability_sheet, coming_back_said, coming_back_sheet, never_returned
-from roboeval.resampling import Prompt, Trial
-from roboeval.suite import Scenario, Suite
+from roboeval.suites.load import Scenario, Suite
 
 
 def as_dicts(table: Sheet | None) -> list[dict[str, Any]]:

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.files import to_line
 from made_up_runs import HOSTILE, SUITE, made_up, usual
-from roboeval.evaluation import Evaluation
-from roboeval.records import to_line
+from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.evaluation import Evaluation
+from roboeval.evaluation.failures import PYTHON
+from roboeval.evaluation.run import Run, open_source
 from roboeval.report import paper
 from roboeval.report.causes import all_causes, beside_notes, causes_of, causes_sheet, kinds_in_order
 from roboeval.report.contents import Wishes, sections
@@ -24,10 +27,7 @@ from roboeval.report.scores import (
     task_sheet,
 )
 from roboeval.report.sheets import Column, Sheet, sheet, told, write_csv
-from roboeval.resume import evaluate_run
-from roboeval.run import Run, open_source
-from roboeval.suite import Suite
-from roboeval.taxonomy import PYTHON
+from roboeval.suites.load import Suite
 
 
 def column(table: Sheet, head: str) -> list[object]:

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from roboeval.records import to_line
-from roboeval.run import Run
+from codebotler.files import to_line
+from roboeval.evaluation.run import Run
 from roboeval.web.followed import FollowedRun, GoneError
 from roboeval.web.seen import Seen, Wanted
 from roboeval.web.telling import State, notes, state_of

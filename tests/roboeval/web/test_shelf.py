@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.run import Run
-from roboeval.suite import load_suite
+from roboeval.evaluation.run import Run
+from roboeval.suites.load import load_suite
 from roboeval.web.shelf import MOST_HELD, Shelf
 
 

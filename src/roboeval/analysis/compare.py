@@ -1,0 +1,295 @@
+"""Is one model better than another? Differences paired by prompt, how sure they are, and where they arise."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.badinput import BadInput
+from codebotler.storyboard import grid
+from codebotler.terminal import visible
+from roboeval.analysis.metrics import Estimate
+from roboeval.analysis.statistics import (
+    DIFFERENCE,
+    FEW,
+    ROUNDING,
+    Needed,
+    by_bootstrap,
+    by_formula,
+    needed,
+    p_by_signs,
+)
+from roboeval.suites.load import Suite
+
+SMALL = 0.0001
+PromptScores = Mapping[tuple[str, int], float]
+"""pass@1 by task and prompt."""
+
+
+@dataclass(frozen=True)
+class TaskDifference:
+    """How two models differ in one task.
+
+    Args:
+        task: its name.
+        first: the mean pass@1 of the first over the prompts that both have.
+        second: the same of the second.
+        share: what the task adds to the difference over all prompts.
+        prompts: how many prompts both have.
+    """
+
+    task: str
+    first: float
+    second: float
+    share: float
+    prompts: int
+
+    @property
+    def difference(self) -> float:
+        """By how much the second is better."""
+        return self.second - self.first
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How two models differ, the second minus the first, over the prompts that both have.
+
+    Args:
+        first: the mean pass@1 of the first.
+        second: the same of the second.
+        prompts: how many prompts both have.
+        left_out: how many prompts only one has.
+        over_prompts: the difference with its interval where prompts are drawn at random.
+        over_tasks: with its interval where tasks are.
+        bootstrap: the same by drawing tasks again.
+        p_prompts: how often signs drawn for each prompt give a difference as large.
+        p_tasks: the same with one sign for all prompts of a task.
+        needed: how much it would take to tell.
+        tasks: those that made the difference first.
+    """
+
+    first: float
+    second: float
+    prompts: int
+    left_out: int
+    over_prompts: Estimate
+    over_tasks: Estimate
+    bootstrap: Estimate
+    p_prompts: float
+    p_tasks: float
+    needed: Needed
+    tasks: tuple[TaskDifference, ...]
+
+
+def compared(first: PromptScores, second: PromptScores) -> Comparison:
+    """Compare two models prompt by prompt.
+
+    Args:
+        first: pass@1 of the one.
+        second: pass@1 of the other.
+
+    Raises:
+        BadInput: there is no prompt that both have.
+    """
+    keys = [key for key in first if key in second]
+    if not keys:
+        raise BadInput("the runs have no prompt in common, so there is nothing to compare")
+    by_task: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    for key in keys:
+        by_task[key[0]].append((first[key], second[key]))
+    pairs = [pair for pairs in by_task.values() for pair in pairs]
+    tasks = [[b - a for a, b in pairs] for pairs in by_task.values()]
+    prompts = [[b - a] for a, b in pairs]
+    return Comparison(
+        first=sum(a for a, _ in pairs) / len(pairs),
+        second=sum(b for _, b in pairs) / len(pairs),
+        prompts=len(pairs),
+        left_out=len({*first, *second}) - len(keys),
+        over_prompts=by_formula(prompts, within=DIFFERENCE),
+        over_tasks=by_formula(tasks, within=DIFFERENCE),
+        bootstrap=by_bootstrap(tasks, within=DIFFERENCE),
+        p_prompts=p_by_signs(prompts),
+        p_tasks=p_by_signs(tasks),
+        needed=needed(pairs),
+        tasks=tuple(sorted(_by_task(by_task), key=lambda one: (-abs(one.share), one.task))),
+    )
+
+
+def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[TaskDifference]:
+    total = sum(map(len, by_task.values()))
+    for task, pairs in by_task.items():
+        n = len(pairs)
+        first, second = sum(a for a, _ in pairs) / n, sum(b for _, b in pairs) / n
+        yield TaskDifference(task, first, second, (second - first) * n / total, n)
+
+
+def verdict(comparison: Comparison, names: tuple[str, str], *, level: float = 0.05) -> str:
+    """In a sentence, which is better, as far as these prompts can tell."""
+    difference = comparison.over_tasks.mean
+    if abs(difference) < ROUNDING:
+        return f"{names[0]} and {names[1]} pass equally often."
+    better, other = (names[1], names[0]) if difference > 0 else names
+    by = f"{100 * abs(difference):.1f} points"
+    if comparison.p_tasks <= level:
+        return f"{better} is better than {other} by {by}; tasks drawn at random would hardly ever give that."
+    if comparison.p_prompts <= level:
+        return (
+            f"{better} is better than {other} by {by} on prompts of these tasks; whether it would be "
+            f"on other tasks, {len(comparison.tasks)} of them cannot tell."
+        )
+    return f"{better} passes more often than {other} by {by}, which chance alone may well give."
+
+
+def told_of(about: Mapping[str, Any], head: Mapping[str, Any]) -> dict[str, Any]:
+    """What run.json says of how completions were asked for, and KEY.json of how they were judged."""
+    return {**about, **{name: head.get(name) for name in ("python", "codebotler")}}
+
+
+def unlike(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
+    """What two runs differ in that may explain a difference beside the model.
+
+    Args:
+        first: what is `told_of` the one.
+        second: the same of the other.
+    """
+    told = []
+    for name, words in WORDS.items():
+        a, b = first.get(name), second.get(name)
+        if a is not None and b is not None and a != b:
+            told.append(f"{words} differ: {_said(a)} and {_said(b)}")
+    settings = [found if isinstance(found := one.get("settings"), dict) else {} for one in (first, second)]
+    if bool(settings[0]) != bool(settings[1]):
+        told.append("of one of them nobody recorded the settings")
+    for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
+        a, b = (one.get(name) for one in settings)
+        if a != b:
+            told.append(f"{name.replace('_', '-')} differs: {_said(a)} and {_said(b)}")
+    return told
+
+
+WORDS = {
+    "python": "the Python versions with which they were judged",
+    "codebotler": "the versions of codebotler with which they were judged",
+    "template": "the prompt templates",
+}
+
+
+def _said(value: object) -> str:
+    return "none" if value is None else visible(str(value))[:12]
+
+
+def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, again: Mapping[str, str]) -> None:
+    """Refuse runs that were judged by suites of different content.
+
+    Args:
+        heads: what KEY.json says of each run, by its path.
+        suite: as it is now.
+        again: the command that judges a run, by its path.
+
+    Raises:
+        BadInput: the hashes of their suites differ.
+    """
+    digests = {path: str(head.get("digest")) for path, head in heads.items()}
+    if len({*digests.values()}) < 2:  # noqa: PLR2004 - two that differ
+        return
+    stale = next(path for path, digest in digests.items() if digest != suite.digest)
+    other = next(path for path, digest in digests.items() if digest != digests[stale])
+    hashes = f"{digests[stale][:8]} and {digests[other][:8]}"
+    raise BadInput(
+        f"{stale} and {other} were judged by suites of other content ({hashes}); "
+        f"`{again[stale]} --redo` judges it by the suite as it is now"
+    )
+
+
+# --- for people and machines
+
+
+def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
+    """A comparison as plain data."""
+    return {
+        "first": {"name": names[0], "pass@1": comparison.first},
+        "second": {"name": names[1], "pass@1": comparison.second},
+        "prompts": comparison.prompts,
+        "prompts_left_out": comparison.left_out,
+        "difference": comparison.over_tasks.mean,
+        "interval": {
+            "prompts": _ends(comparison.over_prompts),
+            "tasks": _ends(comparison.over_tasks),
+            "bootstrap": _ends(comparison.bootstrap),
+        },
+        "p": {"prompts": comparison.p_prompts, "tasks": comparison.p_tasks},
+        "needed": asdict(comparison.needed),
+        "tasks": [{**asdict(task), "difference": task.difference} for task in comparison.tasks],
+    }
+
+
+def _ends(estimate: Estimate) -> dict[str, float]:
+    return {"low": estimate.low, "high": estimate.high}
+
+
+def render(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
+    """A comparison as text and tables.
+
+    Args:
+        comparison: of two runs.
+        names: of both.
+    """
+    a, b = map(visible, names)
+    rows = grid("left", "right", "left")
+    rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")
+    rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}")
+    rows.add_row(
+        "difference",
+        f"{comparison.over_tasks.mean:+.3f}",
+        f"over {prompts(comparison.prompts)} that both have",
+    )
+    few = "too narrow for so few tasks" if len(comparison.tasks) < FEW else ""
+    for name, estimate, told in (
+        ("95% interval, prompts drawn at random", comparison.over_prompts, _p(comparison.p_prompts)),
+        ("95% interval, tasks drawn at random", comparison.over_tasks, _p(comparison.p_tasks)),
+        ("the same by bootstrap", comparison.bootstrap, few),
+    ):
+        rows.add_row(name, f"{estimate.low:+.3f} to {estimate.high:+.3f}", told)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("task", overflow="fold")
+    for head in (a, b, "difference", "adds", "prompts"):
+        table.add_column(Text(head), justify="right")
+    for task in comparison.tasks:
+        cells = (f"{task.first:.3f}", f"{task.second:.3f}", f"{task.difference:+.3f}", f"{task.share:+.3f}")
+        table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
+    sentence = Text(verdict(comparison, (a, b)), "bold")
+    return Group(sentence, Text(), rows, Text(), *map(Text, to_tell(comparison)), Text(), table)
+
+
+def _p(value: float) -> str:
+    return f"p = {value:.4f}" if value >= SMALL else f"p < {SMALL}"
+
+
+def prompts(count: int) -> str:
+    """Such as `1 prompt` or `20 prompts`."""
+    return f"{count:,} prompt{'s' * (count != 1)}"
+
+
+def to_tell(comparison: Comparison) -> list[str]:
+    """How much it would take to tell the two apart, in sentences."""
+    much = comparison.needed
+    if much.completions is None:
+        return ["They do not differ, so no number of completions would tell them apart."]
+    each = f"{much.completions:,} completion{'s' * (much.completions != 1)}"
+    here = (
+        f"A difference of this size on these very prompts is told, four times in five, by {each} of each "
+        f"model for each prompt ({much.completions * comparison.prompts:,} of each in all)."
+    )
+    told = [here]
+    if much.prompts is not None:
+        told.append(
+            f"For prompts like these in general, it takes {much.prompts:,} of them, as many completions each."
+        )
+    return told

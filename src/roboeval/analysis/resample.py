@@ -1,0 +1,221 @@
+"""What asking again for each program that the check rejects would have given (paper, section V).
+
+Whoever checks programs before they run asks for another when one is rejected, up to a limit of retries. From
+a run whose completions are both checked and judged, what that gives is known exactly: completions of a prompt
+are drawn with replacement; the first that is accepted is kept, or the last where none is.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.terminal import visible
+from roboeval.analysis.metrics import Estimate, clustered_interval
+from roboeval.evaluation.completions import Key
+from roboeval.evaluation.tables import RowData
+
+LIMITS = (0, 2, 4, 8, 100)
+THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
+ROUNDING = 1e-9  # what sums of shares may lack of a threshold
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One completion, checked and judged.
+
+    Args:
+        accepted: whether the check found no problem in it.
+        ran: whether it ended without an error in every true world.
+        passed: whether it did what was asked in every true world.
+    """
+
+    accepted: bool
+    ran: bool
+    passed: bool
+
+
+@dataclass(frozen=True)
+class Chances:
+    """What becomes of a prompt, each a chance from 0 to 1.
+
+    Args:
+        accepted: that the program that is kept is one that the check accepts.
+        ran: that it runs without an error in every true world.
+        passed: that it does what was asked: pass@1.
+    """
+
+    accepted: float
+    ran: float
+    passed: float
+
+
+def chances(trials: Sequence[Trial], retries: int) -> Chances:
+    """What is to be expected of a prompt, exactly.
+
+    Args:
+        trials: its completions, at least one; each is drawn as often as any other, and again.
+        retries: how many times a rejected program is asked for again, at least 0.
+
+    Raises:
+        ValueError: there is no completion, or a negative number of retries.
+    """
+    if not trials or retries < 0:
+        raise ValueError(f"there is nothing to expect of {len(trials)} completions and {retries} retries")
+    accepted = [trial for trial in trials if trial.accepted]
+    rejected = [trial for trial in trials if not trial.accepted]
+    none = (len(rejected) / len(trials)) ** (retries + 1)
+
+    def chance(ends: Iterable[tuple[Sequence[bool], float]]) -> float:
+        return sum(weight * sum(good) / len(good) for good, weight in ends if good)
+
+    return Chances(
+        accepted=1 - none,
+        ran=chance((([t.ran for t in accepted], 1 - none), ([t.ran for t in rejected], none))),
+        passed=chance((([t.passed for t in accepted], 1 - none), ([t.passed for t in rejected], none))),
+    )
+
+
+def ran(row: RowData) -> bool:
+    """Whether a judged completion ended without an error in every world; one that may wait for ever may."""
+    return all(
+        verdict["status"] == "finished"
+        or (verdict["status"] == "timeout" and (verdict["satisfied"] or verdict["failed_checks"]))
+        for verdict in row["verdicts"]
+    )
+
+
+@dataclass(frozen=True)
+class Prompt:
+    """The completions of one prompt."""
+
+    task: str
+    prompt: int
+    trials: tuple[Trial, ...]
+
+
+def by_prompt(trials: Iterable[tuple[Key, Trial]]) -> tuple[Prompt, ...]:
+    """Put the completions of each prompt together, in the order of tasks and prompts."""
+    together: defaultdict[tuple[str, int], list[Trial]] = defaultdict(list)
+    for (task, prompt, _), trial in trials:
+        together[task, prompt].append(trial)
+    return tuple(Prompt(*key, tuple(those)) for key, those in sorted(together.items()))
+
+
+@dataclass(frozen=True)
+class Limit:
+    """What one limit of retries gives, over all prompts.
+
+    Args:
+        retries: the limit.
+        passed: the mean pass@1, with its 95 % interval.
+        accepted: the share of programs kept that the check accepts.
+        ran: the share of programs kept that run without an error in every true world.
+        prompts: the share of prompts whose pass@1 is at least some threshold, by threshold.
+        by_prompt: what each prompt comes to, in the order of the prompts.
+    """
+
+    retries: int
+    passed: Estimate
+    accepted: float
+    ran: float
+    prompts: Mapping[float, float]
+    by_prompt: tuple[Chances, ...]
+
+
+def resampled(prompts: Sequence[Prompt], retries: int) -> Limit:
+    """What a limit of retries would have given.
+
+    Args:
+        prompts: at least one.
+        retries: at least 0.
+    """
+    each = tuple(chances(prompt.trials, retries) for prompt in prompts)
+    return Limit(
+        retries=retries,
+        passed=clustered_interval([min(one.passed, 1.0) for one in each]),
+        accepted=_mean([one.accepted for one in each]),
+        ran=_mean([one.ran for one in each]),
+        prompts={t: _mean([one.passed >= t - ROUNDING for one in each]) for t in THRESHOLDS},
+        by_prompt=each,
+    )
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / len(values)
+
+
+def curve_data(prompts: Sequence[Prompt], limits: Sequence[int]) -> dict[str, Any]:
+    """The data of the paper's two figures, for machines.
+
+    Args:
+        prompts: at least one.
+        limits: numbers of retries.
+    """
+    of_limits = [resampled(prompts, retries) for retries in limits]
+    return {
+        "limits": [
+            {
+                "retries": limit.retries,
+                "pass@1": {"mean": limit.passed.mean, "low": limit.passed.low, "high": limit.passed.high},
+                "accepted": limit.accepted,
+                "ran": limit.ran,
+                "prompts_at_least": {str(t): share for t, share in limit.prompts.items()},
+            }
+            for limit in of_limits
+        ],
+        "prompts": [
+            {
+                "task": prompt.task,
+                "prompt": prompt.prompt,
+                "completions": len(prompt.trials),
+                "accepted": sum(trial.accepted for trial in prompt.trials),
+                "passed": sum(trial.passed for trial in prompt.trials),
+                "pass@1": {str(limit.retries): limit.by_prompt[i].passed for limit in of_limits},
+            }
+            for i, prompt in enumerate(prompts)
+        ],
+        "accepted_after": [
+            _mean([chances(prompt.trials, n).accepted for prompt in prompts]) for n in range(max(limits) + 1)
+        ],
+    }
+
+
+def render(prompts: Sequence[Prompt], limits: Sequence[int], *, title: str) -> RenderableType:
+    """The same as a table for people.
+
+    Args:
+        prompts: at least one.
+        limits: numbers of retries.
+        title: which run it is about.
+    """
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    heads = ("retries", "pass@1", *(f"pass@1\n≥ {t:g}" for t in THRESHOLDS), "accepted", "run at all")
+    for name in heads:
+        table.add_column(name, justify="right", no_wrap=True)
+    for limit in (resampled(prompts, retries) for retries in limits):
+        shares = (*limit.prompts.values(), limit.accepted, limit.ran)
+        table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
+    hopeless = sum(not any(trial.accepted for trial in prompt.trials) for prompt in prompts)
+    return Group(
+        Text(visible(title), style="bold"),
+        Text("a program that the check rejects is asked for again, so many times at most; that gives:"),
+        Text(),
+        table,
+        Text(),
+        Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
+        Text("accepted: the share of programs, at the end, that the check accepts", style="dim"),
+        Text("run at all: the share that runs without an error in all the worlds of its task", style="dim"),
+        *([Text(f"no completion of {_prompts(hopeless)} is accepted")] if hopeless else []),
+    )
+
+
+def _prompts(count: int) -> str:
+    return f"{count} prompt{'s' * (count != 1)}"

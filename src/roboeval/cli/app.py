@@ -1,0 +1,62 @@
+"""The command line of RoboEval."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from codebotler import __version__
+from codebotler.cli import obey
+from codebotler.terminal import noting_all, print_text
+from roboeval.cli.evaluate import evaluate, export, import_, show
+from roboeval.cli.find import find
+from roboeval.cli.generate import generate, run
+from roboeval.cli.mutate import mutate
+from roboeval.cli.report import compare, report
+from roboeval.cli.resample import resample
+from roboeval.cli.serve import serve
+from roboeval.cli.tasks import tasks
+
+app = typer.Typer(
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+@app.callback(invoke_without_command=True)
+def roboeval(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """How good are language models at writing programs for service robots?"""
+    if version:
+        print_text(f"roboeval {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print_text(context.get_help())
+
+
+app.command()(generate)
+app.command()(evaluate)
+app.command()(run)
+app.command()(show)
+app.command()(find)
+app.command()(tasks)
+app.command()(resample)
+app.command()(report)
+app.command()(compare)
+app.command()(mutate)
+app.command()(serve)
+app.command()(export)
+app.command("import")(import_)
+
+
+def main() -> None:
+    """Run the command line."""
+    with noting_all():
+        obey(app, "roboeval")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""The command that looks for completions by what they did, and says why those that fail do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from roboeval.cli.completion import task_names
+from roboeval.cli.options import (
+    AblationOption,
+    JsonOption,
+    RunArgument,
+    SuiteOption,
+    as_judged,
+    cores,
+    expect_current,
+    load,
+    open_evaluation,
+)
+from roboeval.cli.output import fail, note, print_json, print_rich, watched
+
+if TYPE_CHECKING:
+    from roboeval.analysis.cluster import Cluster
+    from roboeval.analysis.search import Found, Question
+    from roboeval.suites.load import Suite
+
+
+def find(
+    run: RunArgument,
+    formula: Annotated[
+        str | None, typer.Argument(help='An RTL formula, such as tr.Exists(goto("kitchen")); all by default.')
+    ] = None,
+    negated: Annotated[bool, typer.Option("--not", help="Where the formula does not hold.")] = False,
+    task: Annotated[
+        str | None, typer.Option(help="Only completions of this task.", autocompletion=task_names)
+    ] = None,
+    world: Annotated[
+        str | None, typer.Option(help="Only in this world: its number, from 1, or what it is about.")
+    ] = None,
+    most: Annotated[int, typer.Option("--groups", min=0, help="How many groups of failures to show.")] = 10,
+    suite: SuiteOption = "paper",
+    ablation: AblationOption = False,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes that look; all cores by default.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Find completions by what they did, and group the failures.
+
+    Of those that did something in some world, those that fail are put together by the reason.
+    """
+    from roboeval.analysis.cluster import clusters, groups
+    from roboeval.analysis.search import Question, search
+    from roboeval.evaluation.completions import how_many
+
+    if negated and formula is None:
+        fail("--not is about a formula; name one, or leave --not out")
+    known = as_judged(run, load(suite), ablated=ablation)
+    question = Question(formula, negated, None if task is None else known.task(task).name, world)
+    expect_question(question, known, ablated=ablation)
+    evaluation = open_evaluation(run, known, suite, ablated=ablation)
+    looking = evaluation.read_by(lambda lines: search(lines, question, workers=workers or cores()))
+    every = list(watched(looking, "looking", evaluation.scope.total))
+    expect_current(evaluation, known, suite)
+    found = [one for one in every if one.worlds]
+    programs = {completion.key: completion.program for completion in evaluation.judged()}
+    failed = [one.row for one in found if one.row is not None]
+    right = [one.key for one in every if one.passed]
+    total = sum(question.task in {None, one.key[0]} for one in every)
+    together = groups(failed, programs)
+    shown = together if json else together[:most]
+    telling = clusters(shown, right, programs, known, ablated=ablation)
+    told = list(watched(telling, "comparing", len(shown)))
+    undecided = [one for one in every if one.undecided]
+    if undecided:
+        note(f"undecided, since their traces were too long to be kept: {how_many(len(undecided))}")
+    if json:
+        print_found(found, undecided, told, total)
+    else:
+        show_found(found, told, total, failed=len(failed), groups=len(together))
+
+
+def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
+    """Refuse a formula that is none, and a world that nobody has."""
+    from codebotler.badinput import BadInput
+    from codebotler.rtl import RtlSyntaxError, parse
+
+    if question.formula is not None:
+        try:
+            parse(question.formula)
+        except RtlSyntaxError as error:
+            raise BadInput(f"this is no formula: {error}") from None
+    if question.world is None:
+        return
+    tasks = [suite.tasks[question.task]] if question.task else list(suite.tasks.values())
+    scenarios = [task.judged_in(ablated=ablated) for task in tasks]
+    abouts = {scenario.world.about.lower() for those in scenarios for scenario in those}
+    numbers = {str(n) for n in range(1, max(map(len, scenarios)) + 1)}
+    if question.world.lower() not in abouts | numbers:
+        where = question.task or f'the suite "{suite.name}"'
+        fail(f'{where} has no world "{question.world}"; `roboeval tasks TASK` lists the worlds of a task')
+
+
+def print_found(
+    found: Sequence[Found], undecided: Sequence[Found], told: Sequence[Cluster], total: int
+) -> None:
+    """Print what was found for machines."""
+    from roboeval.analysis.cluster import cluster_data
+
+    print_json(
+        {
+            "looked_at": total,
+            "found": [_found_data(one, one.worlds) for one in found],
+            "undecided": [_found_data(one, one.undecided) for one in undecided],
+            "groups": list(map(cluster_data, told)),
+        }
+    )
+
+
+def _found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]:
+    from roboeval.evaluation.completions import name_of
+
+    return {
+        "completion": name_of(one.key),
+        "passed": one.passed,
+        "worlds": [{"number": number, "world": world} for number, world in worlds],
+    }
+
+
+def show_found(
+    found: Sequence[Found], told: Sequence[Cluster], total: int, *, failed: int, groups: int
+) -> None:
+    """Print what was found for people."""
+    from rich.console import Group
+    from rich.text import Text
+
+    from roboeval.analysis.cluster import cluster_view
+    from roboeval.analysis.search import found_view
+    from roboeval.evaluation.completions import how_many
+
+    parts = [found_view(found, total)]
+    if told:
+        what = f"{how_many(failed)} of these failed, in {groups:,} group{'s' * (groups != 1)}:"
+        parts += [Text(), Text(what, "bold"), Text(), *map(cluster_view, told)]
+        if groups > len(told):
+            parts.append(Text(f"{groups - len(told):,} smaller groups; --groups shows more", "dim"))
+    print_rich(Group(*parts))

@@ -1,0 +1,77 @@
+"""The command about the tasks of a suite."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.cli.completion import task_names
+from roboeval.cli.options import JsonOption, SuiteOption, command, cores, load
+from roboeval.cli.output import fail, note, print_json, print_rich, print_text, watched
+
+if TYPE_CHECKING:
+    from roboeval.suites.load import Suite
+
+
+def tasks(
+    task: Annotated[str | None, typer.Argument(help="Show this task.", autocompletion=task_names)] = None,
+    suite: SuiteOption = "paper",
+    lint: Annotated[bool, typer.Option("--lint", help="Look for faults; status 1 if there are any.")] = False,
+    accepted: Annotated[
+        bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
+    ] = False,
+    new: Annotated[
+        str | None,
+        typer.Option(help="Start a task of this name in the folder of --suite, which is made if need be."),
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """List a suite's tasks, show one, lint them, start a new one."""
+    from roboeval.suites.catalogue import other_suites, suite_data, suite_view, task_view
+
+    if new is not None:
+        if task is not None or lint or accepted or json:
+            fail("--new only starts a task; leave the rest out")
+        start(new, suite)
+        return
+    if accepted and not lint:
+        fail("--accepted is about what --lint finds; add --lint")
+    known = load(suite)
+    if lint:
+        if json:
+            fail("--lint prints for people only; leave --json out")
+        lint_tasks(known, task, accepted=accepted)
+    elif json:
+        print_json(suite_data(known, None if task is None else known.task(task).name))
+    elif task is not None:
+        print_rich(task_view(known.task(task)))
+    else:
+        print_rich(suite_view(known))
+        for sentence in other_suites(known.name):
+            note(sentence)
+
+
+def start(task: str, suite: str) -> None:
+    """Start a task in a folder, and say how to go on."""
+    from roboeval.suites.catalogue import expect_own, new_task
+
+    expect_own(suite)
+    path = new_task(Path(suite), task)
+    lint = command("tasks", "--lint", suite=suite)
+    note(f"{path} is a whole task; make it yours, and let `{lint}` look at it")
+
+
+def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
+    """Print what the linter finds in all tasks or one; status 1 if anything is open."""
+    from roboeval.linting.findings import render
+    from roboeval.linting.lint import lint
+    from roboeval.linting.trials import tried
+
+    wanted = list(suite.tasks.values()) if task is None else [suite.task(task)]
+    linted = (lint(one, tried(one, suite, workers=cores())) for one in wanted)
+    findings = [found for several in watched(linted, "linting", len(wanted)) for found in several]
+    print_text(render(findings, accepted=accepted))
+    if any(finding.accepted is None for finding in findings):
+        raise SystemExit(1)

@@ -1,0 +1,244 @@
+"""Rows of completions and of evaluations: read with line numbers, written so that no crash loses one."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any, SupportsIndex, TypeAlias, TypedDict
+
+from codebotler.arguments import expect_text, expect_whole
+from codebotler.badinput import BadInput
+from codebotler.english import counted
+from codebotler.files import MAX_ROW, read_rows, to_line
+from codebotler.models.recorded import recorded_model
+from roboeval.suites.load import Suite, expect_suite
+
+COMPLETIONS = "completions.jsonl"
+EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
+
+MOST = 1_000_000_000
+REQUIRED = ("task", "prompt", "index", "program")
+FIELDS = (*REQUIRED, "instruction", "model")
+
+Key: TypeAlias = tuple[str, int, int]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Completion:
+    """One row of completions.jsonl: a program that a model wrote for an instruction.
+
+    Args:
+        task: the task's name.
+        prompt: which phrasing, counted from 0, below a billion.
+        index: which sample, counted from 0, below a billion.
+        program: the cleaned source; judged exactly as it stands.
+        instruction: what the model was told; None where nobody recorded it.
+        model: who wrote it.
+        more: what else its row says, such as `usage`.
+
+    Raises:
+        BadInput: one of them is not of its kind or range.
+    """
+
+    task: str
+    prompt: int
+    index: int
+    program: str = field(repr=False)
+    instruction: str | None = field(default=None, repr=False)
+    model: str | None = None
+    more: Mapping[str, Any] = field(default_factory=dict, repr=False, hash=False)
+
+    def __post_init__(self) -> None:
+        expect_text(self.task, "the task")
+        for name, number in (("prompt", self.prompt), ("index", self.index)):
+            expect_whole(number, f"the {name}", least=0)
+            if number >= MOST:
+                raise BadInput(f"the {name} is {number}, but it must be below {MOST:,}")
+            if type(number) is not int:  # but of a library's kind, which JSON cannot write
+                object.__setattr__(self, name, int(number))
+        expect_text(self.program, "the program")
+        if self.instruction is not None:
+            expect_text(self.instruction, "the instruction")
+        if self.model is not None:
+            expect_text(self.model, "the model")
+
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> Completion:
+        """The completion that a row of completions.jsonl says.
+
+        Raises:
+            BadInput: something is missing in it, or not of its kind or range.
+        """
+        more = dict(row)
+        known = {name: more.pop(name) for name in FIELDS if name in more}
+        for name in REQUIRED:
+            if name not in known:
+                raise BadInput(f'"{name}" is missing')
+        return cls(**known, more=more)
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The row of completions.jsonl that says it."""
+        known = {name: getattr(self, name) for name in FIELDS}
+        return {name: value for name, value in known.items() if value is not None} | dict(self.more)
+
+    @property
+    def key(self) -> Key:
+        """What no other row of a run shares."""
+        return self.task, self.prompt, self.index
+
+    @property
+    def program_sha256(self) -> str:
+        """The hash of the program, half surrogate pairs included, in 64 hexadecimal digits."""
+        return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
+
+
+class Judgement(TypedDict):
+    """What is said of a program.
+
+    Args:
+        passed: whether the program does what is required in all worlds.
+        failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
+        verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
+            `line`, `failed_checks` and `trace`; where the trace is too long for a row, it ends early, and
+            `cut` says how many `events` more there are, and the `sha256` of the JSON of all of it.
+    """
+
+    passed: bool
+    failure: dict[str, Any] | None
+    verdicts: list[dict[str, Any]]
+
+
+class Row(Judgement):
+    """One row of an evaluation: what is said of a completion's program.
+
+    Args:
+        task: the task's name.
+        prompt: which phrasing, counted from 0.
+        index: which sample, counted from 0.
+    """
+
+    task: str
+    prompt: int
+    index: int
+
+
+def read_completions(
+    path: str | PathLike[str],
+    suite: Suite | None = None,
+    *,
+    growing: bool = False,
+    name: Path | str | None = None,
+) -> Iterator[Completion]:
+    """Read completions from a file of JSON lines.
+
+    Args:
+        path: the file.
+        suite: whose tasks and prompts they must be of; any by default.
+        growing: whether it stands in a run, where a torn last line is passed over.
+        name: what sentences call the file; its path by default.
+
+    Raises:
+        BadInput: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
+    """
+    if not isinstance(path, PathLike):
+        expect_text(path, "the path")
+    path = Path(path)
+    name = name or path
+    if suite is not None:
+        expect_suite(suite)
+    seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
+    for number, row in read_rows(path, growing=growing, name=name, example=EXAMPLE):
+        try:
+            completion = Completion.of(row)
+        except BadInput as error:
+            raise BadInput(error.sentence, file=name, line=number) from None
+        lines = seen[sys.intern(completion.task), completion.prompt]
+        first_line = lines.setdefault(completion.index, number)
+        if first_line != number:
+            raise BadInput(
+                f"{name_of(completion.key)} stands here again; it stood in line {first_line} already",
+                file=name,
+                line=number,
+            )
+        check_length(row, name, number)
+        if suite is not None and (problem := unknown(completion.key, suite)):
+            raise BadInput(problem, file=name, line=number)
+        yield completion
+    if not seen:
+        raise BadInput("there is no completion in it", file=name)
+
+
+def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
+    """Refuse what would be too long to be read again once it is copied into a run.
+
+    Raises:
+        BadInput: it is.
+    """
+    if len(to_line(row)) > MAX_ROW:
+        sentence = f"as a row this is longer than {MAX_ROW:,} bytes; shorten the program"
+        raise BadInput(sentence, file=str(file), line=line)
+
+
+def unknown(key: Key, suite: Suite) -> str | None:
+    """What is wrong with a completion's task or prompt; None if the suite knows both.
+
+    Args:
+        key: the completion's, as a row or somebody who writes Python gives it.
+        suite: whose tasks and prompts are known.
+    """
+    task = suite.tasks.get(str(key[0]))
+    if task is None:
+        return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
+    there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
+    if not _is_whole(key[1]):
+        return f"the prompt is {key[1]!r}, not a whole number; {there_are}"
+    if not 0 <= key[1] < len(task.prompts):
+        return f"{name_of(key)}: {there_are}"
+    return None
+
+
+def _is_whole(number: object) -> bool:
+    """Whether it is a whole number, of any library's kind."""
+    return isinstance(number, SupportsIndex) and not isinstance(number, bool)
+
+
+def name_of(key: Key) -> str:
+    """How a person names a row: TASK/PROMPT/INDEX."""
+    return "/".join(map(str, key))
+
+
+def how_many(count: int) -> str:
+    """A number of completions: `1 completion`, `2,000 completions`."""
+    return counted(count, "completion")
+
+
+def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
+    """Every reply that a recorded model has for a suite's prompts, as completions.
+
+    Raises:
+        BadInput: there is no such model or suite, or the model knows none of its instructions.
+    """
+    expect_text(name, "the model's name")
+    expect_suite(suite)
+    model = recorded_model(name)
+    found = False
+    for task in suite.tasks.values():
+        for prompt, instruction in enumerate(task.prompts):
+            for index, reply in enumerate(model.replies.get(instruction, ())):
+                found = True
+                yield Completion(
+                    task=task.name,
+                    prompt=prompt,
+                    index=index,
+                    instruction=instruction,
+                    model=f"recorded:{model.name}",
+                    program=reply.program,
+                )
+    if not found:
+        raise BadInput(f'{name} knows no instruction of the suite "{suite.name}"')

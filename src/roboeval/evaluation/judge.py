@@ -1,0 +1,221 @@
+"""The authority on right and wrong: runs completions in the worlds of their tasks and judges the traces."""
+
+from __future__ import annotations
+
+import logging
+import platform
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from codebotler import __version__
+from codebotler.badinput import BadInput
+from codebotler.rtl import CannotJudge, holds
+from codebotler.simulator.engine import digest
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import PAPER
+from codebotler.trace import Outcome, Status, Trace
+from codebotler.tracefile import outcome_data
+from roboeval.evaluation.completions import Completion, Judgement, Row, name_of, unknown
+from roboeval.evaluation.engines import Local, OpenEngine
+from roboeval.evaluation.failures import Verdict, failure
+from roboeval.evaluation.rowsize import bounded
+from roboeval.evaluation.timelimit import TimeLimitExceeded, time_limit
+from roboeval.suites.load import Requirement, Scenario, Suite, expect_suite
+
+LOG = logging.getLogger("roboeval.evaluation.judge")
+
+BUDGET = 60
+"""Seconds of processor time that judging one program may take, in all its worlds."""
+
+
+def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
+    """Say whether a run did what its world requires.
+
+    A run that ended in an error is unsatisfied whatever it did; one that reached a limit is judged by the
+    requirements only in a world that may wait for ever.
+
+    Args:
+        outcome: of the run.
+        scenario: the world in which it ran, with its requirements.
+    """
+    if not may_satisfy(outcome, scenario):
+        return Verdict(scenario.world.about, outcome, (), satisfied=False)
+    failed = tuple(r for r in scenario.require if not is_met(r, outcome.trace))
+    return Verdict(scenario.world.about, outcome, failed, satisfied=not failed)
+
+
+def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
+    """Whether a run ended so that the requirements decide: by itself, or waiting where that is allowed."""
+    waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
+    return waited or outcome.status is Status.FINISHED
+
+
+def is_met(requirement: Requirement, trace: Trace) -> bool:
+    """Whether a trace satisfies a requirement; one that cannot be judged is not satisfied."""
+    try:
+        return holds(requirement.formula, trace)
+    except CannotJudge:
+        return False
+
+
+def evaluate(
+    completions: Iterable[Completion],
+    suite: Suite,
+    *,
+    ablated: bool = False,
+    workers: int = 1,
+    require_isolation: bool = False,
+    engine: OpenEngine | None = None,
+) -> Iterator[Row]:
+    """Judge completions, yielding one row each in their order; equal programs of a task run once.
+
+    One whose judging takes more than 60 seconds of processor time has no row, and a warning is logged; this
+    limit holds only where rows are asked for in the main thread.
+
+    Args:
+        completions: whose tasks the suite knows; read as they are needed.
+        suite: tasks and rules.
+        ablated: whether to require common sense only; then all tasks have an ablation.
+        workers: how many programs are run at the same time.
+        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+        engine: where programs are run; by default in so many lanes of this machine, started and ended for it.
+
+    Raises:
+        BadInput: there are no workers or no suite; or, when it is read, a completion is none or not of the
+            suite.
+        EngineError: no isolated process can be started.
+    """
+    expect_suite(suite)
+    chosen = engine or Local(workers, require_isolation=require_isolation)
+    told = judgements(completions, suite, ablated=ablated, engine=chosen)
+    return (evaluation(completion, one) for completion, one in told if one is not None)
+
+
+def judgements(
+    completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
+) -> Iterator[tuple[Completion, Judgement | None]]:
+    """What is said of each completion, in their order; None, and a warning, where that takes too long.
+
+    Args:
+        completions: whose tasks the suite knows; read as they are needed.
+        suite: tasks and rules.
+        ablated: whether to require common sense only.
+        engine: where programs are run.
+    """
+    waiting: deque[Completion] = deque()
+
+    def works() -> Iterator[tuple[str, str]]:
+        for completion in completions:
+            _expect_judgeable(completion, suite, ablated=ablated)
+            waiting.append(completion)
+            yield completion.task, completion.program
+
+    with engine as opened:
+        running = partial(run_in_worlds, suite, ablated=ablated)
+        judging = partial(judged, suite, ablated=ablated)
+        for told in opened.map_distinct(running, works(), name=lambda work: digest(*work), then=judging):
+            completion = waiting.popleft()
+            if told is None:
+                LOG.warning(
+                    "%s is not judged: that took more than %g seconds of processor time; "
+                    "`roboeval tasks --lint` finds slow regexes",
+                    name_of(completion.key),
+                    BUDGET,
+                )
+            yield completion, told
+
+
+def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
+    if not isinstance(completion, Completion):
+        kind = type(completion).__name__
+        raise BadInput(
+            f"a completion is of the type {kind}; "
+            "make it a Completion(task=..., prompt=..., index=..., program=...)"
+        )
+    if (problem := unknown(completion.key, suite)) is not None:
+        raise BadInput(problem)
+    if ablated and suite.tasks[completion.task].ablation is None:
+        raise BadInput(f'the task "{completion.task}" has no ablation')
+
+
+def run_in_worlds(
+    suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool
+) -> tuple[str, Sequence[Outcome]]:
+    """A task, the first of the two, and how a program, the second, ends in each of its worlds."""
+    task, program = work
+    scenarios = suite.tasks[task].judged_in(ablated=ablated)
+    return task, [lane.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios]
+
+
+def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> Judgement | None:
+    """What is said of a program that ran in all worlds of a task; None where that takes too long."""
+    task, outcomes = ran
+    scenarios = suite.tasks[task].judged_in(ablated=ablated)
+    try:
+        with time_limit(BUDGET):
+            return judgement([judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
+    except TimeLimitExceeded:
+        return None
+
+
+def evaluation(completion: Completion, told: Judgement) -> Row:
+    """The row of an evaluation: which completion, and what is said of its program."""
+    return {"task": completion.task, "prompt": completion.prompt, "index": completion.index, **told}
+
+
+def judgement(verdicts: list[Verdict]) -> Judgement:
+    """What the row of an evaluation says of a program."""
+    why = failure(verdicts)
+    return bounded(
+        {
+            "passed": why is None,
+            "failure": None if why is None else why.data(),
+            "verdicts": [verdict_data(verdict) for verdict in verdicts],
+        }
+    )
+
+
+def verdict_data(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as a row writes it."""
+    outcome = outcome_data(verdict.outcome)
+    return {
+        "world": verdict.world,
+        "satisfied": verdict.satisfied,
+        **{name: value for name, value in outcome.items() if name != "trace"},
+        "failed_checks": [requirement.text for requirement in verdict.failed],
+        "trace": outcome["trace"],
+    }
+
+
+WORDS = ("words_for_people", "words_for_yes", "words_for_no")
+"""Rules that are lists of words, and left out where they are empty."""
+
+
+def head(suite: Suite) -> dict[str, Any]:
+    """What KEY.json says beside the rows: by what they were judged."""
+    rules = suite.rules
+    return {
+        "suite": suite.name,
+        "version": suite.version,
+        "digest": suite.digest,
+        **({} if suite.worlds is None else {"worlds": suite.worlds, "seed": suite.seed}),
+        "rules": {
+            "literals": rules.literals,
+            "matching": rules.matching,
+            "people": rules.people,
+            **{name: list(words) for name in WORDS if (words := getattr(rules, name))},
+            **({"events": rules.events} if rules.events != PAPER.events else {}),
+            "limits": {
+                "seconds": rules.limits.seconds,
+                "calls": rules.limits.calls,
+                "ticks": rules.limits.ticks,
+            },
+            "skill_seconds": 0,
+            "clock_starts": rules.clock_starts.isoformat(),
+        },
+        "codebotler": __version__,
+        "python": ".".join(platform.python_version_tuple()[:2]),
+    }

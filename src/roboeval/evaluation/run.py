@@ -1,0 +1,299 @@
+"""A run: a folder with a model's completions and their evaluations, which survives every interruption."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from codebotler import __version__
+from codebotler.badinput import BadInput, read_text
+from codebotler.files import sync_folder, to_line, to_text, write_whole, written_whole
+from roboeval.evaluation.completions import (
+    COMPLETIONS,
+    EXAMPLE,
+    Completion,
+    read_completions,
+    recorded_completions,
+)
+from roboeval.evaluation.published import passed_over, published_completions
+from roboeval.suites.load import ABLATED, Suite
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where completions come from.
+
+    Args:
+        read: reads them from the start, each time it is called; each is one that the suite knows.
+        run: the run folder they stand in, if they do.
+        passed_over: what is to be said of what was not read there, once the rest has been.
+    """
+
+    read: Callable[[], Iterator[Completion]]
+    run: Run | None = None
+    passed_over: Callable[[], str | None] = lambda: None
+
+    def of(self, tasks: frozenset[str] | None) -> Iterator[Completion]:
+        """Read them again, those of some tasks or all.
+
+        Raises:
+            BadInput: one is wrong, or of a task or prompt that the suite does not know.
+        """
+        return (completion for completion in self.read() if tasks is None or completion.task in tasks)
+
+
+def open_source(text: str, suite: Suite) -> Source:
+    """Find out what completions a person means.
+
+    Args:
+        text: a run folder, a .jsonl file or a pipe, a folder or zip of published .py files, or
+            `recorded:NAME`.
+        suite: whose tasks and prompts they are of.
+
+    Raises:
+        BadInput: there is no such thing.
+    """
+    if not text:
+        raise BadInput("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
+    path = Path(text)
+    if text.partition(":")[0] == "recorded" and not path.exists():
+        return Source(lambda: recorded_completions(text, suite))
+    if not path.exists():
+        raise BadInput(
+            "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
+        )
+    if (path / COMPLETIONS).is_file():
+        return Run(path).source(suite)
+    if path.is_dir() or path.suffix == ".zip":
+        return Source(lambda: published_completions(path, suite), passed_over=lambda: passed_over(path))
+    if path.suffix == ".py":
+        raise BadInput(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
+    lines = path if path.is_file() else _spooled(path)
+    return Source(lambda: read_completions(lines, suite, name=path))
+
+
+def _spooled(path: Path) -> Path:
+    """A file with what a pipe says, since that is read more than once; it is gone when this process ends."""
+    with path.open("rb") as pipe, tempfile.TemporaryFile() as file:
+        try:
+            shutil.copyfileobj(pipe, file)
+            file.flush()
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
+        return Path(f"/proc/self/fd/{os.dup(file.fileno())}")
+
+
+@dataclass(frozen=True)
+class Run:
+    """The folder of a run.
+
+    Args:
+        path: where it is.
+    """
+
+    path: Path
+
+    @property
+    def completions(self) -> Path:
+        """The file of its completions."""
+        return self.path / COMPLETIONS
+
+    @property
+    def about(self) -> Path:
+        """The file that says who wrote the completions, and how they were asked for."""
+        return self.path / "run.json"
+
+    @property
+    def in_flight(self) -> Path:
+        """The file that notes requests for completions while they are under way."""
+        return self.path / "inflight.jsonl"
+
+    def rows(self, key: str) -> Path:
+        """The file of an evaluation's rows; `key` is the suite's name, with -ablation where ablated."""
+        return self.path / "evaluations" / f"{key}.jsonl"
+
+    def programs(self, key: str) -> Path:
+        """The file that says, line by line, the hash of the program that each row judges."""
+        return self.path / "evaluations" / f"{key}.sha256"
+
+    def head(self, key: str) -> Path:
+        """The file that says by what the rows of an evaluation were judged."""
+        return self.path / "evaluations" / f"{key}.json"
+
+    def checks(self, key: str) -> Path:
+        """The file of what a check said of its programs; `key` is the suite's name."""
+        return self.path / "checks" / f"{key}.jsonl"
+
+    def checks_head(self, key: str) -> Path:
+        """The file that says how they were checked."""
+        return self.path / "checks" / f"{key}.json"
+
+    def judged_by(self) -> list[str]:
+        """The names of the suites by which it was judged, sorted."""
+        keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
+        return sorted({key.removesuffix(ABLATED) for key in keys})
+
+    def source(self, suite: Suite | None = None) -> Source:
+        """Its completions; with a suite, all must be of tasks and prompts of it."""
+        return Source(lambda: read_completions(self.completions, suite, growing=True), self)
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Keep other processes from writing this run.
+
+        Raises:
+            BadInput: one is writing it, or the folder cannot be written, or is one of other things.
+        """
+        self._expect_no_others()
+        made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
+        lock = self.path / ".lock"
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except FileExistsError:
+            raise BadInput("is a file, but a run is a folder; name another", file=self.path) from None
+        except OSError as error:
+            raise BadInput(f"cannot be written ({error.strerror})", file=self.path) from None
+        if not _locked(descriptor):
+            os.close(descriptor)
+            raise BadInput("another process is writing this run; wait until it has ended", file=self.path)
+        try:
+            for folder in made:
+                sync_folder(folder.parent)
+            yield
+        except BaseException:
+            if made and list(self.path.iterdir()) == [lock]:
+                lock.unlink()
+                _remove_empty(made)
+            raise
+        finally:
+            os.close(descriptor)
+
+    def _expect_no_others(self) -> None:
+        """Refuse a folder that holds something, and is no run."""
+        if self.completions.exists() or self.about.exists() or not self.path.is_dir():
+            return
+        others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
+        if others:
+            raise BadInput(
+                f'is no run, but holds other files, such as "{others[0]}"; name a new folder', file=self.path
+            )
+
+    def keep(self, source: Source) -> int:
+        """Make this the run of a source's completions: copy them, unless they are here already.
+
+        Returns:
+            how many they are.
+
+        Raises:
+            BadInput: one of them is wrong, or other completions are here; then nothing is changed.
+            OSError: they cannot be written; then nothing is changed either.
+        """
+        models: set[str | None] = set()
+        count = 0
+        for completion in source.read():
+            models.add(completion.model)
+            count += 1
+        with self.writing():
+            if self.completions.exists():
+                self._expect(source)
+                return count
+            about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
+            write_whole(self.about, to_text(about))
+            try:
+                with written_whole(self.completions) as file:
+                    file.writelines(map(_line, source.read()))
+            except BaseException:
+                self.about.unlink()
+                raise
+        return count
+
+    def _expect(self, source: Source) -> None:
+        with self.completions.open("rb") as file:
+            same = all(file.read(len(line)) == line for line in map(_line, source.read()))
+            if not same or file.read(1):
+                raise BadInput("this run holds other completions; name another folder", file=self.path)
+
+
+PATIENCE = 20  # times that a lock is tried
+PAUSE = 0.05  # seconds between two
+
+
+def _locked(descriptor: int) -> bool:
+    """Lock a file; what a killed process was just starting may hold it for a moment longer."""
+    for _ in range(PATIENCE):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            time.sleep(PAUSE)
+        else:
+            return True
+    return False
+
+
+def _line(completion: Completion) -> bytes:
+    return to_line(completion.row)
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    with contextlib.suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
+
+
+def load_head(path: Path) -> dict[str, Any]:
+    """Read a KEY.json or run.json.
+
+    Raises:
+        BadInput: it is missing or no JSON object.
+    """
+    try:
+        data = json.loads(read_text(path))
+    except BadInput:
+        raise
+    except (ValueError, RecursionError):
+        data = None
+    if not isinstance(data, dict):
+        raise BadInput("is no JSON object", file=path)
+    return data
+
+
+def evaluation_key(suite: Suite, *, ablated: bool) -> str:
+    """The name of an evaluation's files."""
+    return suite.name + ABLATED * ablated
+
+
+def tasks_to_judge(
+    suite: Suite, names: str | None, *, ablated: bool
+) -> tuple[frozenset[str] | None, tuple[str, ...]]:
+    """Which tasks a person means, and those left out because they have no ablation.
+
+    Args:
+        suite: whose tasks.
+        names: separated by commas; None for all.
+        ablated: whether they need an ablation.
+
+    Raises:
+        BadInput: a task is unknown, or none of them has an ablation.
+    """
+    wanted = (
+        tuple(suite.tasks)
+        if names is None
+        else tuple(suite.task(name.strip()).name for name in names.split(","))
+    )
+    if not ablated:
+        return (None if names is None else frozenset(wanted)), ()
+    left = tuple(name for name in wanted if suite.tasks[name].ablation is None)
+    kept = frozenset(wanted) - frozenset(left)
+    if not kept:
+        raise BadInput(f"none of {', '.join(wanted)} has an ablation")
+    return kept, left

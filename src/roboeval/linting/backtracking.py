@@ -1,0 +1,157 @@
+"""Regexes, and functions that read texts, whose time grows faster than the text: found by measuring."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from random import Random
+from typing import Any
+
+from codebotler.rtl.pattern import compile_regex
+from roboeval.linting.sample_strings import inner_parts, parsed, spelled
+
+SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)
+"""Lengths of the texts that are tried, in characters."""
+
+FACTOR = 3
+LINEAR = 5.5
+"""How many times as long a text may take that is `FACTOR` times as long: 9 would be quadratic."""
+
+FLOOR = 0.001  # seconds below which a measurement says nothing
+ENOUGH = 0.02  # seconds beyond which no longer text is needed
+MOST = 40  # texts that are tried with a regex
+MANY = 50  # repetitions from which a repeat counts as one without an end
+
+FILLERS = (" ", "\n", "1", "a", "a ", "1 ", "a, ", "-", ",", "'", "no ", "not ")
+SUFFIXES = ("", "\0 x y z x y z")
+BLOCKS = 5
+
+
+@dataclass(frozen=True)
+class Attack:
+    """A text of any length that may take a regex long.
+
+    Args:
+        prefix: how it begins.
+        unit: what follows, again and again.
+        suffix: how it ends.
+        blocks: how often it begins anew.
+    """
+
+    prefix: str
+    unit: str
+    suffix: str = ""
+    blocks: int = 1
+
+    def text(self, size: int) -> str:
+        """The text of about so many characters."""
+        block = self.prefix + self.unit * max(1, size // len(self.unit) // self.blocks)
+        return block * self.blocks + self.suffix
+
+
+def is_superlinear(read: Callable[[str], object], attack: Attack) -> bool:
+    """Whether reading a text takes much more time where the text is longer.
+
+    Args:
+        read: what reads it.
+        attack: the text.
+    """
+    for size in SIZES:
+        spent = _seconds(read, attack.text(size))
+        if spent < FLOOR:
+            continue
+        shorter = _seconds(read, attack.text(size // FACTOR))
+        if spent > LINEAR * shorter:  # or the machine was busy
+            shorter = min(shorter, *(_seconds(read, attack.text(size // FACTOR)) for _ in range(2)))
+            spent = min(spent, *(_seconds(read, attack.text(size)) for _ in range(2)))
+            if spent > max(FLOOR, LINEAR * shorter):
+                return True
+        if spent > ENOUGH:
+            return False
+    return False
+
+
+def _seconds(read: Callable[[str], object], text: str) -> float:
+    start = time.thread_time()
+    read(text)
+    return time.thread_time() - start
+
+
+@cache
+def slow_text(pattern: str) -> Attack | None:
+    """A text on which finding a regex takes more than linear time; None where none was found.
+
+    Args:
+        pattern: the regex, as RTL understands it.
+    """
+    find = compile_regex(pattern).findall
+    return next((attack for attack in drawn(pattern) if is_superlinear(find, attack)), None)
+
+
+def drawn(pattern: str) -> list[Attack]:
+    """Some of the texts that may take a regex long, the same ones each time.
+
+    Args:
+        pattern: the regex.
+    """
+    every = [*attacks(pattern)]
+    return Random(pattern).sample(every, min(MOST, len(every)))  # noqa: S311 - no secret
+
+
+def attacks(pattern: str) -> Iterator[Attack]:
+    """Texts that may take a regex long: near misses that repeat what it repeats; none if it repeats nothing.
+
+    Args:
+        pattern: the regex.
+    """
+    tree = parsed(pattern)
+    repeats = [*_repeats(list(tree), ("",))]
+    units = dict.fromkeys(unit for _, several in repeats for unit in several)
+    if not units:
+        return
+    pairs = dict.fromkeys(
+        (prefix, unit)
+        for prefixes, several in repeats
+        for prefix in dict.fromkeys(["", *prefixes])
+        for unit in dict.fromkeys([*several, *(prefix + one for one in (*several, " ") if prefix)])
+    )
+    pairs.update(dict.fromkeys(product([""], [*FILLERS, *filter(None, spelled(tree)[:3])])))
+    suffixes = [*SUFFIXES, *(f" {text}" for text in _denied(tree))]
+    yield from (Attack(*pair, suffix) for pair in pairs for suffix in suffixes)
+    yield from (Attack(*pair, SUFFIXES[-1], BLOCKS) for pair in pairs if pair[0])
+
+
+def _repeats(items: Sequence[Any], before: Sequence[str]) -> Iterator[tuple[Sequence[str], list[str]]]:
+    """For each repeat without an end: texts that lead to it, and what may be repeated."""
+    for at, (op, value) in enumerate(items):
+        if (inner := _repeated(str(op), value)) is not None:
+            several = [unit for unit in spelled(inner)[:3] if unit]
+            behind = _until_next_repeat(items[at + 1 :])
+            yield before, [*several, *(unit + more for unit in several[:1] for more in behind)]
+        for part in inner_parts(str(op), value):
+            yield from _repeats(list(part), before)
+        following = [text for text in spelled([(op, value)]) if text][:2] or [""]
+        before = [*dict.fromkeys(one + other for one in before for other in following)][:2]
+
+
+def _until_next_repeat(items: Sequence[Any]) -> list[str]:
+    upto = next((n for n, (op, v) in enumerate(items) if _repeated(str(op), v) is not None), len(items))
+    return [
+        text for text in dict.fromkeys([*spelled(items[:upto])[:2], *spelled(items[:upto], " ")[:2]]) if text
+    ]
+
+
+def _denied(items: Sequence[Any]) -> Iterator[str]:
+    """What must not follow somewhere, and so makes a search fail at the end of a text."""
+    for op, value in items:
+        if str(op) == "ASSERT_NOT":
+            yield from spelled(value[-1], " ")[-1:]
+        for part in inner_parts(str(op), value):
+            yield from _denied(part)
+
+
+def _repeated(op: str, value: Any) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
+    return value[2] if op in ("MAX_REPEAT", "MIN_REPEAT") and value[1] >= MANY else None

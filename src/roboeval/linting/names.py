@@ -1,0 +1,85 @@
+"""What requirements name: rooms, things and people, and whether a world has them."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TypeAlias
+
+from codebotler.rtl import Element
+from codebotler.syntaxtree import parse_expression
+from codebotler.world import Room
+from roboeval.linting.alphabet import elements
+from roboeval.linting.sample_strings import alternatives, is_among, patterns, spelled_out
+from roboeval.suites.load import Requirement, Scenario, Task
+
+ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
+
+_Named: TypeAlias = tuple[str, str, Sequence[str]]
+"""Of what sort something is, what it is called, and what of this sort a world has."""
+
+
+def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
+    """What a requirement names and its world lacks: of what sort it is, and what it is called.
+
+    What is said or asked may also name a person who only has an office or a lab in the world.
+
+    Args:
+        requirement: of the scenario.
+        scenario: of the task.
+        task: whose worlds tell what is the name of a person.
+    """
+    for what, name, known in _named(requirement, scenario.world.rooms, task):
+        if not is_among(name, known):
+            yield what, name
+
+
+def _named(requirement: Requirement, rooms: Sequence[Room], task: Task) -> Iterator[_Named]:
+    objects = [label for room in rooms for label in room.objects]
+    people = [person.name for room in rooms for person in room.people]
+    sorts: dict[str, tuple[str, list[str]]] = {
+        "goto": ("room", [room.name for room in rooms]),
+        "pick": ("object", objects),
+        "place": ("object", objects),
+        "check": ("object or person", [*objects, *people, *ANYBODY]),
+    }
+    for element in elements(requirement.formula):
+        if element.kind in sorts:
+            what, known = sorts[element.kind]
+            found = (one for pattern in patterns(element.text) for one in alternatives(pattern))
+            yield from ((what, one, known) for one in found)
+        else:
+            yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
+    check = next(check for check in task.checks if check.name == requirement.check)
+    for parameter, argument in zip(check.parameters, _arguments(requirement), strict=True):
+        if parameter == "person" or argument.lower() in _people(task):
+            yield "person", argument, people
+
+
+def _mentioned(element: Element, task: Task) -> Iterator[str]:
+    """The names, of people in some world of the task, that stand in what is said or asked."""
+    texts = [text for text in (element.text, element.options) if text is not None]
+    spelled = [part.lower() for text in texts for one in patterns(text) for part in spelled_out(one)]
+    for name in sorted(_people(task)):
+        if any(re.search(rf"\b{re.escape(name)}\b", part) for part in spelled):
+            yield name
+
+
+def _people(task: Task) -> set[str]:
+    """Who is in some world of a task, or has an office or a lab there; their names in small letters."""
+    scenarios = (*task.scenarios, *(task.ablation or ()))
+    rooms = [room for scenario in scenarios for room in scenario.world.rooms]
+    names = [*(person.name for room in rooms for person in room.people), *_owners(rooms)]
+    return {name.lower() for name in names}
+
+
+def _owners(rooms: Iterable[Room]) -> list[str]:
+    owners = (re.fullmatch(r"(.+)'s (?:office|lab)", room.name, re.IGNORECASE) for room in rooms)
+    return [owner[1] for owner in owners if owner]
+
+
+def _arguments(requirement: Requirement) -> list[str]:
+    call = parse_expression(requirement.text.strip().removeprefix("not "))
+    values = call.args if isinstance(call, ast.Call) else []
+    return [str(value.value) for value in values if isinstance(value, ast.Constant)]

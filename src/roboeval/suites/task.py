@@ -1,0 +1,128 @@
+"""Tasks: what is asked of a robot, in which worlds, and which requirements each world has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from codebotler.english import counted
+from codebotler.rtl import Formula
+from codebotler.world import World
+from roboeval.suites.schema import Ability, Category
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """What the trace of a program must satisfy in a world (paper, section IV.B).
+
+    Args:
+        text: as the task file says it, such as `not greets("amy")`.
+        check: the name of the check that it applies.
+        formula: the constraint, negated where the text says so.
+        category: the class of failure if it does not hold.
+        line: where it stands in the task file.
+    """
+
+    text: str
+    check: str
+    formula: Formula = field(repr=False)
+    category: Category
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A world and what it requires; with `ablation` only common sense is required of it."""
+
+    world: World
+    require: tuple[Requirement, ...]
+
+    def __repr__(self) -> str:
+        return f"Scenario({self.world!r}, {counted(len(self.require), 'requirement')})"
+
+
+@dataclass(frozen=True)
+class Fact:
+    """Something the requirements rest on.
+
+    Args:
+        fact: what it is, in a sentence.
+        words: regexes; at least one is found in every prompt, or none in any where it is common sense.
+        commonsense: whether the model must know it without being told.
+    """
+
+    fact: str
+    words: tuple[str, ...]
+    commonsense: bool = False
+
+
+@dataclass(frozen=True)
+class Check:
+    """A named constraint of a task.
+
+    Args:
+        name: how requirements call it.
+        parameters: names of what is put into its text.
+        category: the class of failure if it does not hold.
+        rtl: the constraint with `{parameter}` where an argument goes.
+        commonsense: whether it tests what nobody told the model.
+        line: where it stands in the task file.
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    category: Category
+    rtl: str
+    commonsense: bool
+    line: int | None = None
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A finding of the linter that is there on purpose."""
+
+    finding: str
+    because: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """One task of a suite: prompts, worlds, requirements (paper, section IV).
+
+    Args:
+        name: as rows of completions call it.
+        summary: what it is about, in a sentence.
+        abilities: what it takes.
+        prompts: phrasings of the same instruction.
+        facts: what the requirements rest on.
+        checks: the named constraints.
+        scenarios: the worlds with their requirements.
+        ablation: the same with the requirements of common sense only; None where the task has none.
+        accepted: findings of the linter that are there on purpose.
+        path: the file it was read from.
+        borrows: whether its instruction is that of a task that ships with the package.
+        drawn: whether its worlds are drawn from a description.
+        phrases: regexes for what can be said in many words, by the name that stands for them in checks.
+    """
+
+    name: str
+    summary: str
+    abilities: tuple[Ability, ...]
+    prompts: tuple[str, ...]
+    facts: tuple[Fact, ...]
+    checks: tuple[Check, ...]
+    scenarios: tuple[Scenario, ...]
+    ablation: tuple[Scenario, ...] | None
+    accepted: tuple[Accepted, ...]
+    path: Path
+    borrows: bool = False
+    drawn: bool = False
+    phrases: tuple[tuple[str, tuple[str, ...]], ...] = ()
+
+    def __repr__(self) -> str:
+        prompts, worlds = counted(len(self.prompts), "prompt"), counted(len(self.scenarios), "world")
+        return f"Task({self.name!r}, {prompts}, {worlds})"
+
+    def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
+        """The worlds and requirements by which programs are judged; none if there is no ablation."""
+        return (self.ablation or ()) if ablated else self.scenarios

@@ -1,0 +1,110 @@
+"""Groups of failures: who is together, in which order, and what is said of them."""
+
+import json
+from typing import Any
+
+from made_up_runs import SUITE
+from roboeval.analysis.cluster import cluster_data, cluster_view, clusters, groups, trimmed
+from roboeval.evaluation.completions import Key
+from small_run import HOSTILE, SHOWN, printed
+
+GOES = """\
+def task_program():
+    here = "{0}"
+    go_to(here)
+    go_to("hall")
+    say("hello")
+    say("you")
+    say("all")
+"""
+RIGHT = GOES.format("hall").replace("you", "me")
+
+
+def failed(prompt: int, index: int, *, task: str = "Visit", check: str = "visits()") -> dict[str, Any]:
+    verdict = {
+        "world": "w",
+        "satisfied": False,
+        "status": "finished",
+        "error": None,
+        "line": None,
+        "failed_checks": [check],
+        "trace": [["goto", "hall"]],
+    }
+    why = {"class": "TaskCompletionError", "kind": "Location", "world": 1, "check": check}
+    first = {**verdict, "satisfied": True, "failed_checks": [], "trace": [["say", "x"]]}
+    return {
+        "task": task,
+        "prompt": prompt,
+        "index": index,
+        "passed": False,
+        "failure": why,
+        "verdicts": [first, verdict],
+    }
+
+
+def test_same_task_same_check_similar_program() -> None:
+    rows = [failed(0, 0), failed(0, 1), failed(1, 0), failed(0, 2), failed(0, 3, check="other()")]
+    programs: dict[Key, str] = {
+        ("Visit", 0, 0): GOES.format("lab"),
+        ("Visit", 0, 1): GOES.format("lab").replace("here", "there"),
+        ("Visit", 1, 0): GOES.format("room"),
+        ("Visit", 0, 2): "def task_program():\n    pass\n",
+        ("Visit", 0, 3): GOES.format("lab"),
+    }
+    rows.append(failed(0, 0, task="FindBook"))
+    programs["FindBook", 0, 0] = GOES.format("lab")
+    found = [
+        [(row["task"], row["prompt"], row["index"]) for row in those] for those in groups(rows, programs)
+    ]
+    assert found == [
+        [("Visit", 0, 0), ("Visit", 0, 1), ("Visit", 1, 0)],
+        [("FindBook", 0, 0)],
+        [("Visit", 0, 2)],
+        [("Visit", 0, 3)],
+    ]
+
+
+def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
+    rows = [trimmed(failed(0, n)) for n in range(3)]
+    programs = {("Visit", 0, 0): "pass", ("Visit", 0, 1): program, ("Visit", 0, 2): program}
+    programs["Visit", 4, 0] = RIGHT
+    together = [[*rows]]
+    (one,) = clusters(together, [("Visit", 4, 0)], programs, SUITE)
+    return one
+
+
+def test_the_representative_is_of_the_most_frequent_program() -> None:
+    one = told()
+    assert one.representative == ("Visit", 0, 1)
+    assert len(one.members) == 3
+    assert one.prompts == [0]
+    assert one.fix.name == "Visit/4/0"
+    assert one.fix.changed == 4
+
+
+def test_a_group_for_machines() -> None:
+    data = json.loads(json.dumps(cluster_data(told())))
+    assert (data["size"], data["representative"], data["world"]) == (3, "Visit/0/1", "w")
+    assert '+    say("me")' in data["fix"]["difference"]
+
+
+def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
+    shown = printed(cluster_view(told(f"say({HOSTILE}")), width=200)
+    assert SHOWN.removesuffix("\\n") in shown
+    assert "\x1b" not in shown
+    assert shown.startswith("3 completions of Visit, TaskCompletionError: Location")
+
+
+def test_programs_that_are_gone() -> None:
+    rows = [failed(0, 0), failed(0, 1)]
+    (group,) = groups(rows, {})
+    (one,) = clusters([group], [], {}, SUITE)
+    assert one.program is None
+    assert one.fix is None
+    assert "no longer stands" in printed(cluster_view(one), width=200)
+
+
+def test_only_the_world_that_decides_keeps_its_trace() -> None:
+    kept = trimmed(failed(0, 0))
+    assert kept["verdicts"][0] == {"world": "w"}
+    assert kept["verdicts"][1]["trace"] == [["goto", "hall"]]

@@ -1,0 +1,162 @@
+"""Comparing two runs: by hand, and as a person meets it."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput
+from command_line import refused, roboeval
+from made_up_runs import SUITE
+from roboeval.analysis.compare import (
+    compared,
+    comparison_data,
+    expect_same_suite,
+    render,
+    to_tell,
+    unlike,
+    verdict,
+)
+from small_run import HOSTILE, SHOWN, printed
+
+FIRST = {("A", 0): 0.5, ("A", 1): 0.5, ("B", 0): 0.2, ("C", 0): 1.0}
+SECOND = {("A", 0): 0.7, ("A", 1): 0.9, ("B", 0): 0.2, ("D", 0): 1.0}
+
+
+def test_paired_by_prompt() -> None:
+    found = compared(FIRST, SECOND)
+    assert (found.prompts, found.left_out) == (3, 2)
+    assert (found.first, found.second) == pytest.approx((0.4, 0.6))
+    assert found.over_tasks.mean == found.over_prompts.mean == pytest.approx(0.2)
+    assert [(one.task, one.prompts) for one in found.tasks] == [("A", 2), ("B", 1)]
+    assert [one.share for one in found.tasks] == pytest.approx([0.2, 0.0])
+    assert sum(one.share for one in found.tasks) == pytest.approx(found.over_tasks.mean)
+    assert found.p_tasks == 1.0  # with one sign for A and one for B, which adds nothing
+    assert found.p_prompts == 0.5
+
+
+def test_the_other_way_round() -> None:
+    one, other = compared(FIRST, SECOND), compared(SECOND, FIRST)
+    assert one.over_tasks.low == pytest.approx(-other.over_tasks.high)
+    assert one.p_prompts == other.p_prompts
+    assert one.needed == other.needed
+
+
+def test_no_prompt_in_common() -> None:
+    with pytest.raises(BadInput, match="no prompt"):
+        compared({("A", 0): 1.0}, {("A", 1): 1.0})
+
+
+def test_verdicts() -> None:
+    def said(differences: list[float], tasks: int) -> str:
+        a = {(f"T{i % tasks}", i): 0.4 for i in range(len(differences))}
+        b = {key: 0.4 + d for key, d in zip(a, differences, strict=True)}
+        return verdict(compared(a, b), ("one", "two"))
+
+    assert "equally" in said([0.0] * 4, 4)
+    assert "two is better than one by 10.0 points; tasks" in said([0.1] * 10, 10)
+    assert "one is better than two by 10.0 points on prompts of these tasks" in said([-0.1] * 10, 2)
+    assert "chance" in said([0.3, -0.2], 2)
+    assert said([0.1, 0.2, -0.3], 3) == said([0.0] * 4, 4)  # but for the last digit
+
+
+def test_how_much_it_takes_is_said() -> None:
+    (alike,) = to_tell(compared(FIRST, FIRST))
+    assert not re.search(r"\d", alike)
+    told = to_tell(compared(FIRST, SECOND))
+    assert re.search(r"\b25 completions .*\b75\b", told[0])
+    assert re.search(r"\b8\b", told[1])
+
+
+def test_names_are_text() -> None:
+    found = compared(FIRST, SECOND)
+    assert SHOWN.split("\\n", maxsplit=1)[0][:10] in printed(render(found, (HOSTILE, "b")), width=200)
+    assert json.loads(json.dumps(comparison_data(found, (HOSTILE, "b"))))["prompts"] == 3
+
+
+def test_what_is_unlike() -> None:
+    one = {
+        "python": "3.11",
+        "codebotler": "1",
+        "template": "a",
+        "settings": {"temperature": 0.2, "seed": None},
+    }
+    two = {"python": "3.12", "codebotler": "1", "template": "b", "settings": {"temperature": 0.8, "seed": 1}}
+    assert unlike(one, one) == []
+    for sentence, (name, values) in zip(
+        unlike(one, two),
+        [
+            ("Python", "3.11 and 3.12"),
+            ("template", "a and b"),
+            ("seed", "none and 1"),
+            ("temperature", "0.2 and 0.8"),
+        ],
+        strict=True,
+    ):
+        assert name in sentence
+        assert sentence.endswith(values)
+    (unknown,) = unlike(one, {"python": "3.11"})
+    assert "settings" in unknown
+    for wrong in ([1, 2], "abc", 3):
+        assert unlike(one, {**one, "settings": wrong}) == [unknown]
+
+
+def test_other_suites_are_refused() -> None:
+    again = {"a": "roboeval evaluate a", "b": "roboeval evaluate b --suite mine"}
+    expect_same_suite({"a": {"digest": "1"}, "b": {"digest": "1"}}, SUITE, again)
+    with pytest.raises(BadInput, match=r"\bb and a\b.* \(1 and 00000000\)") as e:
+        expect_same_suite({"a": {"digest": SUITE.digest}, "b": {"digest": "1"}}, SUITE, again)
+    assert "`roboeval evaluate b --suite mine --redo`" in str(e.value)
+
+
+def test_a_bootstrap_of_few_tasks_is_not_to_be_quoted() -> None:
+    def shown(tasks: int) -> str:
+        a = {(f"T{n}", 0): n / 10 for n in range(tasks)}
+        return printed(render(compared(a, {key: value / 2 for key, value in a.items()}), ("a", "b")))
+
+    assert re.search(r"by bootstrap .* too narrow", shown(7))
+    assert "too narrow" not in shown(8)
+
+
+def test_one_prompt_is_not_many() -> None:
+    assert "over 1 prompt " in printed(render(compared({("A", 0): 1}, {("A", 0): 0}), ("a", "b")))
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    for name in ("hasty", "careful"):
+        made = roboeval(
+            "evaluate", f"recorded:{name}", "--tasks", "LunchTime,SayGoodDay", "--out", name, cwd=folder
+        )
+        assert made.status == 0, made
+    return folder
+
+
+def test_the_command(runs: Path) -> None:
+    made = roboeval("compare", "hasty", "careful", cwd=runs)
+    assert made.status == 0, made
+    assert made.out.startswith("careful is better than hasty by ")
+    assert made.err == ""
+    data = json.loads(roboeval("compare", "hasty", "careful", "--json", cwd=runs).out)
+    assert data["prompts"] == 10
+    assert data["p"]["tasks"] == 0.5
+    assert data["warnings"] == []
+
+
+def test_the_command_warns_and_refuses(runs: Path) -> None:
+    head = runs / "hasty" / "evaluations" / "paper.json"
+    kept = head.read_text()
+    head.write_text(json.dumps(json.loads(kept) | {"python": "3.99"}))
+    warned = roboeval("compare", "careful", "hasty", cwd=runs)
+    assert "warning: the Python versions" in warned.err
+    assert warned.status == 0
+    head.write_text(json.dumps(json.loads(kept) | {"digest": "1"}))
+    ended = roboeval("compare", "careful", "hasty", cwd=runs)
+    head.write_text(kept)
+    assert ended.status == 2
+    assert re.search(r"\(1 and [0-9a-f]{8}\)", ended.err)
+    refusal = refused("compare", runs / "careful", "none")
+    assert refusal.at == ("none", None)
+    assert "completions.jsonl" in refusal.sentence

@@ -1,0 +1,133 @@
+"""What asking again would have given: exact chances against draws, and the figures of a small run."""
+
+import random
+from typing import Any
+
+import pytest
+
+from roboeval.analysis.resample import (
+    LIMITS,
+    Chances,
+    Trial,
+    by_prompt,
+    chances,
+    curve_data,
+    ran,
+    render,
+    resampled,
+)
+from small_run import printed, row
+
+GOOD = Trial(accepted=True, ran=True, passed=True)
+WRONG = Trial(accepted=True, ran=True, passed=False)
+UNSEEN = Trial(accepted=True, ran=False, passed=False)
+REJECTED = Trial(accepted=False, ran=False, passed=False)
+UNJUST = Trial(accepted=False, ran=True, passed=True)
+
+
+def drawn(trials: list[Trial], retries: int, chance: random.Random) -> Trial:
+    trial = chance.choice(trials)
+    while retries and not trial.accepted:
+        trial, retries = chance.choice(trials), retries - 1
+    return trial
+
+
+@pytest.mark.parametrize("retries", [0, 1, 2, 4, 8])
+def test_chances_are_what_many_draws_come_to(retries: int) -> None:
+    trials = [GOOD, WRONG, UNSEEN, UNJUST, *[REJECTED] * 6]
+    chance = random.Random(11)
+    times = 20_000
+    results = [drawn(trials, retries, chance) for _ in range(times)]
+    exact = chances(trials, retries)
+    for name in ("accepted", "ran", "passed"):
+        share = sum(getattr(trial, name) for trial in results) / times
+        assert getattr(exact, name) == pytest.approx(share, abs=0.012), name
+
+
+def test_without_retries_it_is_the_plain_share() -> None:
+    trials = [GOOD, WRONG, REJECTED, UNJUST]
+    exact = chances(trials, 0)
+    assert (exact.accepted, exact.ran, exact.passed) == pytest.approx((2 / 4, 3 / 4, 2 / 4))
+
+
+def test_one_retry_by_hand() -> None:
+    # One of two is accepted, and passes: it is drawn at once, or in the second of two draws.
+    assert chances([GOOD, REJECTED], 1) == Chances(accepted=3 / 4, ran=3 / 4, passed=3 / 4)
+
+
+def test_where_none_or_all_are_accepted_retries_change_nothing() -> None:
+    for retries in LIMITS:
+        assert chances([REJECTED, UNJUST], retries) == Chances(accepted=0, ran=1 / 2, passed=1 / 2)
+        assert chances([GOOD, WRONG], retries) == Chances(accepted=1, ran=1, passed=1 / 2)
+
+
+def test_of_nothing_nothing_is_expected() -> None:
+    with pytest.raises(ValueError, match="nothing to expect"):
+        chances([], 0)
+    with pytest.raises(ValueError, match="-1 retries"):
+        chances([GOOD], -1)
+
+
+def verdict(status: str, *, satisfied: bool = False, failed: tuple[str, ...] = ()) -> dict[str, Any]:
+    return {"status": status, "satisfied": satisfied, "failed_checks": list(failed)}
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "expected"),
+    [
+        ([verdict("finished"), verdict("finished", satisfied=True)], True),
+        ([verdict("finished"), verdict("robot-error")], False),
+        ([verdict("python-error")], False),
+        ([verdict("killed")], False),
+        ([verdict("timeout")], False),
+        ([verdict("timeout", satisfied=True)], True),
+        ([verdict("timeout", failed=("greets",))], True),
+    ],
+)
+def test_what_runs_at_all(verdicts: list[dict[str, Any]], expected: bool) -> None:  # noqa: FBT001 - a table
+    assert ran({**row(0, 0), "verdicts": verdicts}) is expected
+
+
+PROMPTS = by_prompt(
+    [(("Visit", 1, i), REJECTED) for i in range(4)]
+    + [(("Visit", 0, i), GOOD if i == 0 else REJECTED) for i in range(4)]
+)
+
+
+def test_limits_over_prompts() -> None:
+    none, hundred = resampled(PROMPTS, 0), resampled(PROMPTS, 100)
+    assert none.passed.mean == pytest.approx(1 / 8)
+    assert none.prompts == {0.25: 1 / 2, 0.5: 0, 0.75: 0, 1.0: 0}
+    assert hundred.passed.mean == pytest.approx(1 / 2)
+    assert hundred.prompts[1.0] == 1 / 2  # but for one time in a trillion, a good program is drawn
+    assert hundred.accepted == pytest.approx(1 / 2)
+
+
+def test_data_of_both_figures() -> None:
+    data = curve_data(PROMPTS, LIMITS)
+    assert [limit["retries"] for limit in data["limits"]] == [0, 2, 4, 8, 100]
+    assert data["prompts"][0]["pass@1"]["2"] == pytest.approx(1 - (3 / 4) ** 3)
+    assert data["prompts"][1] == {
+        "task": "Visit",
+        "prompt": 1,
+        "completions": 4,
+        "accepted": 0,
+        "passed": 0,
+        "pass@1": dict.fromkeys(["0", "2", "4", "8", "100"], 0),
+    }
+    after = data["accepted_after"]
+    assert len(after) == 101
+    assert after == sorted(after)
+    assert after[0] == pytest.approx(1 / 8)
+
+
+def test_the_table_names_prompts_without_hope() -> None:
+    shown = printed(render(PROMPTS, LIMITS, title="runs/x"))
+    assert "no completion of 1 prompt " in shown
+    assert [line.split()[:2] for line in shown.splitlines() if line.strip()[:1].isdigit()] == [
+        ["0", "0.125"],
+        ["2", "0.289"],
+        ["4", "0.381"],
+        ["8", "0.462"],
+        ["100", "0.500"],
+    ]

@@ -1,0 +1,133 @@
+"""Looking through all traces of a run by a formula."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.files import to_line
+from command_line import refused, roboeval
+from roboeval.analysis import search as searching
+from roboeval.analysis.search import Found, Question, search
+
+
+def row(index: int, *traces: list[list[object]], passed: bool = False, task: str = "Visit") -> dict[str, Any]:
+    verdicts = [
+        {"world": f"World {n}", "satisfied": passed, "status": "finished", "error": None, "line": None}
+        | {"failed_checks": [], "trace": trace}
+        for n, trace in enumerate(traces, 1)
+    ]
+    why = None if passed else {"class": "TaskCompletionError", "kind": "Location", "world": 0, "check": "c"}
+    return {"task": task, "prompt": 0, "index": index, "passed": passed, "failure": why, "verdicts": verdicts}
+
+
+ROWS = [
+    row(0, [["goto", "hall"]], [["say", "x"]]),
+    row(1, [["say", "hall"]], [["goto", "the hall"]], passed=True),
+    row(2, [], []),
+    row(3, [["goto", "hall"]], [["goto", "hall"]], task="Wait"),
+]
+
+
+def found(question: Question, rows: list[dict[str, Any]] | None = None) -> list[Found]:
+    return [one for one in search(map(to_line, ROWS if rows is None else rows), question) if one.worlds]
+
+
+HALL = 'tr.Exists(goto("hall"))'
+
+
+def test_a_formula_is_tried_in_every_world() -> None:
+    assert [(one.key[2], [n for n, _ in one.worlds]) for one in found(Question(HALL))] == [
+        (0, [1]),
+        (1, [2]),
+        (3, [1, 2]),
+    ]
+    negated = found(Question(HALL, negated=True))
+    assert [(one.key[2], [n for n, _ in one.worlds]) for one in negated] == [(0, [2]), (1, [1]), (2, [1, 2])]
+
+
+def test_narrowed_to_a_task_or_a_world() -> None:
+    assert [one.key[2] for one in found(Question(HALL, task="Wait"))] == [3]
+    assert [one.key[2] for one in found(Question(HALL, world="2"))] == [1, 3]
+    assert [one.key[2] for one in found(Question(HALL, world="world 1"))] == [0, 3]
+    assert len(found(Question())) == 4
+
+
+def test_only_failures_bring_their_rows() -> None:
+    assert [one.row is None for one in found(Question(HALL))] == [False, True, False]
+
+
+def test_what_cannot_be_judged_does_not_match() -> None:
+    asks = row(0, [["ask", "tea?", [{"no text": "1"}], None]])
+    formula = 'tr.Exists(ask("tea", "yes"))'
+    assert found(Question(formula), [asks]) == []
+    assert len(found(Question(formula, negated=True), [asks])) == 1
+
+
+def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(searching, "BATCH", 3)
+    monkeypatch.setattr(searching, "SMALL", 2)
+    rows = [{**ROWS[n % 4], "index": n} for n in range(50)]
+    lines = list(map(to_line, rows))
+    assert list(search(lines, Question(HALL), workers=2)) == list(search(lines, Question(HALL)))
+
+
+@pytest.mark.parametrize("line", [b"{}\n", b"x\n", b"[]\n", to_line({**ROWS[0], "verdicts": [{}]})])
+def test_a_line_that_is_no_row(line: bytes) -> None:
+    with pytest.raises(BadInput, match="no row"):
+        list(search([line], Question(HALL)))
+
+
+# --- the command
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    made = roboeval(
+        "evaluate", "recorded:hasty", "--tasks", "GrilledCheese,SayGoodDay", "--out", "run", cwd=folder
+    )
+    assert made.status == 0, made
+    return folder / "run"
+
+
+def test_the_command(runs: Path) -> None:
+    made = roboeval("find", runs, 'tr.Exists(goto("lab"))', "--task", "SayGoodDay")
+    assert made.status == 0, made
+    assert made.out.startswith("found ")
+    assert "GrilledCheese" not in made.out
+    of_the_task = json.loads(roboeval("find", runs, "--task", "SayGoodDay", "--json").out)
+    assert of_the_task["looked_at"] == len(of_the_task["found"]) > 0
+    assert f" of {of_the_task['looked_at']} completions" in made.out
+    assert " passes, and differs in " in made.out
+    data = json.loads(roboeval("find", runs, "--json").out)
+    assert data["looked_at"] == len(data["found"])
+    failed = sum(not one["passed"] for one in data["found"])
+    assert sum(group["size"] for group in data["groups"]) == failed > 0
+    assert all(group["why"] for group in data["groups"])
+    few = roboeval("find", runs, "--groups", "1").out
+    assert "--groups" in few
+
+
+def test_what_is_refused(runs: Path) -> None:
+    said = refused("find", runs, 'tr.Exist(goto("lab"))').sentence
+    for name in ("column 4", "Exist;", "Exists?"):
+        assert name in said
+    assert refused("find", runs, "--not").sentence.startswith("--not ")
+    assert '"Nothing"' in refused("find", runs, "--task", "Nothing").sentence
+    said = refused("find", runs, "--task", "SayGoodDay", "--world", "99").sentence
+    assert "SayGoodDay" in said
+    assert '"99"' in said
+
+
+def test_rows_about_other_programs_are_refused(runs: Path) -> None:
+    file = runs / "completions.jsonl"
+    kept = file.read_text()
+    file.write_text(kept.replace("def task_program", "def  task_program"))
+    ended = roboeval("find", runs)
+    file.write_text(kept)
+    assert ended.status == 2
+    assert "run/completions.jsonl" in ended.err
+    assert "--redo" in ended.err

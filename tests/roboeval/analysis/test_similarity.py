@@ -1,0 +1,93 @@
+"""Shapes of programs, what two share, and the shortest way from one to another."""
+
+from collections import Counter
+
+import pytest
+
+from roboeval.analysis.similarity import LONGEST, passing, shape, shortest_fix, similarity
+
+ONE = """\
+def task_program():
+    'Go.'
+    start = get_current_location()  # here
+    go_to(start)
+    for n in range(3):
+        say(n)
+"""
+OTHER = """\
+def task_program():
+    'Go there.'
+    here = get_current_location()
+    go_to( here )
+
+    for i in range(3):
+        say(i)
+"""
+
+
+def test_names_comments_and_layout_are_no_shape() -> None:
+    assert shape(ONE) == shape(OTHER)
+    assert "    name1 = get_current_location()" in shape(ONE)
+    assert shape(ONE) != shape(ONE.replace("range(3)", "range(4)"))
+    assert shape(ONE) != shape(ONE.replace("say", "ask"))
+
+
+def test_different_names_stay_different() -> None:
+    assert shape("a = 1\nb = 2\nsay(a)\n") == shape("x = 1\ny = 2\nsay(x)\n")
+    assert shape("a = 1\nb = 2\nsay(a)\n") != shape("a = 1\nb = 2\nsay(b)\n")
+
+
+def test_functions_and_their_arguments_have_chosen_names() -> None:
+    program = "def {0}({1}):\n    try:\n        go_to({1})\n    except Exception as {2}:\n        say({2})\n"
+    assert shape(program.format("visit", "room", "error")) == shape(program.format("f", "x", "e"))
+
+
+@pytest.mark.parametrize(
+    "program", ["def task_program(:\n    go\n", "", "\0", "x" * (LONGEST + 1), "(" * 5_000, "-" * 5_000 + "1"]
+)
+def test_any_text_has_a_shape(program: str) -> None:
+    assert isinstance(shape(program), tuple)
+
+
+def test_similarity_by_hand() -> None:
+    one, other = Counter(["a", "b", "b", "c"]), Counter(["a", "b", "d"])
+    assert similarity(one, other) == 2 * 2 / 7
+    assert similarity(one, one) == 1.0
+    assert similarity(Counter(), Counter()) == 1.0
+
+
+def test_the_shortest_fix() -> None:
+    wrong = "def task_program():\n    go_to('hall')\n    say('x')\n"
+    near = wrong.replace("'x'", "'y'")
+    far = "def task_program():\n    pass\n"
+    fix = shortest_fix(wrong, passing([("far", far), ("near", near), ("again", near)]))
+    assert fix is not None
+    assert (fix.name, fix.changed) == ("near", 2)
+    assert fix.changes[-2:] == (("-", "    say('x')"), ("+", "    say('y')"))
+    assert shortest_fix(wrong, []) is None
+
+
+def test_of_equally_near_programs_the_first() -> None:
+    fix = shortest_fix("a\nb\n", passing([("one", "a\nc\n"), ("two", "a\nd\n")]))
+    assert fix is not None
+    assert fix.name == "one"
+
+
+def test_lines_that_only_move_are_changes() -> None:
+    fix = shortest_fix("a\nb\n", passing([("moved", "b\na\n")]))
+    assert fix is not None
+    assert fix.changed == 2
+
+
+def test_what_is_left_out_of_a_difference_is_marked() -> None:
+    lines = [f"line {n}" for n in range(30)]
+    fix = shortest_fix("\n".join(lines), passing([("p", "\n".join([*lines[:29], "other"]))]))
+    assert fix is not None
+    assert fix.changes[0] == (" ", "...")
+    assert [sign for sign, _ in fix.changes] == [" ", " ", " ", "-", "+"]
+
+
+def test_the_same_lines_in_another_order_may_be_further_than_other_lines() -> None:
+    fix = shortest_fix("a\nb\nc\n", passing([("turned", "c\nb\na\n"), ("other", "a\nb\nd\n")]))
+    assert fix is not None
+    assert (fix.name, fix.changed) == ("other", 2)

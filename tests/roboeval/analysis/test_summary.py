@@ -1,0 +1,162 @@
+"""Counts of an evaluation, and how they are printed."""
+
+from __future__ import annotations
+
+import json
+import re
+import weakref
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from roboeval.analysis.summary import render, summary, summary_data
+from roboeval.evaluation.evaluation import Scope
+from roboeval.evaluation.failures import CATEGORIES, PYTHON_KINDS, ROBOT_KINDS
+from small_run import ROWS, SUITE, TASK, printed, row
+
+
+def test_a_summary_counts_tasks_prompts_and_failures() -> None:
+    data = summary_data(summary(iter(ROWS), SUITE, k=(1, 2)))
+    assert (data["completions"], data["passed"], data["judged"], data["to_judge"]) == (4, 1, 4, 4)
+    assert data["missing"] == {"no_completions": ["Wait"], "not_judged": [], "not_selected": []}
+    assert data["pass@1"]["mean"] == 0.25
+    assert data["pass@2"]["mean"] == 0.5
+    (task,) = data["tasks"]
+    assert task["pass@1"] == {"mean": 0.25, "lowest": 0.0, "highest": 0.5}
+    assert task["pass@2"] == {"mean": 0.5, "lowest": 0.0, "highest": 1.0}
+    assert task["prompts"] == [
+        {"prompt": 0, "completions": 2, "passed": 1, "pass@1": 0.5, "pass@2": 1.0},
+        {"prompt": 1, "completions": 2, "passed": 0, "pass@1": 0.0, "pass@2": 0.0},
+    ]
+    counts = [(each["class"], each["count"], each["share"]) for each in data["failures"]]
+    assert counts == [
+        ("PythonError", 2, 0.5),
+        ("RobotExecutionError", 0, 0.0),
+        ("TaskCompletionError", 1, 0.25),
+    ]
+    json.dumps(data)
+
+
+def test_all_known_kinds_are_always_listed_and_others_after_them() -> None:
+    kinds = [[kind.name for kind in each.kinds] for each in summary(ROWS, SUITE).failures]
+    assert kinds == [[*PYTHON_KINDS, "MemoryError"], [*ROBOT_KINDS], [*CATEGORIES]]
+
+
+def test_each_prompt_counts_the_same_however_many_completions_it_has() -> None:
+    rows = [row(0, 0), row(1, 0), *(row(1, i, ("PythonError", "KeyError")) for i in range(1, 4))]
+    assert summary(rows, SUITE).overall[0].mean == (1 + 0.25) / 2
+
+
+def test_tasks_stand_in_the_order_of_the_suite() -> None:
+    rows = [row(0, 0, task="Wait"), row(0, 0)]
+    assert [task.task for task in summary(rows, SUITE).tasks] == ["Visit", "Wait"]
+
+
+def test_nothing_to_count_is_said() -> None:
+    with pytest.raises(BadInput, match=r"^0 of 0 completions "):
+        summary([], SUITE)
+
+
+@pytest.mark.parametrize("k", [0, 3])
+def test_a_k_that_cannot_be_estimated_is_refused(k: int) -> None:
+    with pytest.raises(BadInput, match=r"\bk from 1 to 2$"):
+        summary(ROWS, SUITE, k=(k,))
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_tables_fit_and_break_no_number(width: int) -> None:
+    rows = [row(p, i, ("PythonError", "NameError")) for p in range(2) for i in range(2000)]
+    text = printed(render(summary(rows, SUITE, k=(1, 2)), title="runs/one"), width)
+    assert max(map(len, text.splitlines())) <= width
+    assert "runs/one" in text
+    assert "Visit" in text
+    assert "4,000 of 4,000 completions failed (100.0%)" in text
+    assert "pass@2 over all prompts: 0.000 (95% interval 0.000 to 0.000, 2 prompts)" in text
+    assert "no completions of Wait" in text
+    assert re.search(r"\n  NameError +4,000  100\.0%", text)
+    assert "ExhaustiveSearch" in text
+
+
+@pytest.mark.parametrize(
+    ("width", "columns"),
+    [
+        (100, "completions pass@1 pass@2 worst prompt best prompt"),
+        (80, "completions pass@1 pass@2 worst prompt best prompt"),
+        (70, "completions pass@1 pass@2 prompt prompt"),
+        (60, "completions pass@1 pass@2"),
+        (40, "pass@1 pass@2"),
+        (30, "pass@1"),
+        (20, "pass@1"),
+    ],
+)
+def test_task_names_stay_whole_and_columns_go_where_there_is_little_room(width: int, columns: str) -> None:
+    name = "HalloweenShopping"
+    suite = replace(SUITE, tasks={name: replace(TASK, name=name)})
+    rows = [row(0, index, task=name) for index in range(2)]
+    text = printed(render(summary(rows, suite, k=(1, 2)), title="x"), width)
+    assert max(map(len, text.splitlines())) <= width
+    assert ("\n" + name in text) == (width > 20)
+    (head,) = [line for line in text.splitlines() if line.startswith("task")]
+    assert " ".join(head.split()) == f"task {columns}"
+
+
+def test_tasks_without_a_score_are_told_apart() -> None:
+    suite = replace(SUITE, tasks={name: replace(TASK, name=name) for name in ("Visit", "A", "B", "C")})
+    scope = Scope({"Visit": 9, "B": 2, "C": 5}, frozenset({"Visit", "A", "B"}))
+    counted = summary(ROWS, suite, scope=scope)
+    data = summary_data(counted)
+    assert data["missing"] == {"no_completions": ["A"], "not_judged": ["B"], "not_selected": ["C"]}
+    assert (data["judged"], data["to_judge"]) == (4, 11)
+    text = printed(render(counted, title="x"))
+    assert text.startswith("x\n4 of 11 completions judged\n")
+    assert re.search(r"no completions .*A\nnot judged.* B\nnot selected.* C\n", text)
+    with pytest.raises(BadInput, match=r"^0 of 11 completions "):
+        summary([], suite, scope=scope)
+
+
+def test_rows_whose_completions_are_gone_are_told() -> None:
+    text = printed(render(summary(ROWS, SUITE, scope=Scope({"Visit": 3})), title="x"))
+    assert re.match(r"x\n4 completions judged.* 3 .*\n", text)
+
+
+def test_a_finished_evaluation_does_not_count_what_it_judged() -> None:
+    assert "completions judged" not in printed(render(summary(ROWS, SUITE), title="x"))
+
+
+def test_rows_are_counted_and_not_kept() -> None:
+    alive: list[weakref.ref[object]] = []
+
+    class Kept(dict[str, Any]):
+        pass
+
+    def rows() -> Iterator[dict[str, Any]]:
+        for index in range(100):
+            each = Kept(row(0, index))
+            alive.append(weakref.ref(each))
+            yield each
+            del each
+            assert sum(ref() is not None for ref in alive) <= 2
+
+    assert summary(rows(), SUITE).prompts[0].n == 100
+
+
+def test_one_is_one() -> None:
+    one = row(0, 0, ("PythonError", "NameError"))
+    assert "1 of 1 completion failed" in printed(render(summary([one], SUITE), title="x"))
+    with pytest.raises(BadInput, match=r"^0 of 1 completion "):
+        summary([], SUITE, scope=Scope({"Visit": 1}))
+
+
+def test_one_prompt_has_no_interval_and_no_failure_no_tables() -> None:
+    text = printed(render(summary([row(0, 0)], SUITE), title="x"))
+    assert "interval" not in text
+    assert "SyntaxError" not in text
+
+
+def test_an_ablation_is_named_and_misses_no_task() -> None:
+    text = printed(render(summary(ROWS, SUITE, ablated=True), title="x"))
+    assert "x (ablation" in text
+    assert "Wait" not in text

@@ -1,0 +1,276 @@
+"""What another suite changes: by hand, and as a person meets it."""
+
+import json
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from command_line import Ended, refused, roboeval
+from made_up_runs import PROGRAM, SUITE, made_up
+from roboeval.analysis.verdict_changes import (
+    Judged,
+    Reversals,
+    overtakings,
+    place,
+    render,
+    reversals,
+    reversals_data,
+    said,
+    said_of_order,
+    said_of_prompts,
+)
+from roboeval.report import beside
+from small_run import HOSTILE, SHOWN, printed
+
+STRICT = replace(SUITE, name="strict")
+Passes = Mapping[str, tuple[int, ...]]
+
+
+def judged(passes: Passes, *, strictly: bool = False) -> Judged:
+    return Judged.of(made_up("a", passes).rows, STRICT if strictly else SUITE)
+
+
+def changed(first: Passes, second: Passes, *, name: str = "a") -> Reversals:
+    loose, strict = judged(first), judged(second, strictly=True)
+    return reversals(name, loose, strict, dict.fromkeys(loose.keys | strict.keys, PROGRAM))
+
+
+def test_counted_by_hand() -> None:
+    found = changed({"Visit": (10, 4), "FindBook": (0,)}, {"Visit": (7, 4), "FindBook": (2,)})
+    assert found.suites == ("small", "strict")
+    assert [(t.task, t.both, t.first_only, t.second_only, t.neither) for t in found.tasks] == [
+        ("Visit", 11, 3, 0, 6),
+        ("FindBook", 0, 0, 2, 8),
+    ]
+    assert found.completions == 30
+    assert found.pass_at_1 == pytest.approx((1.4 / 3, 1.3 / 3))
+    assert sorted(key for one in found.first_only for key in one.members) == [
+        ("Visit", 0, 7),
+        ("Visit", 0, 8),
+        ("Visit", 0, 9),
+    ]
+    assert [key for one in found.second_only for key in one.members] == [
+        ("FindBook", 0, 0),
+        ("FindBook", 0, 1),
+    ]
+    assert {one.failure["class"] for one in found.second_only} == {
+        "PythonError"
+    }  # what the first has against
+    assert found.programs == 2
+    assert re.search(
+        r"^a: strict .*\b3 of the 14 .*\bsmall .*\b2 .*small .*\(2 different programs\)", said(found)
+    )
+
+
+def test_nothing_changes() -> None:
+    found = changed({"Visit": (3,)}, {"Visit": (3,)})
+    assert (found.first_only, found.second_only) == ((), ())
+    assert re.search(r"\bsmall and strict agree .*\b10\b", said(found))
+    assert "only, and what" not in printed(render([found], most=3))
+
+
+def test_what_one_suite_has_not_judged_is_left_out() -> None:
+    found = changed({"Visit": (3,), "FindBook": (1,)}, {"Visit": (2,), "BringTea": (9, 9)})
+    assert (found.completions, found.left_out) == (10, 30)
+    assert [task.task for task in found.tasks] == ["Visit"]
+    with pytest.raises(BadInput, match="both suites") as error:
+        changed({"Visit": (3,)}, {"FindBook": (3,)})
+    assert error.value.file == "a"
+
+
+def runs(**scores: tuple[int, int]) -> list[Reversals]:
+    return [changed({"Visit": (a,)}, {"Visit": (b,)}, name=name) for name, (a, b) in scores.items()]
+
+
+def test_places_are_shared_by_those_that_pass_equally_often() -> None:
+    scores = {"a": 0.5, "b": 0.9, "c": 0.5 + 1e-15, "d": 0.1}
+    assert {name: place(name, scores) for name in scores} == {"a": 2, "b": 1, "c": 2, "d": 4}
+
+
+def test_who_changes_places() -> None:
+    found = runs(a=(9, 3), b=(5, 5), c=(9, 2), d=(1, 1))
+    assert [(one.one, one.other) for one in overtakings(found)] == [("b", "a"), ("a", "c"), ("b", "c")]
+    tied = next(one for one in overtakings(found) if one.one == "a")
+    assert tied.first == 0.0
+    assert tied.second == pytest.approx(0.1)
+    for sentence, (one, other, how) in zip(
+        said_of_order(found),
+        [("b", "a", "less often"), ("a", "c", "as often"), ("b", "c", "less often")],
+        strict=True,
+    ):
+        assert re.match(rf"{one} passes more often than {other} under strict, .*\b{how}\b.* small", sentence)
+
+
+def test_who_is_caught_up() -> None:
+    (one,) = said_of_order(runs(a=(2, 4), b=(5, 4)))
+    assert re.match(r"b passes as often as a under strict, .*\bmore often\b.* small", one)
+
+
+def test_the_order_stays() -> None:
+    (sentence,) = said_of_order(runs(a=(5, 3), b=(2, 1)))
+    assert re.search(r"\b2 runs is the same under strict\b.* small", sentence)
+    assert said_of_order(runs(a=(5, 3))) == []
+
+
+def test_runs_about_different_prompts_are_warned_of() -> None:
+    one, other = runs(a=(5, 3), b=(2, 1))
+    more = changed({"Visit": (1, 1)}, {"Visit": (1, 1)}, name="c")
+    assert said_of_prompts([one, other]) == []
+    (warning,) = said_of_prompts([one, more])
+    assert "same prompts" in warning
+
+
+def test_what_a_model_wrote_and_is_called_does_no_harm() -> None:
+    found = replace(changed({"Visit": (3,)}, {"Visit": (1,)}), name=HOSTILE)
+    assert "".join(SHOWN.split()) in "".join(printed(render([found, found], most=1), 300).split())
+    assert "\x1b[2J" not in printed(render([found], most=1))
+
+
+def test_the_largest_groups_are_shown() -> None:
+    found = changed({"Visit": (10,)}, {"Visit": (0,)})
+    assert re.search(r"\b6 smaller groups\b.* --groups\b", printed(render([found], most=1)))
+    assert "smaller groups" not in printed(render([found], most=7))
+
+
+def as_dicts(name: str, found: list[Reversals]) -> list[dict[str, Any]]:
+    (table,) = (table for table in beside.sheets(found) if table.name == name)
+    heads = [column.head for column in table.columns]
+    return [dict(zip(heads, row, strict=True)) for row in table.rows]
+
+
+def test_tables_of_the_report() -> None:
+    found = runs(a=(9, 3), b=(5, 5))
+    a, b = as_dicts("beside", found)
+    assert (a["pass@1"], a["pass@1 beside"], a["place"], a["place beside"]) == (0.9, 0.3, 1, 2)
+    assert a["difference"] == pytest.approx(-0.6)
+    assert (b["place"], b["place beside"]) == (2, 1)
+    assert as_dicts("beside-tasks", found)[0] == {
+        "task": "Visit",
+        "model": "a",
+        "both": 3,
+        "here only": 6,
+        "beside only": 0,
+        "neither": 1,
+    }
+    groups = as_dicts("reversals", found)
+    assert sum(group["completions"] for group in groups) == 6
+    assert {group["passes"] for group in groups} == {"small only"}
+
+
+def test_a_report_shows_the_largest_groups_and_says_how_many_it_leaves_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(beside, "MOST", 2)
+    found = changed({"Visit": (10, 0)}, {"Visit": (0, 1)})
+    (table,) = (table for table in beside.sheets([found]) if table.name == "reversals")
+    sizes = [group["completions"] for group in as_dicts("reversals", [found])]
+    assert sizes == [2, 2]
+    assert table.notes[0].startswith("a: 6 smaller groups ")
+
+
+def test_a_report_reads_both_evaluations() -> None:
+    run = made_up("a", {"Visit": (9,)}, beside=judged({"Visit": (4,)}, strictly=True))
+    (found,) = beside.reversed_in([run, made_up("b", {"Visit": (9,)})], SUITE)
+    assert found.suites == ("small", "strict")
+    assert sum(len(one.members) for one in found.first_only) == 5
+
+
+@pytest.fixture(scope="module")
+def judged_twice(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runs")
+    for name in ("hasty", "careful"):
+        for source, suite in ((f"recorded:{name}", "paper"), (name, "plus")):
+            more = ("--tasks", "GetDrink,GrilledCheese", "--suite", suite)
+            made = roboeval("evaluate", source, "--out", name, *more, cwd=folder)
+            assert made.status == 0, made
+    return folder
+
+
+def test_the_command(judged_twice: Path) -> None:
+    made = roboeval("compare", "hasty", "careful", "--suites", "paper,plus", cwd=judged_twice)
+    assert made.status == 0, made
+    assert made.err == ""
+    assert re.search("under plus only, .*paper", made.out)
+    ended = roboeval("compare", "hasty", "--suites", "paper, plus", "--json", cwd=judged_twice)
+    data = json.loads(ended.out)
+    assert data["suites"] == ["paper", "plus"]
+    assert data["overtakings"] == []
+    (run,) = data["runs"]
+    for members, (passes, fails) in (("first_only", ("paper", "plus")), ("second_only", ("plus", "paper"))):
+        names = [name for group in run[members] for name in group["members"]]
+        assert names
+        verdicts = [verdicts_of(judged_twice / "hasty", suite) for suite in (passes, fails)]
+        assert all(verdicts[0][name] and not verdicts[1][name] for name in names)
+
+
+def verdicts_of(run: Path, suite: str) -> dict[str, bool]:
+    lines = (run / "evaluations" / f"{suite}.jsonl").read_text().splitlines()
+    rows = map(json.loads, lines)
+    return {f"{row['task']}/{row['prompt']}/{row['index']}": row["passed"] for row in rows}
+
+
+def test_the_other_way_round(judged_twice: Path) -> None:
+    def data(suites: str) -> dict[str, Any]:
+        ended = roboeval("compare", "hasty", "careful", "--suites", suites, "--json", cwd=judged_twice)
+        return dict(json.loads(ended.out))
+
+    one, other = data("paper,plus")["runs"][0], data("plus,paper")["runs"][0]
+    assert one["first_only"] == other["second_only"]
+    assert one["difference"] == pytest.approx(-other["difference"])
+
+
+def test_other_worlds_than_the_suites_own(judged_twice: Path, tmp_path: Path) -> None:
+    shutil.copytree(judged_twice / "hasty", tmp_path / "hasty")
+    few = ("--suite", "plus", "--tasks", "GetDrink,GrilledCheese", "--worlds", "12", "--seed", "5", "--redo")
+    assert roboeval("evaluate", "hasty", *few, cwd=tmp_path).status == 0
+    made = roboeval("compare", "hasty", "--suites", "paper,plus", cwd=tmp_path)
+    assert (made.status, made.err) == (0, "")
+    made = roboeval("find", "hasty", "--suite", "plus", cwd=tmp_path)
+    assert (made.status, "has changed" in made.err) == (0, False)
+
+
+def test_the_report(judged_twice: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report"
+    options = ("--beside", "plus", "--no-check")
+    made = roboeval("report", "hasty", "careful", "--out", str(out), *options, cwd=judged_twice)
+    assert made.status == 0, made
+    page = (out / "index.html").read_text()
+    assert "What other checks change" in page
+    assert "--beside plus" in page
+    assert (out / "tables" / "reversals.csv").exists()
+    made = roboeval("report", "hasty", "careful", "--out", str(out), "--no-check", cwd=judged_twice)
+    assert "What other checks change" not in (out / "index.html").read_text()
+    assert not (out / "tables" / "reversals.csv").exists()
+
+
+def test_what_is_refused(judged_twice: Path) -> None:
+    def told(*words: str) -> Ended:
+        return roboeval(*words, cwd=judged_twice)
+
+    assert "1 is named" in refused("compare", judged_twice / "hasty").sentence
+    assert 'not "paper"' in refused("compare", judged_twice / "hasty", "--suites", "paper").sentence
+    assert "comma" in refused("compare", judged_twice / "hasty", "--suites", "plus,plus").sentence
+    assert "twice" in told("compare", "hasty", "./hasty", "--suites", "paper,plus").err
+    twice = told("report", "hasty", "--out", "r", "--beside", "paper")
+    assert (twice.status, '"paper"' in twice.err) == (2, True)
+
+
+def test_a_suite_that_has_not_judged_is_named(tmp_path: Path) -> None:
+    assert (
+        roboeval("evaluate", "recorded:hasty", "--tasks", "LunchTime", "--out", "a", cwd=tmp_path).status == 0
+    )
+    ended = roboeval("compare", "a", "--suites", "paper,plus", cwd=tmp_path)
+    assert ended.status == 2
+    assert '"plus"' in ended.err
+
+
+def test_data_of_several_runs() -> None:
+    data = reversals_data(runs(a=(9, 3), b=(5, 5)))
+    assert [run["places"] for run in data["runs"]] == [[1, 2], [2, 1]]
+    assert data["overtakings"][0]["one"] == "b"

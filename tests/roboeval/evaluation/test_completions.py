@@ -1,0 +1,160 @@
+"""Rows of completions: what is accepted can be copied and read again, and nothing else is accepted."""
+
+import errno
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from codebotler.badinput import BadInput
+from codebotler.files import MAX_ROW, Appender, sync_folder, to_line, write_whole
+from roboeval.evaluation.completions import read_completions
+from roboeval.evaluation.run import Run, open_source
+from roboeval.suites.load import Suite
+
+ROW = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": "x = 1"}
+
+
+def error_about(path: Path, line: bytes) -> BadInput:
+    path.write_bytes(line)
+    with pytest.raises(BadInput) as caught:
+        list(read_completions(path))
+    assert (str(caught.value.file), caught.value.line) == (str(path), 1)
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "expected"),
+    [
+        ("prompt", 10**9, "below 1,000,000,000"),
+        ("index", 10**9, "below 1,000,000,000"),
+        ("index", 10**25, "below 1,000,000,000"),
+        ("index", -1, "at least 0"),
+        ("index", True, "whole number"),
+        ("index", "3", "whole number"),
+    ],
+)
+def test_a_number_that_is_none_gets_a_sentence(
+    tmp_path: Path, name: str, value: object, expected: str
+) -> None:
+    error = error_about(tmp_path / "a.jsonl", to_line(ROW | {name: value}))
+    assert f"{name} is {value!r}, " in error.sentence
+    assert expected in error.sentence
+
+
+@given(st.dictionaries(st.text(), st.text(st.characters()) | st.integers() | st.floats(allow_nan=False)))
+def test_a_line_is_one_line_that_reads_as_its_row(row: dict[str, Any]) -> None:
+    line = to_line(row)
+    assert line.decode().count("\n") == 1
+    assert json.loads(line) == json.loads(json.dumps(row))
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "\ud800" + "é" * 2_400_000,
+        "\ud800" * 800_000,
+        "é" * 2_400_000,
+        "\n" * 2_400_000,
+    ],
+)
+def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
+    tmp_path: Path, paper: Suite, program: str
+) -> None:
+    path = tmp_path / "a.jsonl"
+    row = ROW | {"program": program}
+    path.write_text(json.dumps(row, ensure_ascii=False).replace("\ud800", "\\ud800"))
+    run = Run(tmp_path / "run")
+    run.keep(open_source(str(path), paper))
+    assert [c.program for c in read_completions(run.completions)] == [program]
+
+
+def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
+    tmp_path: Path, paper: Suite
+) -> None:
+    path = tmp_path / "a.jsonl"
+    line = json.dumps(ROW | {"usage": [1] * 2_400_000}, separators=(",", ":")).encode()
+    assert len(line) < MAX_ROW
+    assert "5,000,000 bytes" in error_about(path, line).sentence
+    with pytest.raises(BadInput, match="5,000,000 bytes"):
+        Run(tmp_path / "run").keep(open_source(str(path), paper))
+    assert not (tmp_path / "run").exists()
+
+
+# --- what is brought to the disk
+
+
+@pytest.fixture
+def synced(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Path, frozenset[str]]]:
+    """What is brought to the disk, each with the files that it has if it is a folder."""
+    found: list[tuple[Path, frozenset[str]]] = []
+    fsync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        path = Path(f"/proc/self/fd/{descriptor}").readlink()
+        found.append(
+            (path, frozenset(file.name for file in path.iterdir()) if path.is_dir() else frozenset())
+        )
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    return found
+
+
+def test_a_line_is_brought_to_the_disk_when_that_is_asked_for(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    file = Appender(tmp_path / "a.jsonl")
+    synced.clear()
+    file.append(b"{}\n")
+    assert synced == []
+    file.sync()
+    assert synced == [(tmp_path / "a.jsonl", frozenset())]
+    file.close()
+    assert synced == [(tmp_path / "a.jsonl", frozenset())] * 2
+
+
+def test_a_new_file_is_in_its_folder_on_the_disk(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    Appender(tmp_path / "a.jsonl").close()
+    assert (tmp_path, frozenset({"a.jsonl"})) in synced
+    synced.clear()
+    Appender(tmp_path / "a.jsonl").close()
+    assert tmp_path not in dict(synced)  # it is there already
+
+
+def test_a_file_that_is_written_whole_is_in_its_folder_on_the_disk(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    write_whole(tmp_path / "run.json", b"{}")
+    assert synced == [(tmp_path / "run.json.new", frozenset()), (tmp_path, frozenset({"run.json"}))]
+
+
+def test_a_new_folder_of_a_run_is_on_the_disk(
+    tmp_path: Path, synced: list[tuple[Path, frozenset[str]]]
+) -> None:
+    with Run(tmp_path / "runs" / "one").writing():
+        pass
+    assert synced == [
+        (tmp_path / "runs", frozenset({"one"})),
+        (tmp_path, frozenset({"runs"})),
+    ]
+
+
+def test_a_folder_that_cannot_be_synced_is_told_only_where_the_disk_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers = iter([errno.EINVAL, errno.EIO])
+
+    def refused(_descriptor: int) -> None:
+        raise OSError(next(numbers), "refused")
+
+    monkeypatch.setattr(os, "fsync", refused)
+    sync_folder(tmp_path)  # many a file system brings no folder to the disk
+    with pytest.raises(OSError, match=str(tmp_path)):
+        sync_folder(tmp_path)

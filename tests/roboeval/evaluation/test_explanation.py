@@ -1,0 +1,363 @@
+"""Views of prompts and completions: reasons, storyboards, and that programs stay text on the terminal."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console, RenderableType
+
+from codebotler.badinput import BadInput
+from codebotler.rtl import Explanation, Formula, explain, parse
+from codebotler.simulator.rules import Rules
+from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
+from codebotler.world import Person, Room, World
+from roboeval.evaluation.completions import Completion
+from roboeval.evaluation.explanation import (
+    Selection,
+    completion_data,
+    completion_view,
+    prompt_data,
+    prompt_view,
+    task_data,
+    task_view,
+    view,
+    view_data,
+)
+from roboeval.evaluation.judge import evaluation, judge, judgement
+from roboeval.suites.load import Requirement, Scenario, Suite, Task
+
+HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800"
+SHOWN = r"[red]x[/red]\x1b[2J\x07\u202e\ud800"
+
+WORLD = World(
+    rooms=(Room("start"), Room("office", people=(Person("amy", ("yes",)),)), Room("lab")),
+    robot="start",
+    about="amy is in",
+)
+
+
+def required(name: str, rtl: str) -> Requirement:
+    return Requirement(name, name, parse(rtl), "Location")
+
+
+VISITS = required("visits", 'tr.Exists(goto("office"))')
+GREETS = required('greets("amy")', 'tr.ActAtFirst("office", say("hello"))')
+BIDS = required("bids_farewell", 'tr.Exists(say("bye"))')
+WAITING = replace(WORLD, about="nobody comes", may_wait_forever=True)
+TASK = Task(
+    name="Visit",
+    summary="Visit Amy.",
+    abilities=(),
+    prompts=("Visit Amy.",),
+    facts=(),
+    checks=(),
+    scenarios=(Scenario(WORLD, (VISITS, GREETS)), Scenario(WAITING, ())),
+    ablation=(Scenario(WORLD, (BIDS,)), Scenario(WAITING, ())),
+    accepted=(),
+    path=Path("Visit.yaml"),
+)
+SUITE = Suite("small", 1, "", Rules(), {"Visit": TASK}, "0")
+
+GOTO, HELLO = Event("goto", "office"), Event("say", "hello")
+FINE = Outcome(Status.FINISHED, (GOTO, HELLO))
+MUTE = Outcome(Status.FINISHED, (GOTO, Event("goto", "lab"), HELLO))
+
+
+def completion(index: int = 0, program: str = "x = 1\ny = 2\n", **fields: Any) -> Completion:  # noqa: ANN401 - any field
+    return Completion(task="Visit", prompt=0, index=index, program=program, **fields)
+
+
+def row(written: Completion, *outcomes: Outcome, ablated: bool = False) -> dict[str, Any]:
+    scenarios = TASK.judged_in(ablated=ablated)
+    verdicts = [judge(o, s) for o, s in zip(outcomes, scenarios, strict=False)]
+    return json.loads(json.dumps(evaluation(written, judgement(verdicts))))  # type: ignore[no-any-return]  # JSON
+
+
+def failed(status: Status, kind: str, message: str, *events: Event, line: int | None = None) -> Outcome:
+    return Outcome(status, events, RunError(kind, message), line)
+
+
+def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False) -> str:
+    console = Console(width=width, force_terminal=colour, color_system="standard" if colour else None)
+    with console.capture() as captured:
+        console.print(renderable)
+    return "\n".join(line.rstrip() for line in captured.get().splitlines())
+
+
+# --- a prompt
+
+
+LOST = failed(Status.ROBOT_ERROR, "GoToInvalidLocation", 'there is no room "moon"', line=2)
+THREE = [completion(0), completion(1), completion(2, "mute"), completion(3, "lost")]
+ROWS = [row(c, o, FINE) for c, o in zip(THREE, [FINE, FINE, MUTE, LOST], strict=True)]
+
+
+def test_a_prompt_groups_equal_programs_and_gives_reasons() -> None:
+    data = prompt_data(ROWS, THREE, SUITE, "Visit", 0)
+    json.dumps(data)
+    assert (data["completions"], data["passed"], data["pass@1"]) == (4, 2, 0.5)
+    assert [program["indices"] for program in data["programs"]] == [[0, 1], [2], [3]]
+    assert [program["passed"] for program in data["programs"]] == [True, False, False]
+    assert data["programs"][1]["failure"]["check"] == 'greets("amy")'
+    assert "at step 3" in data["programs"][1]["explanation"]
+    assert data["programs"][2]["line"] == 2
+
+
+def test_a_prompt_is_shown_line_by_line() -> None:
+    text = printed(prompt_view(ROWS, THREE, SUITE, "Visit", 0), 160)
+    assert text.startswith(
+        "Visit/0  2 of 4 passed (pass@1 0.50)\ninstruction not recorded\n\n  0  x2  passed\n"
+    )
+    assert '  2  TaskCompletionError: Location in "amy is in"\n     greets("amy"): ' in text
+    assert (
+        '  3  RobotExecutionError: GoToInvalidLocation in "amy is in"\n     line 2: there is no room "moon"'
+    ) in text
+
+
+def test_a_prompt_without_rows_is_an_error() -> None:
+    with pytest.raises(BadInput, match=r"\bVisit/0\b"):
+        prompt_view([], [], SUITE, "Visit", 0)
+
+
+# --- a completion
+
+
+def test_a_completion_is_shown_world_by_world() -> None:
+    written = completion(program="go_to('office')\nsay('hello')\n", instruction="Visit her.", model="m")
+    answered = Event("ask", "lunch?", (Option("yes"), Option("5", is_text=False)), answer="yes")
+    trace = (
+        Event("check", "amy", found=False),
+        GOTO,
+        Event("check", "amy", found=True),
+        answered,
+        Event("goto", "moon"),
+        Event("goto", "the lab, please"),
+        Event("pick", "mug"),
+        Event("place", "mug"),
+        Event("wave", "amy"),
+    )
+    text = printed(completion_view(row(written, Outcome(Status.FINISHED, trace)), written, SUITE), 110)
+    assert text.startswith("Visit/0/0  TaskCompletionError: Location\nwritten by m\nVisit her.\n\n")
+    assert "  1 go_to('office')\n  2 say('hello')\n" in text
+    story = """World 1 of 1: amy is in
+not satisfied, finished
+   in start
+1      looked for "amy": not found
+2  start → office
+3      looked for "amy": found
+4      asked "lunch?" [yes | 5 (no text)] → yes
+5  office → "moon"  failed: there is no such room
+6  office → lab  (asked for "the lab, please")
+7      picked up "mug"
+8      put down "mug"
+9      wave "amy"
+  failed greets("amy"): the robot"""
+    assert story in text
+
+
+def test_the_line_of_an_error_is_marked_and_that_of_an_allowed_timeout_is_not() -> None:
+    waits = failed(Status.TIMEOUT, "TimeoutError", "1,000 skill calls", line=1)
+    text = printed(completion_view(row(completion(), LOST, waits), completion(), SUITE))
+    assert "  1 x = 1\n❱ 2 y = 2\n" in text
+    assert 'not satisfied, robot-error: GoToInvalidLocation, line 2: there is no room "moon"' in text
+    assert "\n  the robot did nothing" in text
+    assert "satisfied, timeout (allowed here): TimeoutError, line 1: 1,000 skill calls" in text
+
+
+def test_an_error_without_a_message_is_told_by_its_kind_and_line() -> None:
+    for line, where in ((2, ", line 2"), (None, "")):
+        full = row(completion(), failed(Status.KILLED, "MemoryError", "", line=line))
+        text = printed(completion_view(full, completion(), SUITE))
+        assert f"\nnot satisfied, killed: MemoryError{where}\n" in text
+        text = printed(prompt_view([full], [completion()], SUITE, "Visit", 0))
+        assert text.endswith('MemoryError in "amy is in"' + ("\n     line 2" if line else ""))
+
+
+def test_lines_keep_their_numbers_whatever_ends_them() -> None:
+    written = completion(program="\n\r\n\rx = (\n\n\n")
+    text = printed(completion_view(row(written, LOST), written, SUITE))
+    assert "  4 x = (\n" in text
+    assert "  5" not in text
+
+
+@pytest.mark.parametrize("written", [None, completion(program="")])
+def test_what_was_not_recorded_is_said_and_not_taken_from_the_suite(written: Completion | None) -> None:
+    text = printed(completion_view(row(completion(), FINE), written, SUITE))
+    assert ("instruction not recorded" in text) == (written is not None)
+    assert "Visit Amy." not in text
+    assert ("no longer stands" in text) == (written is None)
+
+
+def test_of_a_prompt_it_is_said_what_is_gone_and_what_was_not_recorded() -> None:
+    gone, unknown = "no longer stand in this run", "instruction not recorded"
+    for written, told, untold in ([], gone, unknown), (THREE[:1], unknown, gone):
+        for text in (
+            printed(task_view(ROWS, written, SUITE, "Visit")),
+            printed(prompt_view(ROWS, written, SUITE, "Visit", 0)),
+        ):
+            assert told in text
+            assert untold not in text
+
+
+def test_a_completion_as_data_holds_every_step() -> None:
+    written = completion(model="m")
+    data = completion_data(row(written, Outcome(Status.FINISHED, (GOTO,) * 999)), written, SUITE)
+    json.dumps(data)
+    world = data["worlds"][0]
+    assert len(world["steps"]) == 999
+    assert world["steps"][1] == {
+        "step": 2,
+        "kind": "goto",
+        "text": "office",
+        "place": "office",
+        "to": "office",
+    }
+    assert world["failed_checks"][0]["check"] == 'greets("amy")'
+    assert (data["instruction"], data["program"], data["model"]) == (None, "x = 1\ny = 2\n", "m")
+
+
+def test_an_ablation_is_explained_by_its_own_requirements() -> None:
+    only = row(completion(), MUTE, ablated=True)
+    data = completion_data(only, completion(), SUITE, ablated=True)
+    assert '"bye"' in data["worlds"][0]["failed_checks"][0]["explanation"]
+    of_prompt = prompt_data([only], [completion()], SUITE, "Visit", 0, ablated=True)
+    assert '"bye"' in of_prompt["programs"][0]["explanation"]
+
+
+def test_worlds_of_one_name_are_told_apart_by_their_order() -> None:
+    suite = replace(
+        SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, ()), Scenario(WORLD, (BIDS,))))}
+    )
+    verdicts = [judge(MUTE, scenario) for scenario in suite.tasks["Visit"].scenarios]
+    data = completion_data(evaluation(completion(), judgement(verdicts)), completion(), suite)
+    assert '"bye"' in data["worlds"][1]["failed_checks"][0]["explanation"]
+
+
+def test_a_suite_that_has_changed_since_is_named() -> None:
+    gone = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, (VISITS,)),))})
+    met = replace(TASK, scenarios=(Scenario(WORLD, (replace(VISITS, text='greets("amy")'),)),))
+    cases = [
+        (gone, "the suite has changed .* no longer requires this"),
+        (replace(SUITE, tasks={"Visit": met}), "the suite has changed .* by now"),
+    ]
+    for suite, sentence in cases:
+        text = printed(completion_view(row(completion(), MUTE), completion(), suite), 160)
+        assert re.search(rf'failed greets\("amy"\): {sentence}', text)
+
+
+def test_a_world_that_the_suite_has_no_more_still_shows_its_trace() -> None:
+    renamed = replace(TASK, scenarios=(Scenario(replace(WORLD, about="amy is out"), (VISITS, GREETS)),))
+    for suite in (replace(SUITE, tasks={}), replace(SUITE, tasks={"Visit": renamed})):
+        text = printed(completion_view(row(completion(), MUTE), completion(), suite), 160)
+        assert '1  → "office"\n2  → "lab"\n3      said "hello"\n' in text
+
+
+# --- long traces and texts
+
+
+def test_a_long_trace_is_shortened_in_its_middle() -> None:
+    trace = (GOTO, *[Event("check", "amy", found=False), Event("say", "hm")] * 499, Event("goto", "start"))
+    text = printed(completion_view(row(completion(), Outcome(Status.FINISHED, trace)), completion(), SUITE))
+    assert "     ... 982 more, repeating steps 11 to 12 ...\n" in text
+    assert "\n1000  office → start\n" in text
+    assert "\n 500 " not in text
+
+
+def test_a_step_that_an_explanation_names_is_never_left_out() -> None:
+    once = required("is_silent", 'not tr.Exists(say("hm"))')
+    suite = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, (once,)),))})
+    trace = (*[Event("check", f"n{i}", found=False) for i in range(500)], Event("say", "hm"), *[GOTO] * 100)
+    verdict = judge(Outcome(Status.FINISHED, trace), suite.tasks["Visit"].scenarios[0])
+    text = printed(completion_view(evaluation(completion(), judgement([verdict])), completion(), suite))
+    assert '\n     ... 488 more ...\n501      said "hm"\n     ... 94 more ...\n' in text
+
+
+def test_a_long_text_is_shortened() -> None:
+    trace = (Event("say", "a" * 10_000), Event("ask", "q", (Option("o"),) * 30))
+    text = printed(completion_view(row(completion(), Outcome(Status.FINISHED, trace)), completion(), SUITE))
+    assert "9,500 more characters" in text.replace("\n      ", "")
+    assert "10 more] → no answer" in text
+    assert len(text) < 3_000
+
+
+# --- what a model wrote is text
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_nothing_a_model_wrote_reaches_the_terminal_as_more_than_text(*, colour: bool) -> None:
+    trace = (
+        Event("say", HOSTILE),
+        Event("goto", HOSTILE),
+        Event("ask", HOSTILE, (Option(HOSTILE), Option(HOSTILE, is_text=False))),
+        Event(HOSTILE, HOSTILE),
+    )
+    silent = Outcome(Status.FINISHED, trace)
+    fails = failed(Status.PYTHON_ERROR, HOSTILE, HOSTILE, *trace, line=1)
+    written = completion(program=f"say('{HOSTILE}')\r\n\t# {HOSTILE}", instruction=HOSTILE, model=HOSTILE)
+    rows = [row(written, silent), row(written, fails), row(written, fails)]
+    rows[2]["verdicts"][0]["world"] = HOSTILE
+    for one in rows:
+        views = [
+            completion_view(one, written, SUITE),
+            prompt_view([one], [written], SUITE, "Visit", 0),
+            task_view([one], [written], SUITE, "Visit"),
+        ]
+        for shown in views:
+            text = printed(shown, 400, colour=colour)
+            assert SHOWN in text
+            for control in ("\x1b[2J", "\x07", "\u202e", "\ud800"):
+                assert control not in text
+            assert colour or "\x1b" not in text
+
+
+# --- the way in
+
+
+def test_a_selection_opens_its_view() -> None:
+    for selection, begin in [
+        (Selection("Visit"), "Visit\nVisit Amy.\n"),
+        (Selection("Visit", 0), "Visit/0  2 of 4 passed"),
+        (Selection("Visit", 0, 2), "Visit/0/2  TaskCompletionError: Location"),
+    ]:
+        assert printed(view(selection, ROWS, THREE, SUITE)).startswith(begin)
+    with pytest.raises(BadInput, match="Visit/0/9"):
+        view(Selection("Visit", 0, 9), ROWS, THREE, SUITE)
+
+
+def test_a_selection_as_data_is_what_its_view_shows() -> None:
+    assert view_data(Selection("Visit"), ROWS, THREE, SUITE) == task_data(ROWS, THREE, SUITE, "Visit")
+    assert view_data(Selection("Visit", 0), ROWS, THREE, SUITE) == prompt_data(ROWS, THREE, SUITE, "Visit", 0)
+    assert view_data(Selection("Visit", 0, 2), ROWS, THREE, SUITE)["program"] == "mute"
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_views_fit_the_width(width: int) -> None:
+    for selection in (Selection("Visit"), Selection("Visit", 0), Selection("Visit", 0, 2)):
+        text = printed(view(selection, ROWS, THREE, SUITE), width)
+        assert max(map(len, text.splitlines())) <= width
+
+
+def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = [Event("say", "no " * 1_000)] * 10
+    task = replace(TASK, scenarios=tuple(Scenario(replace(WORLD, about=str(n)), (BIDS,)) for n in range(30)))
+    suite = replace(SUITE, tasks={"Visit": task})
+    verdicts = [judge(Outcome(Status.FINISHED, tuple(told)), s) for s in task.scenarios]
+    one = evaluation(completion(), judgement(verdicts))
+    compared = []
+
+    def noting(formula: Formula, trace: Trace) -> Explanation | None:
+        compared.append(sum(len(event.text) for event in trace))
+        return explain(formula, trace)
+
+    monkeypatch.setattr("roboeval.evaluation.explanation.explain", noting)
+    worlds = completion_data(one, None, suite)["worlds"]
+    why = [check["explanation"] for world in worlds for check in world["failed_checks"]]
+    assert len(why) == 30
+    assert "never said" in why[0]
+    assert "too long" in why[-1]
+    assert 0 < sum(compared) <= 100_000

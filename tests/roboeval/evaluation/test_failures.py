@@ -1,0 +1,53 @@
+import pytest
+
+from codebotler.rtl import parse
+from codebotler.trace import Outcome, RunError, Status
+from roboeval.evaluation.failures import CATEGORIES, PYTHON_KINDS, ROBOT_KINDS, Failure, Verdict, failure
+from roboeval.suites.load import Requirement
+from roboeval.suites.schema import Category
+
+FORMULA = parse('tr.Exists(say("x"))')
+
+
+def required(text: str, category: Category) -> Requirement:
+    return Requirement(text, text, FORMULA, category)
+
+
+def finished(*failed: Requirement) -> Verdict:
+    return Verdict("w", Outcome(Status.FINISHED, ()), failed, satisfied=not failed)
+
+
+def ended(status: Status, kind: str, *failed: Requirement) -> Verdict:
+    return Verdict("w", Outcome(status, (), RunError(kind, "m")), failed, satisfied=False)
+
+
+A, B = required("a", "SayAtLocation"), required("b", "Location")
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "expected"),
+    [
+        ([finished(), finished()], None),
+        ([finished(), finished(A, B)], Failure("TaskCompletionError", "SayAtLocation", 1, "a")),
+        ([finished(B, A), finished(A)], Failure("TaskCompletionError", "Location", 0, "b")),
+        (
+            [ended(Status.ROBOT_ERROR, "AskNoPerson"), finished(A)],
+            Failure("RobotExecutionError", "AskNoPerson", 0),
+        ),
+        ([ended(Status.PYTHON_ERROR, "KeyError")], Failure("PythonError", "KeyError", 0)),
+        ([ended(Status.TIMEOUT, "TimeoutError")], Failure("PythonError", "TimeoutError", 0)),
+        ([ended(Status.KILLED, "MemoryError")], Failure("PythonError", "MemoryError", 0)),
+        (
+            [ended(Status.TIMEOUT, "TimeoutError", B)],  # in a world that may wait for ever
+            Failure("TaskCompletionError", "Location", 0, "b"),
+        ),
+    ],
+)
+def test_the_first_unsatisfied_world_gives_the_one_reason(
+    verdicts: list[Verdict], expected: Failure | None
+) -> None:
+    assert failure(verdicts) == expected
+
+
+def test_the_kinds_of_the_paper_are_always_there() -> None:
+    assert (len(PYTHON_KINDS), len(ROBOT_KINDS), len(CATEGORIES)) == (9, 7, 8)

@@ -1,0 +1,479 @@
+"""Whatever happens meanwhile, a run gets exactly the completions it shall have, each once."""
+
+import json
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.files import Appender, read_rows, to_line
+from codebotler.models.base import ModelError, Settings
+from roboeval.evaluation.completions import read_completions
+from roboeval.evaluation.generate import Pace, Progress, generate_run
+from roboeval.evaluation.inflight import InFlight
+from roboeval.evaluation.order import Order
+from roboeval.evaluation.run import Run
+from roboeval.suites.load import Suite
+from scripted_model import Scripted
+
+SMALL = frozenset({"LunchTime", "SayGoodDay"})
+CUT = ModelError("the connection was cut", may_pass=True)
+REFUSED = ModelError("the key in SCRIPTED_API_KEY is refused", may_pass=False)
+
+
+def generated(
+    run: Run,
+    suite: Suite,
+    model: Scripted,
+    *,
+    count: int = 3,
+    settings: Settings | None = None,
+    pace: Pace | None = None,
+    told: Any = lambda _: None,  # noqa: ANN401 - passed on
+) -> Progress:
+    order = Order(suite, SMALL, count)
+    return generate_run(run, order, model, settings or Settings(), pace or Pace(), told=told)
+
+
+def rows(run: Run) -> list[dict[str, Any]]:
+    return [row for _, row in read_rows(run.completions)]
+
+
+def keys(run: Run) -> list[tuple[str, int, int]]:
+    return sorted((row["task"], row["prompt"], row["index"]) for row in rows(run))
+
+
+def expected(count: int) -> list[tuple[str, int, int]]:
+    return sorted((task, prompt, index) for task in SMALL for prompt in range(5) for index in range(count))
+
+
+def about(run: Run) -> dict[str, Any]:
+    data: dict[str, Any] = json.loads(run.about.read_text())
+    return data
+
+
+def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "runs" / "one")
+    model = Scripted()
+    progress = generated(
+        run, paper, model, settings=Settings(temperature=0.7, seed=5, base_url="http://a/v1")
+    )
+    assert (progress.done, progress.total, progress.missing, progress.twice) == (30, 30, None, 0)
+    assert model.closed
+    assert keys(run) == expected(3)
+    row = next(row for row in rows(run) if (row["task"], row["prompt"], row["index"]) == ("LunchTime", 4, 2))
+    assert row == {
+        "task": "LunchTime",
+        "prompt": 4,
+        "index": 2,
+        "instruction": paper.tasks["LunchTime"].prompts[4],
+        "model": "scripted:one",
+        "program": 'def task_program():\n    say("2")\n',
+        "raw_reply": 'def task_program():\n    say("2")\n',
+        "usage": {"input_tokens": 100, "output_tokens": 10},
+        "latency_s": 0.0,
+        "finish_reason": "stop",
+    }
+    told = about(run)
+    assert told["model"] == "scripted:one"
+    assert told["settings"] == {"temperature": 0.7, "top_p": 0.95, "max_tokens": 512, "seed": 5}
+    assert told["base_url"] == "http://a/v1"
+    assert re.fullmatch("[0-9a-f]{64}", told["template"])
+    assert told["usage"] == {"input_tokens": 3000, "output_tokens": 300}
+    assert told["started"] <= told["ended"]
+    assert told["possibly_paid_twice"] == 0
+    assert sorted(path.name for path in run.path.iterdir()) == [".lock", "completions.jsonl", "run.json"]
+
+
+def test_first_completions_of_all_prompts_come_first(tmp_path: Path, paper: Suite) -> None:
+    model = Scripted()
+    generated(Run(tmp_path / "run"), paper, model, count=2, pace=Pace(concurrency=1))
+    assert [number for _, number in model.asked] == [0] * 10 + [1] * 10
+
+
+def test_a_completed_run_asks_for_nothing_and_keeps_its_end(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted())
+    before = run.completions.read_bytes(), run.about.read_bytes()
+    model = Scripted()
+    assert generated(run, paper, model).found == 30
+    assert model.asked == []
+    assert (run.completions.read_bytes(), run.about.read_bytes()) == before
+
+
+def test_more_can_be_asked_for_later_and_fewer_take_nothing_away(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted(), count=1)
+    model = Scripted()
+    progress = generated(run, paper, model, count=3)
+    assert (progress.found, len(model.asked)) == (10, 20)
+    assert keys(run) == expected(3)
+    assert generated(run, paper, Scripted(), count=2).missing is None
+    assert keys(run) == expected(3)
+
+
+def test_as_many_at_the_same_time_as_allowed(tmp_path: Path, paper: Suite) -> None:
+    model = Scripted(seconds=0.002)
+    generated(Run(tmp_path / "run"), paper, model, count=5, pace=Pace(concurrency=3))
+    assert model.most == 3
+
+
+def test_each_completion_is_in_the_file_when_it_is_told_of(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    told: list[int] = []
+
+    def tell(progress: Progress) -> None:
+        told.append(progress.done)
+        assert len(rows(run)) >= progress.done
+
+    generated(run, paper, Scripted(seconds=0.001), told=tell)
+    assert told == list(range(1, 31))
+
+
+def test_a_completion_counts_only_once_it_is_on_the_disk(
+    tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run(tmp_path / "run")
+    on_disk = [0]
+    sync = Appender.sync
+
+    def noted(file: Appender) -> None:
+        lines = file.path.read_bytes().count(b"\n")
+        sync(file)
+        if file.path == run.completions:
+            on_disk[0] = lines
+
+    def tell(progress: Progress) -> None:
+        assert on_disk[0] >= progress.done
+
+    monkeypatch.setattr(Appender, "sync", noted)
+    assert generated(run, paper, Scripted(seconds=0.001), told=tell).missing is None
+
+
+# --- what goes on and what does not
+
+
+@pytest.mark.parametrize(
+    ("settings", "what"),
+    [
+        (Settings(temperature=0.7), "temperature (0.2, now 0.7)"),
+        (Settings(top_p=0.5), "top-p (0.95, now 0.5)"),
+        (Settings(max_tokens=100), "max-tokens (512, now 100)"),
+        (Settings(seed=1), "seed (none, now 1)"),
+    ],
+)
+def test_other_settings_are_refused(tmp_path: Path, paper: Suite, settings: Settings, what: str) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted())
+    before = run.completions.read_bytes(), run.about.read_bytes()
+    with pytest.raises(BadInput, match=re.escape(what)) as error:
+        generated(run, paper, Scripted(), settings=settings)
+    assert error.value.file == run.about
+    assert (run.completions.read_bytes(), run.about.read_bytes()) == before
+
+
+def test_another_model_or_template_is_refused(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted())
+    with pytest.raises(BadInput, match=r"\(scripted:one, now scripted:two\)"):
+        generated(run, paper, Scripted(name="scripted:two"))
+    run.about.write_text(json.dumps(about(run) | {"template": "0" * 64}))
+    with pytest.raises(BadInput, match=r"template \(000000000000\.\.\., now "):
+        generated(run, paper, Scripted())
+
+
+def test_another_timeout_or_address_is_no_matter(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted(), count=1)
+    moved = Settings(timeout=5, base_url="http://other/v1")
+    generated(run, paper, Scripted(), count=2, settings=moved)
+    assert keys(run) == expected(2)
+
+
+def test_completions_from_elsewhere_are_left_alone(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    run.path.mkdir()
+    run.completions.write_bytes(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}))
+    with pytest.raises(BadInput, match="missing") as error:
+        generated(run, paper, Scripted())
+    assert error.value.file == run.about
+    run.about.write_text('{"model": null}')
+    with pytest.raises(BadInput, match="from elsewhere"):
+        generated(run, paper, Scripted())
+
+
+def test_completions_of_another_instruction_are_refused(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted())
+    first, *others = rows(run)
+    changed = [first | {"instruction": "Do something else."}, *others]
+    run.completions.write_bytes(b"".join(map(to_line, changed)))
+    with pytest.raises(BadInput, match=r"/0/0 .* instruction"):
+        generated(run, paper, Scripted())
+
+
+def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    with run.writing(), pytest.raises(BadInput, match="another process"):
+        generated(run, paper, Scripted())
+
+
+# --- what goes wrong
+
+
+@pytest.mark.parametrize("cut", [1, 10, 200])
+def test_a_torn_last_line_is_asked_for_again(tmp_path: Path, paper: Suite, cut: int) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted())
+    run.completions.write_bytes(run.completions.read_bytes()[:-cut])
+    model = Scripted()
+    generated(run, paper, model)
+    assert len(model.asked) == 1
+    assert keys(run) == expected(3)
+
+
+def test_what_fails_is_missing_and_asked_for_again_later(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    refusing = Scripted(fails=lambda number: REFUSED if number in {3, 7} else None)
+    progress = generated(run, paper, refusing, pace=Pace(concurrency=1))
+    assert progress.missing is not None
+    assert progress.missing.startswith("2 completions ")
+    assert "SCRIPTED_API_KEY" in progress.missing
+    assert about(run)["ended"] is None
+    model = Scripted()
+    assert generated(run, paper, model).missing is None
+    assert (len(model.asked), keys(run)) == (2, expected(3))
+    assert about(run)["ended"] is not None
+    assert about(run)["possibly_paid_twice"] == 0
+
+
+def test_a_model_that_fails_now_and_then_is_not_given_up(tmp_path: Path, paper: Suite) -> None:
+    model = Scripted(fails=lambda number: REFUSED if number % 3 else None)
+    progress = generated(Run(tmp_path / "run"), paper, model, pace=Pace(concurrency=1))
+    assert (len(model.asked), progress.done, progress.stopped) == (30, 10, None)
+
+
+@pytest.mark.parametrize(("concurrency", "most"), [(1, 3), (8, 15)])
+def test_a_model_that_only_fails_is_given_up_and_leaves_nothing(
+    tmp_path: Path, paper: Suite, concurrency: int, most: int
+) -> None:
+    model = Scripted(fails=lambda _: REFUSED)
+    with pytest.raises(ModelError, match="SCRIPTED_API_KEY"):
+        generated(Run(tmp_path / "runs" / "run"), paper, model, pace=Pace(concurrency))
+    assert len(model.asked) <= most
+    assert list(tmp_path.iterdir()) == []
+    assert model.closed
+
+
+def test_a_reply_too_long_to_be_kept_is_a_failure(tmp_path: Path, paper: Suite) -> None:
+    with pytest.raises(ModelError, match=r"too long .* 6,0\d\d,\d\d\d bytes"):
+        generated(Run(tmp_path / "run"), paper, Scripted(text="#" * 3_000_000), pace=Pace(1))
+
+
+def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: Suite) -> None:
+    run = Run(tmp_path / "run")
+    progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
+    assert progress.done == 10
+    assert progress.missing is not None
+    assert re.match(r"20 completions .*\btoken budget of 1,000\b", progress.missing)
+    assert len(rows(run)) == 10
+    assert not run.in_flight.exists()
+    progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
+    assert (progress.found, progress.done, progress.twice) == (10, 20, 0)
+    generated(run, paper, Scripted())
+    assert keys(run) == expected(3)
+    assert about(run)["usage"] == {"input_tokens": 3000, "output_tokens": 300}
+
+
+def test_a_request_that_failed_is_no_longer_under_way_while_the_next_try_waits(
+    tmp_path: Path, paper: Suite
+) -> None:
+    run = Run(tmp_path / "run")
+    notes: list[list[str]] = []
+
+    def fails(number: int) -> ModelError | None:
+        notes.append([next(iter(row)) for _, row in read_rows(run.in_flight)])
+        return CUT if number == 0 else None
+
+    generated(run, paper, Scripted(fails=fails), count=1, pace=Pace(concurrency=1))
+    assert notes[:3] == [
+        ["lost", "sent"],
+        ["lost", "sent", "failed", "sent"],
+        ["lost", "sent", "failed", "sent", "sent"],
+    ]
+
+
+def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, paper: Suite) -> None:
+    chance = random.Random(3)
+    run = Run(tmp_path / "run")
+    model = Scripted(fails=lambda _: CUT if chance.random() < 0.1 else None)
+    progress = generate_run(run, Order(paper), model, Settings(), Pace(concurrency=100))
+    assert (progress.done, progress.missing) == (4000, None)
+    prompts = [(task.name, number) for task in paper.tasks.values() for number in range(len(task.prompts))]
+    assert keys(run) == sorted((*prompt, index) for prompt in prompts for index in range(50))
+    assert 4300 < len(model.asked) < 4600
+    assert about(run)["possibly_paid_twice"] == 0
+
+
+SCRIPT = """
+import pathlib, sys
+sys.path.insert(0, {tests!r})
+from codebotler.models.base import Settings
+from roboeval.evaluation.generate import Pace, generate_run
+from roboeval.evaluation.order import Order
+from roboeval.evaluation.run import Run
+from roboeval.suites.load import load_suite
+from scripted_model import Scripted
+print("on", flush=True)
+{before}
+generate_run(
+    Run(pathlib.Path({run!r})), Order(load_suite(), {tasks!r}, {count}),
+    Scripted(seconds={seconds}, log=pathlib.Path({log!r})), Settings(), Pace(concurrency=5),
+)
+"""
+
+
+def started(
+    run: Run, log: Path, *, count: int, seconds: float = 0.01, before: str = ""
+) -> subprocess.Popen[bytes]:
+    script = SCRIPT.format(
+        tests=str(Path(__file__).parents[1]),
+        run=str(run.path),
+        log=str(log),
+        tasks=SMALL,
+        count=count,
+        seconds=seconds,
+        before=before,
+    )
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout is not None
+    process.stdout.readline()
+    return process
+
+
+def wait_for_notes(log: Path, count: int) -> None:
+    """Wait until the model has noted so much."""
+    deadline = time.monotonic() + 30
+    while (log.read_bytes().count(b"\n") if log.exists() else 0) < count:
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def asked_of(log: Path, pid: int, suite: Suite) -> set[tuple[str, int, int]]:
+    """The completions that a process asked for, as the model noted it."""
+    prompts = {
+        instruction: (task.name, number)
+        for task in suite.tasks.values()
+        for number, instruction in enumerate(task.prompts)
+    }
+    noted = log.read_bytes() if log.exists() else b""
+    if noted and not noted.endswith(b"\n"):  # a kill tears a line where a page of memory ends
+        os.truncate(log, noted.rfind(b"\n") + 1)
+    notes = [json.loads(line) for line in noted.splitlines(keepends=True) if line.endswith(b"\n")]
+    return {(*prompts[told], index) for what, told, index, by in notes if what == "asked" and by == pid}
+
+
+def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
+    run, log = Run(tmp_path / "run"), tmp_path / "log"
+    chance = random.Random(5)
+    lost: Counter[tuple[str, int, int]] = Counter()
+    kills = 0
+    for _ in range(5):
+        notes = log.read_bytes().count(b"\n") if log.exists() else 0
+        process = started(run, log, count=60)
+        wait_for_notes(log, notes + chance.randint(10, 100))
+        time.sleep(chance.uniform(0, 0.01))
+        process.kill()
+        kills += process.wait() == -signal.SIGKILL
+        process.communicate()
+        done = {completion.key for completion in read_completions(run.completions, growing=True)}
+        under_way = asked_of(log, process.pid, paper) - done
+        assert len(under_way) <= 5
+        # A request is noted before the model hears of it, so that at most those being sent are counted too.
+        assert len(under_way) <= InFlight(run.in_flight).read(done, 0) <= 5
+        lost.update(under_way)
+    assert kills == 5
+    generated(run, paper, Scripted(), count=60)
+    assert Counter(keys(run)) == Counter(expected(60))
+    assert 0 < sum(lost.values()) <= about(run)["possibly_paid_twice"] <= sum(lost.values()) + kills
+    lines = map(json.loads, log.read_text().splitlines())
+    asked = Counter((told, index) for what, told, index, _ in lines if what == "asked")
+    assert sum(n - 1 for n in asked.values()) <= about(run)["possibly_paid_twice"]
+
+
+def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path, paper: Suite) -> None:
+    run, log = Run(tmp_path / "run"), tmp_path / "log"
+    process = started(run, log, count=60, seconds=0.05)
+    wait_for_notes(log, 50)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert b"KeyboardInterrupt" in err
+    done = set(keys(run))
+    under_way = asked_of(log, process.pid, paper) - done
+    assert 0 < len(under_way) <= 5
+    progress = generated(run, paper, Scripted(), count=60)
+    assert progress.twice == len(under_way)
+    assert about(run)["possibly_paid_twice"] == len(under_way)
+    assert Counter(keys(run)) == Counter(expected(60))
+    assert not run.in_flight.exists()
+
+
+def test_an_interruption_counts_what_waits_for_the_disk(
+    tmp_path: Path, paper: Suite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = Run(tmp_path / "run")
+    seen: list[Progress] = []
+    sync = Appender.sync
+
+    def interrupted(file: Appender) -> None:
+        if file.path == run.completions and file.path.read_bytes().count(b"\n") > 10:
+            monkeypatch.undo()
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+        sync(file)
+
+    monkeypatch.setattr(Appender, "sync", interrupted)
+    order = Order(paper, SMALL, 100)  # so many that it cannot be over by then
+    with pytest.raises(KeyboardInterrupt):
+        generate_run(run, order, Scripted(seconds=0.01), Settings(), Pace(), begun=seen.append)
+    (progress,) = seen
+    assert progress.done == len(rows(run)) > 10
+    assert progress.under_way > 0
+
+
+def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper: Suite) -> None:
+    run, log = Run(tmp_path / "run"), tmp_path / "log"
+    limit = (
+        "import resource, signal\nsignal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))\n"
+    )
+    process = started(run, log, count=20, seconds=0.0, before=limit)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 1
+    assert b"OSError: [Errno 27] File too large" in err
+    assert run.completions.read_bytes().endswith(b"}\n")
+    done = set(keys(run))
+    under_way = asked_of(log, process.pid, paper) - done
+    assert len(under_way) <= 5
+    progress = generated(run, paper, Scripted(), count=20)
+    assert len(under_way) <= progress.twice <= 5
+    assert Counter(keys(run)) == Counter(expected(20))
+
+
+@pytest.mark.parametrize("line", ["{}", '{"sent": 3}', '{"sent": ["a", "b", 1]}'])
+def test_a_note_that_somebody_broke_is_refused(tmp_path: Path, paper: Suite, line: str) -> None:
+    run = Run(tmp_path / "run")
+    generated(run, paper, Scripted())
+    run.in_flight.write_text(f'{{"lost": 0}}\n{line}\n')
+    with pytest.raises(BadInput, match="request") as error:
+        generated(run, paper, Scripted())
+    assert (error.value.file, error.value.line) == (run.in_flight, 2)

@@ -1,0 +1,243 @@
+"""The benchmark in Inspect: the same verdicts as ours, told in a log that its viewer opens.
+
+Inspect is an extra; `make test-inspect` runs this file.
+"""
+
+import asyncio
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+pytest.importorskip("inspect_ai", reason="Inspect is an extra")
+
+from inspect_ai import eval as inspect_eval
+from inspect_ai.log import EvalLog, list_eval_logs, read_eval_log
+from inspect_ai.model import ModelOutput, ModelUsage, get_model
+from inspect_ai.scorer import CORRECT, Target
+from playwright.sync_api import expect, sync_playwright
+
+from codebotler.badinput import BadInput
+from codebotler.prompts import prompt_for
+from roboeval.evaluation import inspect as inspecting
+from roboeval.evaluation.completions import Completion, Row, recorded_completions
+from roboeval.evaluation.judge import evaluate
+from roboeval.suites.load import Suite
+from viewing import chromium
+
+# Inspect leaves one of its own streams open for each sample.
+pytestmark = pytest.mark.filterwarnings("ignore:Unclosed <MemoryObjectReceiveStream:ResourceWarning")
+
+TASK = "codebotler/roboeval"
+
+
+def answering(completions: list[Completion]) -> Any:  # noqa: ANN401 - Inspect has no types here
+    """A model that answers with recorded programs, those for the same prompt in turns."""
+    programs: dict[str, list[str]] = defaultdict(list)
+    for completion in completions:
+        assert completion.instruction is not None
+        programs[prompt_for(completion.instruction).messages[-1].text].append(completion.program)
+    turns = {asked: count() for asked in programs}
+
+    def answer(said: list[Any], *_: object) -> ModelOutput:
+        known = programs[said[-1].text]
+        program = known[next(turns[said[-1].text]) % len(known)]
+        output = ModelOutput.from_content("mockllm", f"Here it is:\n```python\n{program}```\n")
+        output.usage = ModelUsage()  # otherwise it is counted with a table from the network
+        return output
+
+    return get_model("mockllm/model", custom_outputs=answer)
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("logs")
+
+
+@pytest.fixture(scope="module")
+def recorded(paper: Suite) -> list[Completion]:
+    """All that ship with the package."""
+    names = ("recorded:careful", "recorded:hasty")
+    return [completion for name in names for completion in recorded_completions(name, paper)]
+
+
+@pytest.fixture(scope="module")
+def judged(logs: Path, recorded: list[Completion]) -> EvalLog:
+    """What Inspect makes of them."""
+    most = max(Counter((completion.task, completion.prompt) for completion in recorded).values())
+    (log,) = inspect_eval(
+        TASK, model=answering(recorded), epochs=most, log_dir=str(logs), log_realtime=False, display="none"
+    )
+    assert log.status == "success", log.error
+    return read_eval_log(log.location)
+
+
+def test_all_recorded_completions_get_the_verdicts_that_we_give(
+    judged: EvalLog, recorded: list[Completion], paper: Suite
+) -> None:
+    ours = {
+        (c.task, c.prompt, c.program.rstrip()): row
+        for c, row in zip(recorded, evaluate(recorded, paper, workers=2), strict=True)
+    }
+    told = {}
+    for sample in judged.samples or []:
+        (score,) = (sample.scores or {}).values()
+        key = sample.metadata["task"], sample.metadata["prompt"], score.answer.rstrip()
+        told[key] = score
+        row = ours[key]
+        assert (score.value == CORRECT) == row["passed"]
+        assert score.metadata["failure"] == row["failure"]
+        for world, verdict in zip(score.metadata["worlds"], row["verdicts"], strict=True):
+            assert [world[k] for k in ("world", "satisfied", "status", "error", "line")] == [
+                verdict[k] for k in ("world", "satisfied", "status", "error", "line")
+            ]
+            assert [failed["check"] for failed in world["failed_checks"]] == verdict["failed_checks"]
+            assert len(world["steps"]) == len(verdict["trace"])
+            ended = f"{world['world']}: {'satisfied' if world['satisfied'] else 'not satisfied'}"
+            assert ended in score.explanation.splitlines()
+            for failed in world["failed_checks"]:
+                assert f"- {failed['check']}: {failed['explanation']}" in score.explanation
+    assert told.keys() == ours.keys()
+    shares = judged.results.scores[0].metrics
+    samples = judged.samples or []
+    passed = sum(next(iter((s.scores or {}).values())).value == CORRECT for s in samples)
+    assert shares["accuracy"].value == pytest.approx(passed / len(samples))
+    assert shares.keys() >= {"accuracy", "stderr", *paper.tasks}
+
+
+def test_a_sample_is_a_prompt_with_what_our_command_asks(paper: Suite) -> None:
+    made = inspecting.roboeval(tasks="LunchTime,SayGoodDay")
+    assert [sample.id for sample in made.dataset] == [
+        f"{task}/{number}" for task in ("LunchTime", "SayGoodDay") for number in range(5)
+    ]
+    (instruction, asked) = (paper.tasks["SayGoodDay"].prompts[2], made.dataset[7].input)
+    assert asked == instruction
+    state = SimpleNamespace(input_text=asked, messages=[])
+    told = asyncio.run(made.setup(state, None)).messages
+    ours = prompt_for(instruction).messages
+    assert [(said.role, said.text) for said in told] == [(said.role, said.text) for said in ours]
+    assert (made.config.temperature, made.config.top_p, made.config.max_tokens) == (0.2, 0.95, 512)
+    with pytest.raises(BadInput, match='"Sing"'):
+        inspecting.roboeval(tasks=["Sing"])
+    with pytest.raises(BadInput, match="written by hand"):
+        inspecting.roboeval(worlds=3)
+
+
+def scored(program: str) -> Any:  # noqa: ANN401 - Inspect has no types here
+    about = {"task": "SayGoodDay", "prompt": 0}
+    state = SimpleNamespace(metadata=about, output=SimpleNamespace(completion=program))
+    return inspecting.verdict()(state, Target(""))  # all of a state that is looked at
+
+
+def test_what_a_log_cannot_hold_is_no_reason_to_stop() -> None:
+    score = asyncio.run(scored("def task_program():\n    go_to('amy\\'s lab')\n    say('\\ud800')\n"))
+    assert score.metadata["worlds"][0]["steps"][-1]["text"] == "?"
+    assert score.model_dump_json()
+
+
+def test_the_loop_goes_on_while_a_program_is_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+    went_on = threading.Event()
+
+    def slowly(*arguments: Any, **options: Any) -> Iterator[Row]:  # noqa: ANN401 - whatever it takes
+        assert went_on.wait(20), "the loop stands still"
+        return evaluate(*arguments, **options)
+
+    monkeypatch.setattr(inspecting, "evaluate", slowly)
+
+    async def both() -> Any:  # noqa: ANN401 - as above
+        judging = asyncio.ensure_future(scored("def task_program():\n    pass\n"))
+        await asyncio.sleep(0.1)
+        went_on.set()
+        return await judging
+
+    assert asyncio.run(both()).value != CORRECT
+
+
+# --- as a user has it
+
+COMMAND = """
+import tiktoken
+class Words:  # the mock model counts tokens with a table from the network, which tests go without
+    def encode(self, text, **_):
+        return text.split()
+tiktoken.get_encoding = lambda name: Words()
+from importlib.metadata import entry_points
+(command,) = entry_points(group="console_scripts", name="inspect")
+command.load()()
+"""
+
+
+def test_the_command_finds_the_task_by_its_name(tmp_path: Path) -> None:
+    asked = "eval codebotler/roboeval --model mockllm/model -T tasks=LunchTime --limit 2 --display plain"
+    command = [sys.executable, "-c", COMMAND, *asked.split(), "--log-dir", str(tmp_path)]
+    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    (found,) = list_eval_logs(str(tmp_path))
+    log = read_eval_log(found)
+    assert (log.status, log.eval.task_registry_name) == ("success", TASK)
+    assert [scorer.name for scorer in log.eval.scorers] == ["verdict"]
+    for sample in log.samples or []:
+        (score,) = (sample.scores or {}).values()
+        assert score.metadata["failure"]["kind"] == "SyntaxError"
+
+
+@pytest.fixture
+def viewer(logs: Path, tmp_path: Path) -> Iterator[str]:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    arguments = ["view", "start", "--host", "127.0.0.1", "--port", str(port), "--log-dir", str(logs)]
+    viewing = subprocess.Popen(
+        [sys.executable, "-c", COMMAND, *arguments],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    url = f"http://127.0.0.1:{port}/"
+    try:
+        for _ in range(200):
+            try:
+                urllib.request.urlopen(url).close()
+                break
+            except OSError:
+                time.sleep(0.1)
+        yield url
+    finally:
+        viewing.terminate()
+        viewing.wait()
+
+
+def test_the_viewer_opens_the_log(judged: EvalLog, viewer: str, pytestconfig: pytest.Config) -> None:
+    browser_path = chromium()
+    if browser_path is None:
+        pytest.skip("there is no Chromium here: apt-get install chromium-headless-shell")
+    sample = next(one for one in judged.samples or [] if one.scores["verdict"].metadata["failure"])
+    failed = next(w for w in sample.scores["verdict"].metadata["worlds"] if not w["satisfied"])
+    shots = pytestconfig.getoption("--shots")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=browser_path, args=["--no-sandbox", "--disable-gpu"]
+        )
+        page = browser.new_page(viewport={"width": 1400, "height": 1000})
+        page.set_default_timeout(40_000)
+        expect.set_options(timeout=40_000)
+        page.goto(viewer)
+        expect(page.get_by_text("480 Samples")).to_be_visible()
+        expect(page.get_by_text(sample.input[:40]).first).to_be_visible()
+        if shots:
+            page.screenshot(path=str(Path(shots) / "inspect-samples.png"))
+        page.get_by_text(sample.id, exact=True).nth(sample.epoch - 1).click()
+        page.get_by_role("tab", name="Scoring").click()
+        expect(page.get_by_text(f"{failed['world']}: not satisfied")).to_be_visible()
+        if shots:
+            page.screenshot(path=str(Path(shots) / "inspect-scoring.png"))
+        browser.close()

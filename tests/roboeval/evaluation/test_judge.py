@@ -1,0 +1,212 @@
+"""What is right and wrong: errors, limits, worlds that may wait, options that cannot be judged."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
+from codebotler.world import Room, World
+from roboeval.evaluation.completions import Completion, Row
+from roboeval.evaluation.failures import Failure, Verdict, failure
+from roboeval.evaluation.judge import evaluate, judge
+from roboeval.suites.load import Scenario, Suite, load_suite
+
+SUITE = "name: mine\nversion: 1\n"
+TASK = """\
+name: T
+summary: s
+prompts: [p]
+checks:
+  goes: {category: Location, rtl: 'tr.Exists(goto("kitchen"))'}
+  asks: {category: AskAtLocation, rtl: 'tr.Exists(ask("tea", ".*"))'}
+  says(what): {category: SayAtLocation, rtl: 'tr.Exists(say("{what}"))'}
+worlds:
+  - about: one
+    robot: kitchen
+    rooms: [kitchen]
+    people: {kitchen: [{name: kim, answers: ["1", "2"]}]}
+    require: [goes, says("hi"), not asks]
+  - about: may wait
+    robot: kitchen
+    rooms: [kitchen]
+    may_wait_forever: true
+    require: [goes]
+"""
+
+
+@pytest.fixture
+def suite(tmp_path: Path) -> Suite:
+    (tmp_path / "suite.yaml").write_text(SUITE)
+    (tmp_path / "tasks").mkdir()
+    (tmp_path / "tasks" / "T.yaml").write_text(TASK)
+    return load_suite(str(tmp_path))
+
+
+def judged(suite: Suite, *programs: str) -> list[Row]:
+    completions = [Completion(task="T", prompt=0, index=i, program=p) for i, p in enumerate(programs)]
+    return list(evaluate(completions, suite, workers=2))
+
+
+def first_failure(suite: Suite, program: str) -> dict[str, Any] | None:
+    (row,) = judged(suite, program)
+    assert row["passed"] == (row["failure"] is None)
+    why: dict[str, Any] | None = row["failure"]
+    return why
+
+
+GOOD = "def task_program():\n    go_to('the kitchen')\n    say('hi')\n"
+
+
+def test_a_program_that_satisfies_every_world_passes(suite: Suite) -> None:
+    assert first_failure(suite, GOOD) is None
+
+
+def test_the_first_failed_check_decides(suite: Suite) -> None:
+    assert first_failure(suite, "def task_program(): say('hi')") == {
+        "class": "TaskCompletionError",
+        "kind": "Location",
+        "world": 0,
+        "check": "goes",
+    }
+
+
+def test_an_error_decides_whatever_was_done_before(suite: Suite) -> None:
+    why = first_failure(suite, GOOD + "    pick('x')\n")
+    assert why == {"class": "RobotExecutionError", "kind": "PickInvalidObject", "world": 0, "check": None}
+    why = first_failure(suite, GOOD + "    undefined\n")
+    assert why == {"class": "PythonError", "kind": "NameError", "world": 0, "check": None}
+
+
+def test_the_trace_of_a_run_that_ended_in_an_error_is_kept_but_not_judged(suite: Suite) -> None:
+    (row,) = judged(suite, GOOD + "    undefined\n")
+    verdict = row["verdicts"][0]
+    assert verdict["trace"] == [["goto", "the kitchen"], ["say", "hi"]]
+    assert verdict["failed_checks"] == []
+    assert not verdict["satisfied"]
+
+
+def test_a_limit_fails_a_world_that_may_not_wait(suite: Suite) -> None:
+    assert first_failure(suite, GOOD + "    while True: time.sleep(1)\n") == {
+        "class": "PythonError",
+        "kind": "TimeoutError",
+        "world": 0,
+        "check": None,
+    }
+
+
+def test_a_limit_leaves_the_requirements_to_decide_where_a_world_may_wait(suite: Suite) -> None:
+    (waits, waits_elsewhere) = judged(
+        suite,
+        GOOD + "    while True: time.sleep(1)\n",
+        "def task_program():\n    while True: time.sleep(1)\n",
+    )
+    assert waits["verdicts"][1]["satisfied"]
+    assert waits["verdicts"][1]["status"] == "timeout"
+    assert not waits_elsewhere["verdicts"][1]["satisfied"]
+    assert waits_elsewhere["verdicts"][1]["failed_checks"] == ["goes"]
+
+
+def test_an_option_that_is_no_text_cannot_be_judged_negated_or_not(suite: Suite) -> None:
+    program = GOOD + "    ask('', 'coffee?', [1, 2])\n"
+    assert first_failure(suite, program) == {
+        "class": "TaskCompletionError",
+        "kind": "AskAtLocation",
+        "world": 0,
+        "check": "not asks",
+    }
+    (row,) = judged(suite, program)
+    assert row["verdicts"][0]["status"] == "finished"
+    assert row["verdicts"][0]["error"] is None
+    assert row["verdicts"][0]["trace"][-1] == ["ask", "coffee?", [{"no text": "1"}, {"no text": "2"}], "1"]
+
+
+def test_a_program_is_judged_exactly_as_it_stands(suite: Suite) -> None:
+    assert first_failure(suite, "```python\n" + GOOD + "```") == {
+        "class": "PythonError",
+        "kind": "SyntaxError",
+        "world": 0,
+        "check": None,
+    }
+    assert first_failure(suite, "go_to('kitchen')\nsay('hi')\n") == {
+        "class": "PythonError",
+        "kind": "NameError",
+        "world": 0,
+        "check": None,
+    }
+    cut_off = GOOD[:-2]
+    assert first_failure(suite, cut_off) is not None
+
+
+def test_rows_come_in_the_order_of_completions(suite: Suite) -> None:
+    programs = [f"def task_program():\n    say('{n}')\n" for n in (3, 1, 2, 1, 3)]
+    said = [row["verdicts"][0]["trace"][0][1] for row in judged(suite, *programs)]
+    assert said == ["3", "1", "2", "1", "3"]
+
+
+def test_what_a_killed_process_is_called(suite: Suite) -> None:
+    assert first_failure(suite, "import os\nos._exit(0)") == {
+        "class": "PythonError",
+        "kind": "Crash",
+        "world": 0,
+        "check": None,
+    }
+
+
+# --- judging alone
+
+WORLD = Scenario(World((Room("kitchen"),), "kitchen", about="w"), ())
+GREETING: Trace = (Event("say", "hi"),)
+
+
+@pytest.mark.parametrize("status", [s for s in Status if s is not Status.FINISHED])
+def test_only_a_finished_run_can_satisfy_a_world(status: Status) -> None:
+    outcome = Outcome(status, GREETING, RunError("X", "x"))
+    assert not judge(outcome, WORLD).satisfied
+    assert judge(Outcome(Status.FINISHED, GREETING), WORLD).satisfied
+
+
+def test_the_first_unsatisfied_world_decides() -> None:
+    def verdict(kind: str, *, satisfied: bool) -> Verdict:
+        error = None if satisfied else RunError(kind, "m")
+        status = Status.FINISHED if satisfied else Status.PYTHON_ERROR
+        return Verdict("w", Outcome(status, (), error), (), satisfied=satisfied)
+
+    verdicts = [verdict("A", satisfied=True), verdict("B", satisfied=False), verdict("C", satisfied=False)]
+    assert failure(verdicts) == Failure("PythonError", "B", 1)
+    assert failure(verdicts[:1]) is None
+
+
+def test_options_are_compared_as_they_were_offered() -> None:
+    assert Option("1", is_text=False) != Option("1")
+
+
+OURS = Completion(task="Visit", prompt=0, index=0, program="")
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        (replace(OURS, task="Vist"), '"Vist"'),
+        (replace(OURS, prompt=9), "/9/0: .* prompts 0 to "),
+        (OURS.row, "dict.* Completion"),
+    ],
+)
+def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: object, named: str) -> None:
+    task = next(iter(paper.tasks))
+    if isinstance(wrong, Completion) and wrong.task == OURS.task:
+        wrong = replace(wrong, task=task)
+    completion: Any = wrong
+    with pytest.raises(BadInput, match=named):
+        list(evaluate([completion], paper))
+
+
+def test_evaluating_takes_workers_and_an_ablation(paper: Suite) -> None:
+    with pytest.raises(BadInput, match=r"workers is 0, .* 1"):
+        evaluate([], paper, workers=0)
+    task = next(task.name for task in paper.tasks.values() if task.ablation is None)
+    completion = replace(OURS, task=task)
+    with pytest.raises(BadInput, match=f'"{task}" .*ablation'):
+        list(evaluate([completion], paper, ablated=True))

@@ -1,0 +1,345 @@
+"""Rewards: 1 exactly for what passes, nothing for nothing, from any thread and any process."""
+
+import gc
+import logging
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.simulator.isolated import ONE_AT_A_TIME
+from codebotler.simulator.lane import EVENTS
+from codebotler.simulator.warm import warm
+from codebotler.trace import Event, Outcome, RunError, Status
+from processes import are_gone, children_of
+from roboeval.evaluation.completions import recorded_completions
+from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.rewards import REWARDS, Share, reward, total
+from roboeval.suites.load import Suite, load_suite
+
+RIGHT = """
+def task_program():
+    for room in get_all_rooms():
+        if "lab" in room:
+            go_to(room)
+            if is_in_room("person"):
+                say("Good day!")
+"""
+NOTHING = ("", "no program", "def task_program():\n    pass\n", "def task_program():\n    say('hello')\n")
+
+
+def distinct(count: int, mark: str) -> list[str]:
+    return [f"{RIGHT}# {mark} {number}\n" for number in range(count)]
+
+
+@pytest.mark.parametrize("model", ["recorded:careful", "recorded:hasty"])
+def test_the_reward_is_1_exactly_for_what_passes(model: str, paper: Suite) -> None:
+    completions = list(recorded_completions(model, paper))
+    passed = [row["passed"] for row in evaluate(completions, paper, workers=2)]
+    by_task = groupby(completions, key=lambda completion: completion.task)
+    told = [one for task, its in by_task for one in reward(task, 0, [c.program for c in its])]
+    assert [one == 1 for one in told] == passed
+    assert all(0 <= one <= 1 for one in told)
+    if model == "recorded:hasty":
+        assert len({round(one, 3) for one in told}) > 20  # of which most are partly right
+
+
+def test_nothing_is_worth_nothing_in_any_task(paper: Suite) -> None:
+    assert {task: reward(task, 0, NOTHING) for task in paper.tasks} == {
+        task: [0.0] * len(NOTHING) for task in paper.tasks
+    }
+
+
+def test_who_errs_gets_half_of_who_returns() -> None:
+    at_once, late = "    go_to('nowhere')\n", "    return\n"
+    part = RIGHT.replace("Good day!", "Good morning!")
+    returned, erred, right, spoiled = reward(
+        "SayGoodDay", 0, [part + late, part + at_once, RIGHT, RIGHT + at_once]
+    )
+    assert 0 < returned < 1
+    assert erred == pytest.approx(returned / 2)
+    assert (right, spoiled) == (1, 0.5)
+
+
+def test_what_was_let_be_only_scales_what_was_gained(paper: Suite) -> None:
+    scenario = paper.tasks["SayGoodDay"].scenarios[3]  # nobody is in a lab
+    free = [False, True, False, True, True]
+    assert [requirement.text for requirement in scenario.require] == [
+        "visits_every_lab",
+        "visits_nothing_else",
+        "looks_into_every_lab",
+        'says_nothing_like_it("sam")',
+        'says_nothing_like_it("amy")',
+    ]
+    trace = (Event("goto", "sam's lab"), Event("say", "good day"), Event("goto", "amy's lab"))
+    share = Share.of(Outcome(Status.FINISHED, trace), scenario, free)
+    assert share == Share(gained=1 / 2, kept=2 / 3)
+    stopped = Outcome(Status.TIMEOUT, trace, RunError("TimeoutError", "an hour"))
+    assert Share.of(stopped, scenario, free) == Share(gained=1 / 2, kept=1 / 3)
+    assert Share.of(Outcome(Status.FINISHED, ()), scenario, free) == Share(gained=0.0, kept=1.0)
+
+
+def test_a_world_that_only_asks_to_let_something_be_counts_as_the_others_do() -> None:
+    let_be = Share(gained=None, kept=1.0)
+    assert total([Share(0.0, 1.0), let_be]) == 0
+    assert total([Share(0.5, 1.0), let_be]) == 0.5
+    assert total([Share(1.0, 1.0), Share(None, 0.5)]) == 0.75
+    assert total([let_be]) == 1  # where nothing is to be done anywhere
+
+
+def test_equal_programs_are_judged_once(caplog: pytest.LogCaptureFixture) -> None:
+    (program,) = distinct(1, "once")
+    with caplog.at_level(logging.DEBUG, logger=EVENTS.name):
+        first = reward("SayGoodDay", 0, [program] * 50)
+        assert reward("SayGoodDay", 3, [program]) == first[:1] == [1.0]
+    started = [record for record in caplog.records if record.getMessage().endswith("started")]
+    assert len(started) == 4  # one a world
+
+
+def test_it_may_be_called_from_many_threads_at_once() -> None:
+    shared = [*distinct(10, "shared"), *NOTHING]
+
+    def one(number: int) -> list[float]:
+        return reward("SayGoodDay", 0, [*shared, *distinct(2, f"thread {number}")])
+
+    with ThreadPoolExecutor(12) as threads:
+        told = list(threads.map(one, range(12)))
+    assert told == [[1.0] * 10 + [0.0] * len(NOTHING) + [1.0] * 2] * 12
+
+
+@pytest.fixture
+def uncollected() -> Iterator[None]:
+    """No garbage is collected meanwhile: Python loses an interrupt that comes in a `__del__`."""
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+def interrupt(asked: int) -> None:
+    """Interrupt this process once it waits for so many programs."""
+    while len(REWARDS._running) < asked:
+        time.sleep(0.01)
+    time.sleep(0.1)
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+@pytest.mark.usefixtures("uncollected")
+def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # in the place of polars' own
+    lanes = warm()
+    gate, patience = threading.Event(), 60
+    here, plain_submit = lanes.here, lanes.submit
+    monkeypatch.setattr(lanes, "here", lambda: gate.wait(patience) and here())
+    waited_for = distinct(8, "interrupted")
+    asked = threading.Event()
+
+    def submit(function: Callable[..., object], *args: object) -> object:
+        asked.set()
+        return plain_submit(function, *args)
+
+    monkeypatch.setattr(lanes, "submit", submit)
+    with ThreadPoolExecutor(1) as beside:
+        other = beside.submit(reward, "SayGoodDay", 0, waited_for)
+        assert asked.wait(patience)
+        beside_it = threading.Thread(target=interrupt, args=(len(waited_for) + 1_000,))
+        beside_it.start()
+        with pytest.raises(KeyboardInterrupt):
+            reward("SayGoodDay", 0, [*waited_for, *distinct(1_000, "given up")])
+        beside_it.join()
+        gate.set()
+        assert other.result() == [1.0] * 8  # the other thread asks again for what was taken from it
+    assert not REWARDS._running
+
+
+def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
+    with pytest.raises(BadInput, match="a list"):
+        reward("SayGoodDay", 0, RIGHT)
+    with pytest.raises(BadInput, match='"Sing"'):
+        reward("Sing", 0, [RIGHT], suite=paper)
+    with pytest.raises(BadInput, match="prompts 0 to 4"):
+        reward("SayGoodDay", 5, [RIGHT])
+    with pytest.raises(BadInput, match="written by hand"):
+        reward("SayGoodDay", 0, [RIGHT], worlds=3)
+    with pytest.raises(BadInput, match=r"worlds is 0, .* 1"):
+        reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=0)
+    with pytest.raises(BadInput, match=r"worlds is 1000000000, .* 10,000"):
+        reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=10**9)
+    wrong: Any = "7"
+    with pytest.raises(BadInput, match="seed is '7'"):
+        reward("SayGoodDay", 0, [RIGHT], suite="plus", seed=wrong)
+    wrong = None
+    with pytest.raises(BadInput, match=r"suite.* is None"):
+        reward("SayGoodDay", 0, [RIGHT], suite=wrong)
+    assert reward("SayGoodDay", 0, []) == []
+
+
+@pytest.mark.parametrize(
+    ("task", "prompt", "programs", "named"),
+    [
+        ("LunchTime", 0, [None], ["programs is None"]),
+        ("LunchTime", 0, None, ["programs are None", "list"]),
+        ("LunchTime", "0", [], ["prompt is '0'", "0 to 4"]),
+        ("LunchTime", True, [], ["prompt is True", "0 to 4"]),
+        ("LunchTime", -1, [], ["LunchTime/-1/0", "0 to 4"]),
+        (["LunchTime"], 0, [], ['"paper"', "no task"]),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(
+    task: object, prompt: object, programs: object, named: list[str]
+) -> None:
+    wrong: Any = (task, prompt, programs)
+    with pytest.raises(BadInput) as error:
+        reward(*wrong)
+    assert all(name in error.value.sentence for name in named), error.value
+
+
+# --- processes
+
+
+def told_by_child(programs: list[str], queue: "multiprocessing.SimpleQueue[object]") -> None:
+    signal.alarm(60)
+    queue.put((reward("SayGoodDay", 0, programs), children_of(os.getpid())))
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
+def test_a_forked_process_has_an_engine_of_its_own() -> None:
+    programs = distinct(5, "before")
+    assert reward("SayGoodDay", 0, programs) == [1.0] * 5
+    ours = children_of(os.getpid())
+    forking = multiprocessing.get_context("fork")
+    queue = forking.SimpleQueue()
+    children = [
+        forking.Process(target=told_by_child, args=([*programs, *distinct(20, f"child {n}")], queue))
+        for n in range(2)
+    ]
+    stop = threading.Event()
+
+    def keep_busy() -> None:
+        number = 0
+        while not stop.is_set():
+            number += 1
+            reward("SayGoodDay", 0, distinct(4, f"meanwhile {number}"))
+
+    busy = threading.Thread(target=keep_busy)
+    busy.start()
+    try:
+        for child in children:
+            child.start()
+        for child in children:
+            child.join()
+    finally:
+        stop.set()
+        busy.join()
+    assert [child.exitcode for child in children] == [0, 0]
+    found = [queue.get() for _ in children]
+    assert [rewards for rewards, _ in found] == [[1.0] * 25] * 2
+    theirs = set().union(*(pids for _, pids in found))
+    assert theirs
+    assert not theirs & ours
+    assert are_gone(theirs)
+    assert reward("SayGoodDay", 0, distinct(5, "after")) == [1.0] * 5
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
+def test_a_process_that_is_started_anew_is_given_the_suite_itself() -> None:
+    asked = partial(reward, "SayGoodDay", 0, [RIGHT, *NOTHING])
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        told = pool.submit(asked, suite=load_suite("plus")).result()
+    assert told == asked(suite="plus")
+    assert any(told)
+
+
+def test_nobody_forks_in_the_middle_of_a_start() -> None:
+    began = threading.Event()
+
+    def starting() -> None:
+        with ONE_AT_A_TIME:
+            began.set()
+            time.sleep(0.3)
+
+    other = threading.Thread(target=starting)
+    other.start()
+    assert began.wait(10)
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if ONE_AT_A_TIME.acquire(timeout=5) else 1)
+    other.join()
+    assert os.waitpid(child, 0)[1] == 0
+    assert ONE_AT_A_TIME.acquire(timeout=5)
+    ONE_AT_A_TIME.release()
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
+def test_a_forked_process_does_not_wait_for_threads_of_the_one_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lanes, gate, patience = warm(), threading.Event(), 60
+    here = lanes.here
+    monkeypatch.setattr(lanes, "here", lambda: gate.wait(patience) and here())
+    (program,) = distinct(1, "under way")
+    with ThreadPoolExecutor(1) as beside:
+        other = beside.submit(reward, "SayGoodDay", 0, [program])
+        while not REWARDS._running:
+            time.sleep(0.01)
+        child = os.fork()
+        if child == 0:
+            signal.alarm(patience // 2)
+            os._exit(0 if reward("SayGoodDay", 0, [program]) == [1.0] else 1)
+        status = os.waitpid(child, 0)[1]
+        gate.set()
+        assert other.result() == [1.0]
+    assert status == 0
+
+
+SCRIPT = """
+import os, threading
+from pathlib import Path
+from roboeval import reward
+
+def children():
+    mine = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            text = stat.read_text(errors="replace")
+        except OSError:
+            continue
+        if int(text.rpartition(")")[2].split()[1]) == os.getpid():
+            mine.append(int(stat.parent.name))
+    return mine
+
+right = "def task_program():\\n    pass\\n"
+first = threading.Thread(target=lambda: reward("SayGoodDay", 0, [right]))
+first.start(); first.join()  # processes outlive the thread that asked for them first
+assert reward("SayGoodDay", 0, [right + "# again"]) == [0.0]
+parents = children()
+if not (pid := os.fork()):
+    assert reward("SayGoodDay", 0, [right + "# child"]) == [0.0]
+    print("child", *children(), flush=True)
+    raise SystemExit(0)
+assert os.waitpid(pid, 0)[1] == 0
+assert reward("SayGoodDay", 0, [right + "# parent"]) == [0.0]
+print("parent", *parents, flush=True)
+"""
+
+
+def test_all_processes_end_with_the_one_that_asked_for_them() -> None:
+    command = [sys.executable, "-W", "error", "-W", "ignore:.*use of fork:DeprecationWarning", "-c", SCRIPT]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    pids = {name: {*map(int, rest)} for name, *rest in map(str.split, ended.stdout.splitlines())}
+    assert set(pids) == {"child", "parent"}
+    assert len(pids["child"]) >= 2
+    assert not pids["child"] & pids["parent"]
+    assert are_gone(pids["child"] | pids["parent"])

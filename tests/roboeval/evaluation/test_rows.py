@@ -1,0 +1,150 @@
+"""What was damaged in an evaluation is noticed by all who read it, and nothing unknown is taken for known."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.files import to_line
+from roboeval.analysis.search import Question, search
+from roboeval.evaluation.completions import Row
+from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.evaluation import Evaluation
+from roboeval.evaluation.rows import row_of
+from roboeval.evaluation.run import Run
+from roboeval.suites.load import Suite
+from roboeval.web.followed import FollowedRun
+from seals import unseal
+
+PLACES = 60
+Parts = tuple[Any, ...]
+
+
+def completions(run: Run, count: int) -> None:
+    rows = (
+        {"task": "LunchTime", "prompt": 0, "index": n, "program": f"go_to('office {n}')\nsay('Hi!')\n"}
+        for n in range(count)
+    )
+    run.completions.write_bytes(b"".join(map(to_line, rows)))
+
+
+def judged(run: Run, suite: Suite) -> list[Row]:
+    return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=False))
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory, paper: Suite) -> Run:
+    run = Run(tmp_path_factory.mktemp("run"))
+    completions(run, 3)
+    judged(run, paper)
+    return run
+
+
+@pytest.fixture
+def run(finished: Run, tmp_path: Path) -> Run:
+    again = Run(tmp_path / "run")
+    for path in (finished.completions, *finished.rows("").parent.iterdir()):
+        copy = again.path / path.relative_to(finished.path)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(path.read_bytes())
+    return again
+
+
+def head(run: Run) -> dict[str, Any]:
+    return json.loads(run.head("paper").read_text())  # type: ignore[no-any-return]  # JSON
+
+
+def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: Run) -> None:
+    content = run.rows("paper").read_bytes()
+    assert (head(run)["rows"], head(run)["sha256"]) == (3, hashlib.sha256(content).hexdigest())
+    assert len(list(Evaluation(run, "paper").rows())) == 3
+
+
+def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
+    path = run.rows("paper")
+    content = path.read_bytes()
+    readers: dict[str, Callable[[], object]] = {
+        "rows": lambda: list(Evaluation(run, "paper").rows()),
+        "find": lambda: list(
+            Evaluation(run, "paper").read_by(lambda lines: search(lines, Question('tr.Exists(say("x"))')))
+        ),
+        "evaluate": lambda: judged(run, paper),
+    }
+    for number in range(PLACES):
+        flipped = bytearray(content)
+        flipped[number * (len(content) - 1) // (PLACES - 1)] ^= 1 << number % 8
+        for name, read in readers.items():
+            path.write_bytes(flipped)
+            with pytest.raises(BadInput) as caught:
+                read()
+            assert caught.value.file == path, (number, name)
+            assert "--redo" in caught.value.sentence
+        path.write_bytes(flipped)
+        assert FollowedRun(run, "paper", run.path.resolve()).wait().fault_count > 0, number
+
+
+def test_rows_that_are_missing_or_too_many_are_noticed(run: Run) -> None:
+    lines = run.rows("paper").read_bytes().splitlines(keepends=True)
+    for damaged in (lines[:2], [*lines, lines[0]], [*lines, b'{"torn'], [lines[1], lines[0], lines[2]]):
+        run.rows("paper").write_bytes(b"".join(damaged))
+        with pytest.raises(BadInput, match="--redo"):
+            list(Evaluation(run, "paper").rows())
+
+
+def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: Run, paper: Suite) -> None:
+    sealed = run.head("paper").read_bytes()
+    unseal(run.path)
+    assert len(list(Evaluation(run, "paper").rows())) == 3
+    assert FollowedRun(run, "paper", run.path.resolve()).wait().fault_count == 0
+    judged(run, paper)
+    assert run.head("paper").read_bytes() == sealed
+
+
+def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: Run, paper: Suite) -> None:
+    completions(run, 5)
+    rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False)
+    assert [next(rows)["index"] for _ in range(4)] == [0, 1, 2, 3]
+    rows.close()  # type: ignore[attr-defined]  # of a generator
+    assert not {"rows", "sha256"} & head(run).keys()
+    assert len(list(Evaluation(run, "paper").rows())) == 4
+    judged(run, paper)
+    content = run.rows("paper").read_bytes()
+    assert (head(run)["rows"], head(run)["sha256"]) == (5, hashlib.sha256(content).hexdigest())
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("more",), 1),
+        (("failure", "more"), 1),
+        (("failure", "world"), 2),
+        (("passed",), True),
+        (("verdicts", 1, "more"), 1),
+        (("verdicts", 1, "status"), "finishee"),
+        (("verdicts", 1, "trace"), [["goto", "lab"], ["wave", "amy"]]),
+        (("verdicts", 1, "trace"), [["goto", "lab"], []]),
+        (("verdicts", 1, "cut"), {"events": 1}),
+    ],
+)
+def test_what_is_unknown_in_a_row_is_refused_with_its_line(run: Run, place: Parts, value: object) -> None:
+    rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
+    assert rows == [*map(row_of, rows)]
+    inner = rows[1]
+    for part in place[:-1]:
+        inner = inner[part]
+    inner[place[-1]] = value
+    run.rows("paper").write_bytes(b"".join(map(to_line, rows)))
+    unseal(run.path)
+    evaluation = Evaluation(run, "paper")
+    for reading in (evaluation.rows(), evaluation.read_by(lambda lines: search(lines, Question()))):
+        with pytest.raises(BadInput) as caught:
+            list(reading)
+        assert (caught.value.file, caught.value.line) == (run.rows("paper"), 2)
+    (fault,) = FollowedRun(run, "paper", run.path.resolve()).wait().faults
+    assert "line 2" in fault

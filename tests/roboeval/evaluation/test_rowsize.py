@@ -1,0 +1,112 @@
+"""A row of an evaluation is bounded, whatever its program did; shorter ones stay as they are."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from codebotler.files import to_line
+from codebotler.rtl import parse
+from codebotler.trace import Event, Outcome, RunError, Status, Trace
+from codebotler.world import Room, World
+from roboeval.analysis.export import table
+from roboeval.analysis.search import Question, asked_of
+from roboeval.evaluation.completions import Completion, Row
+from roboeval.evaluation.explanation import completion_data, completion_view
+from roboeval.evaluation.failures import Verdict
+from roboeval.evaluation.judge import evaluation, judgement
+from roboeval.evaluation.rowsize import MOST, MOST_OF_WORLD
+from roboeval.report.strengths import never_returned
+from roboeval.suites.load import Suite, load_suite
+
+WORLD = World(rooms=(Room("start"),), robot="start", about="nobody is in")
+LOUD = (Event("goto", "start"), *[Event("say", "\x00\x1b" * 4_999)] * 98)
+WORDY = Completion(task="T" * 250, prompt=999_999_999, index=999_999_999, program="x = 1")
+
+
+def row(traces: list[Trace], message: str = "no", completion: Completion = WORDY) -> Row:
+    error = RunError("K" * 100, message)
+    outcomes = [Outcome(Status.PYTHON_ERROR, trace, error, 1) for trace in traces]
+    verdicts = [Verdict(f"World {n}", outcome, (), satisfied=False) for n, outcome in enumerate(outcomes)]
+    return evaluation(completion, judgement(verdicts))
+
+
+@pytest.mark.parametrize(("worlds", "most"), [(1, MOST), (50, MOST), (80, 80 * MOST_OF_WORLD)])
+def test_a_row_is_bounded_whatever_was_said(worlds: int, most: int) -> None:
+    one = row([LOUD[:20]] * worlds, "\x00" * 1_000)
+    line = to_line(one)
+    assert 0.5 * most - 70_000 * worlds < len(line) <= most
+    whole = to_line([[e.kind, e.text] for e in LOUD[:20]])[:-1]
+    for verdict in one["verdicts"]:
+        assert verdict["cut"] == {
+            "events": 20 - len(verdict["trace"]),
+            "sha256": hashlib.sha256(whole).hexdigest(),
+        }
+        assert verdict["trace"][0] == ["goto", "start"]
+        assert (verdict["error"]["message"], verdict["line"]) == ("\x00" * 1_000, 1)
+    assert to_line(row([LOUD[:20]] * worlds, "\x00" * 1_000)) == line
+
+
+def test_what_fits_stays_whole() -> None:
+    short = (Event("say", "x" * 2_000),) * 8
+    one = row([short] * 50)
+    assert len(to_line(one)) > 0.8 * MOST
+    assert not any("cut" in verdict for verdict in one["verdicts"])
+    mixed = row([LOUD, short])["verdicts"]
+    assert "cut" in mixed[0]
+    assert "cut" not in mixed[1]
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory: pytest.TempPathFactory) -> Suite:
+    folder: Path = tmp_path_factory.mktemp("suite")
+    (folder / "suite.yaml").write_text("name: mine\nversion: 1\n")
+    (folder / "tasks").mkdir()
+    (folder / "tasks" / "T.yaml").write_text(
+        "name: T\nsummary: s\nprompts: [p]\n"
+        "checks:\n  says: {category: Location, rtl: 'tr.Exists(say(\"bye\"))'}\n"
+        "worlds:\n"
+        + "".join(
+            f"  - {{about: World {n}, robot: start, rooms: [start], require: [says]}}\n" for n in (0, 1)
+        )
+    )
+    return load_suite(folder)
+
+
+def cut_row(suite: Suite) -> Row:
+    scenarios = suite.tasks["T"].scenarios
+    ended = [Outcome(Status.FINISHED, LOUD), Outcome(Status.FINISHED, LOUD[:1])]
+    verdicts = [
+        Verdict(s.world.about, o, s.require, satisfied=False) for s, o in zip(scenarios, ended, strict=True)
+    ]
+    return evaluation(Completion(task="T", prompt=0, index=0, program="x = 1"), judgement(verdicts))
+
+
+def test_a_cut_trace_is_said_and_not_explained(suite: Suite) -> None:
+    one = cut_row(suite)
+    first, second = completion_data(one, None, suite)["worlds"]
+    assert first["cut"] == one["verdicts"][0]["cut"]
+    assert "cut" not in second
+    assert "too long" in first["failed_checks"][0]["explanation"]
+    assert "never said" in second["failed_checks"][0]["explanation"]
+    console = Console(width=100)
+    with console.capture() as shown:
+        console.print(completion_view(one, None, suite))
+    assert f"{first['cut']['events']} more steps" in shown.get()
+    assert never_returned(one, suite) is False
+
+
+def test_a_table_counts_the_events_that_were_not_kept(suite: Suite) -> None:
+    assert table([cut_row(suite)], []).get_column("events").to_list() == [99, 1]
+
+
+@pytest.mark.parametrize("negated", [False, True])
+def test_a_formula_is_undecided_where_the_trace_was_cut(suite: Suite, *, negated: bool) -> None:
+    formula = 'tr.Exists(say("bye"))'
+    found = asked_of(cut_row(suite), Question(formula, negated), parse(formula))
+    assert found.undecided == ((1, "World 0"),)
+    assert found.worlds == (((2, "World 1"),) if negated else ())
+    assert len(asked_of(cut_row(suite), Question(), None).worlds) == 2

@@ -1,0 +1,428 @@
+"""A run survives interruptions, refuses what does not fit, and gives the same bytes each time."""
+
+import json
+import random
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from codebotler.badinput import BadInput
+from codebotler.files import read_rows, to_line
+from roboeval.cli.app import app
+from roboeval.evaluation.completions import Completion, Row, read_completions, recorded_completions
+from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.run import Run, Source, open_source, tasks_to_judge
+from roboeval.evaluation.timelimit import TimeLimitExceeded, time_limit
+from roboeval.suites.load import Suite, load_suite
+from seals import unseal
+
+GREETS = 'def task_program():\n    say("good day")\n'
+ADDRESS = "def task_program():\n    say(str(object()))\n    say(str(id([])))\n    say(str({'a', 'b', 'c'}))\n"
+
+
+def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> Run:
+    path.mkdir(parents=True)
+    rows = [
+        {"task": task, "prompt": 0, "index": index, "program": program}
+        for index, program in enumerate(programs)
+    ]
+    run = Run(path)
+    run.completions.write_bytes(b"".join(map(to_line, rows)))
+    return run
+
+
+def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[Row]:
+    return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
+
+
+def careful_run(path: Path, suite: Suite) -> Run:
+    run = Run(path)
+    run.keep(Source(lambda: recorded_completions("recorded:careful", suite)))
+    return run
+
+
+def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, "go_to('nowhere')\n"])
+    judged(run, paper)
+    about = json.loads(run.head("paper").read_text())
+    assert about["suite"] == "paper"
+    assert about["digest"] == paper.digest
+    assert about["rules"]["literals"] == "lowercase"
+    rows = [row for _, row in read_rows(run.rows("paper"))]
+    assert rows[0] == {
+        "task": "SayGoodDay",
+        "prompt": 0,
+        "index": 0,
+        "passed": False,
+        "failure": {
+            "class": "TaskCompletionError",
+            "kind": "ExhaustiveSearch",
+            "world": 0,
+            "check": "visits_every_lab",
+        },
+        "verdicts": rows[0]["verdicts"],
+    }
+    assert rows[1]["failure"] == {
+        "class": "RobotExecutionError",
+        "kind": "GoToInvalidLocation",
+        "world": 0,
+        "check": None,
+    }
+    assert rows[1]["verdicts"][0] == {
+        "world": "sam and amy are both in",
+        "satisfied": False,
+        "status": "robot-error",
+        "error": {"kind": "GoToInvalidLocation", "message": 'there is no room "nowhere"'},
+        "line": 1,
+        "failed_checks": [],
+        "trace": [["goto", "nowhere"]],
+    }
+
+
+def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path: Path) -> None:
+    programs = [
+        ADDRESS,
+        *[f"{GREETS}\n# {n}\n" + "x = [0] * " + str(n * 1000) for n in range(20)],
+        ADDRESS + "#",
+    ]
+    results, hashes = [], []
+    for workers in (1, 4):
+        run = a_run(tmp_path / f"run{workers}", programs)
+        script = (
+            "import sys, pathlib\n"
+            "from roboeval.evaluation.evaluate import evaluate_run\nfrom roboeval.evaluation.run import Run\n"
+            "from roboeval.suites.load import load_suite\n"
+            f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+            "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, "
+            f"workers={workers}): pass\n"
+        )
+        subprocess.run([sys.executable, "-c", script], check=True)
+        assert run.programs("paper").read_bytes().count(b"\n") == len(programs)
+        results.append(run.rows("paper").read_bytes())
+        hashes.append(run.programs("paper").read_bytes())
+    assert results[0] == results[1]
+    assert hashes[0] == hashes[1]
+    said = [event[1] for event in json.loads(results[0].splitlines()[0])["verdicts"][0]["trace"]]
+    assert said[0].startswith("<object object at 0x")
+
+
+@pytest.mark.slow
+def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: Suite) -> None:
+    whole = careful_run(tmp_path / "whole", paper)
+    judged(whole, paper)
+    run = careful_run(tmp_path / "killed", paper)
+    script = (
+        "import pathlib\n"
+        "from roboeval.evaluation.evaluate import evaluate_run\nfrom roboeval.evaluation.run import Run\n"
+        "from roboeval.suites.load import load_suite\n"
+        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        "print('on', flush=True)\n"
+        "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=2): pass\n"
+    )
+    chance = random.Random(7)
+    kills = 0
+    for _ in range(10):
+        process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE)
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(chance.uniform(0.1, 1.2))
+        process.send_signal(signal.SIGKILL)
+        kills += process.wait() == -signal.SIGKILL
+        process.stdout.close()
+    assert kills >= 3
+    rows = judged(run, paper)
+    assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
+    assert run.programs("paper").read_bytes() == whole.programs("paper").read_bytes()
+    assert run.head("paper").read_bytes() == whole.head("paper").read_bytes()
+    assert len(rows) == sum(1 for _ in read_completions(run.completions))
+
+
+@pytest.mark.parametrize("cut", [1, 10, 200])
+def test_a_torn_last_row_is_judged_again(tmp_path: Path, paper: Suite, cut: int) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    whole = run.rows("paper").read_bytes()
+    run.rows("paper").write_bytes(whole[:-cut])
+    unseal(run.path)
+    judged(run, paper)
+    assert run.rows("paper").read_bytes() == whole
+
+
+@pytest.mark.parametrize("more", ["0" * 64 + "\n", "0" * 30, ""])
+def test_a_hash_that_a_crash_left_without_its_row_is_dropped(tmp_path: Path, paper: Suite, more: str) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    rows, hashes = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
+    run.rows("paper").write_bytes(b"".join(rows.splitlines(keepends=True)[:2]))
+    run.programs("paper").write_bytes(hashes[:130] + more.encode())
+    unseal(run.path)
+    judged(run, paper)
+    assert run.rows("paper").read_bytes() == rows
+    assert run.programs("paper").read_bytes() == hashes
+
+
+@pytest.mark.parametrize("left", [0, 64, 65, 100])
+def test_a_row_without_the_hash_of_its_program_is_judged_again(
+    tmp_path: Path, paper: Suite, left: int
+) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    rows, hashes = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
+    run.programs("paper").write_bytes(hashes[:left])
+    assert len(judged(run, paper)) == 3
+    assert run.rows("paper").read_bytes() == rows
+    assert run.programs("paper").read_bytes() == hashes
+
+
+def test_a_program_that_was_changed_is_refused_unless_all_is_redone(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
+    judged(run, paper)
+    kept = run.completions.read_bytes()
+    run.completions.write_bytes(kept.replace(b"#1", b"#one"))
+    before = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
+    with pytest.raises(BadInput, match=r"SayGoodDay/0/1 .* --redo") as error:
+        judged(run, paper)
+    assert (error.value.file, error.value.line) == (run.rows("paper"), 2)
+    assert before == (run.rows("paper").read_bytes(), run.programs("paper").read_bytes())
+    run.completions.write_bytes(kept)
+    assert len(judged(run, paper)) == 3
+    run.completions.write_bytes(kept.replace(b"#1", b"#one"))
+    judged(run, paper, redo=True)
+    assert len(judged(run, paper)) == 3
+
+
+def test_a_program_that_is_changed_while_it_waits_is_tied_to_what_was_judged(
+    tmp_path: Path, paper: Suite
+) -> None:
+    run = a_run(tmp_path / "run", [f"{GREETS}# {n:03}" for n in range(300)])
+    kept = run.completions.read_bytes()
+    rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False, workers=1)
+    next(rows)
+    run.completions.write_bytes(kept.replace(b"# 299", b"# abc"))
+    assert len(list(rows)) == 299
+    assert len(judged(run, paper)) == 300
+    run.completions.write_bytes(kept)
+    with pytest.raises(BadInput, match="SayGoodDay/0/299 "):
+        judged(run, paper)
+
+
+def test_a_finished_evaluation_runs_nothing_again(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    judged(run, paper)
+    before = run.rows("paper").stat().st_mtime_ns
+    assert len(judged(run, paper)) == 1
+    assert run.rows("paper").stat().st_mtime_ns == before
+
+
+def test_completions_that_come_later_are_judged_later(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    judged(run, paper)
+    with run.completions.open("ab") as file:
+        file.write(to_line({"task": "SayGoodDay", "prompt": 1, "index": 0, "program": GREETS}))
+    assert [row["prompt"] for row in judged(run, paper)] == [0, 1]
+
+
+def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    script = (
+        "import pathlib, sys, time\n"
+        "from roboeval.evaluation.run import Run\n"
+        f"with Run(pathlib.Path({str(run.path)!r})).writing():\n"
+        "    print('on', flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        with pytest.raises(BadInput, match="another process"):
+            judged(run, paper)
+        process.kill()
+    assert len(judged(run, paper)) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "what"),
+    [
+        ("digest", "0" * 64, "suite ("),
+        ("python", "2.7", 'Python ("2.7", now "3.'),
+        ("codebotler", "0.0.1", 'tool ("0.0.1", now '),
+        ("tasks", ["LunchTime", "GetDrink"], "tasks (LunchTime, GetDrink, now all)"),
+        ("ablation", True, "ablation (true, now false)"),
+    ],
+)
+def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
+    tmp_path: Path, paper: Suite, name: str, value: object, what: str
+) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    judged(run, paper)
+    about = json.loads(run.head("paper").read_text())
+    run.head("paper").write_text(json.dumps(about | {name: value}))
+    with pytest.raises(BadInput, match=rf"{re.escape(what)}.* --redo"):
+        judged(run, paper)
+    assert len(judged(run, paper, redo=True)) == 1
+    assert json.loads(run.head("paper").read_text()) == about
+
+
+def test_only_some_tasks_are_read_where_only_some_are_meant(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    with run.completions.open("ab") as file:
+        file.write(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": GREETS}))
+    source = open_source(str(run.path), paper)
+    assert [c.task for c in source.of(frozenset({"LunchTime"}))] == ["LunchTime"]
+    assert [c.task for c in source.of(None)] == ["SayGoodDay", "LunchTime"]
+
+
+def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
+    judged(run, paper)
+    rows = run.completions.read_bytes().splitlines(keepends=True)
+    run.completions.write_bytes(rows[1] + rows[0])
+    with pytest.raises(BadInput, match=r"SayGoodDay/0/0 .* SayGoodDay/0/1"):
+        judged(run, paper)
+
+
+def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    before = run.completions.read_bytes()
+    with pytest.raises(BadInput, match="other completions"):
+        careful_run(run.path, paper)
+    assert run.completions.read_bytes() == before
+
+
+@pytest.mark.parametrize("more", [GREETS, None])
+def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more: str | None) -> None:
+    run = a_run(tmp_path / "run", [GREETS, "#"])
+    other = a_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
+    with pytest.raises(BadInput, match="other completions"):
+        run.keep(open_source(str(other.path), paper))
+    assert run.keep(open_source(str(run.path), paper)) == 2
+
+
+def test_a_run_that_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
+    times = 0
+
+    def read() -> Iterator[Completion]:
+        nonlocal times
+        times += 1
+        yield Completion(task="SayGoodDay", prompt=0, index=0, program=GREETS)
+        if times > 1:
+            raise KeyboardInterrupt
+
+    (tmp_path / "there").mkdir()
+    for path in (tmp_path / "there" / "run", tmp_path / "new" / "run", tmp_path / "there"):
+        times = 0
+        with pytest.raises(KeyboardInterrupt):
+            Run(path).keep(Source(read))
+    assert sorted(path.name for path in tmp_path.rglob("*")) == [".lock", "there"]
+
+
+def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS])
+    assert open_source(str(run.path), paper).run == run
+    assert open_source(str(run.completions), paper).run is None
+    folder = tmp_path / "published"
+    folder.mkdir()
+    (folder / "SayGoodDay_0_3.py").write_text(f"name = 'x'\nprompt = 'p'\ncompletion = {GREETS!r}\n")
+    assert [c.key for c in open_source(str(folder), paper).read()] == [("SayGoodDay", 0, 3)]
+    assert len(list(open_source("recorded:hasty", paper).read())) >= 160
+    with pytest.raises(BadInput, match="no such file or folder") as error:
+        open_source(str(tmp_path / "nothing"), paper)
+    assert str(error.value.file) == str(tmp_path / "nothing")
+
+
+def test_only_tasks_with_an_ablation_are_ablated(paper: Suite) -> None:
+    kept, left = tasks_to_judge(paper, "LunchTime,SayGoodDay", ablated=True)
+    assert kept == frozenset({"LunchTime"})
+    assert left == ("SayGoodDay",)
+    with pytest.raises(BadInput, match=r"SayGoodDay .* ablation"):
+        tasks_to_judge(paper, "SayGoodDay", ablated=True)
+    with pytest.raises(BadInput, match='"Nonsense"'):
+        tasks_to_judge(paper, "Nonsense", ablated=False)
+
+
+def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
+    script = (
+        "import pathlib, resource, signal\n"
+        "from roboeval.evaluation.evaluate import evaluate_run\nfrom roboeval.evaluation.run import Run\n"
+        "from roboeval.suites.load import load_suite\n"
+        f"run = Run(pathlib.Path({str(run.path)!r}))\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "rows = evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, workers=1)\n"
+        "next(rows)\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1500, 1500))\n"
+        "list(rows)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert ended.returncode != 0
+    assert run.rows("paper").read_bytes().endswith(b"\n")
+    assert len(judged(run, paper)) == 2
+
+
+def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite) -> None:
+    row = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": GREETS, "usage": {"output": 7}}
+    path = tmp_path / "rows.jsonl"
+    path.write_bytes(to_line(row))
+    run = Run(tmp_path / "run")
+    run.keep(open_source(str(path), paper))
+    assert [c.row for c in read_completions(run.completions)] == [row]
+    assert Completion.of(row).key == ("SayGoodDay", 0, 0)
+
+
+def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> None:
+    run = a_run(tmp_path / "run", ["def task_program(): pass\n"])
+    judged(run, paper)
+    run.head("paper").unlink()
+    with pytest.raises(BadInput, match="--redo") as error:
+        judged(run, paper)
+    assert error.value.file == run.head("paper")
+
+
+def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "suite" / "tasks").mkdir(parents=True)
+    (tmp_path / "suite" / "suite.yaml").write_text("name: slow\nversion: 1\n")
+    (tmp_path / "suite" / "tasks" / "Slow.yaml").write_text(
+        "name: Slow\nsummary: Speak.\nprompts: [Speak.]\n"
+        "checks: {speaks: {category: SayAtLocation, rtl: 'tr.Exists(say(\"^(a+)+b\"))'}}\n"
+        "worlds: [{about: a, robot: hall, rooms: [hall], require: [speaks]}]\n"
+    )
+    suite = load_suite(str(tmp_path / "suite"))
+    slow, quick = (f"def task_program(): say({'a' * n!r})\n" for n in (18, 3))
+    run = a_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
+
+    monkeypatch.setattr("roboeval.evaluation.judge.BUDGET", 0.001)
+    assert [row["index"] for row in judged(run, suite)] == [1, 3]
+    assert [
+        record.getMessage().split()[0]
+        for record in caplog.records
+        if record.name == "roboeval.evaluation.judge"
+    ] == ["Slow/0/0", "Slow/0/2"]
+    result = CliRunner().invoke(app, ["evaluate", str(run.path), "--suite", str(tmp_path / "suite")])
+    assert result.exit_code == 1
+
+    monkeypatch.undo()
+    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
+    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
+
+
+def test_other_threads_know_no_limit() -> None:
+    def work() -> bool:
+        with time_limit(0.01):
+            return sum(range(100_000)) > 0
+
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(work).result()
+    with pytest.raises(TimeLimitExceeded), time_limit(0.01):
+        re.search("(a+)+b", "a" * 26)

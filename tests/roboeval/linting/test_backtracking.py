@@ -1,0 +1,119 @@
+"""No text that a program can say makes the judge slow: its regexes and functions take linear time."""
+
+import ast
+import importlib
+import pkgutil
+import re
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import codebotler.rtl
+import codebotler.simulator.robot
+from codebotler.rtl import Claim, Number, Time
+from codebotler.rtl.clauses import clauses, sentences
+from codebotler.rtl.clock import times_in
+from codebotler.rtl.numerals import numerals
+from codebotler.rtl.polarity import polarity
+from roboeval.linting.backtracking import FILLERS, Attack, drawn, is_superlinear, slow_text
+from roboeval.linting.lint import regexes
+from roboeval.suites.load import load_suite
+
+Read = Callable[[str], object]
+METHODS = ("match", "fullmatch", "search", "finditer", "sub", "split")
+MODULES = [
+    *(
+        importlib.import_module(f"codebotler.rtl.{one.name}")
+        for one in pkgutil.iter_modules(codebotler.rtl.__path__)
+    ),
+    codebotler.simulator.robot,
+]
+
+
+def uses() -> Iterator[tuple[str, str, Read]]:
+    """Every regex of the judge's modules with every way in which it is used there."""
+    for module in MODULES:
+        tree = ast.parse(Path(str(module.__file__)).read_text())
+        used: dict[str, set[str]] = {}
+        for node in ast.walk(tree):
+            match node:
+                case ast.Attribute(ast.Name(name), method) if method in METHODS:
+                    used.setdefault(name, set()).add(method)
+        for name, value in vars(module).items():
+            if isinstance(value, re.Pattern):
+                for method in sorted(used.get(name, {"search"})):
+                    yield f"{module.__name__}.{name}.{method}", value.pattern, reading(value, method)
+
+
+def reading(pattern: re.Pattern[str], method: str) -> Read:
+    match method:
+        case "finditer":
+            return pattern.findall
+        case "sub":
+            return partial(pattern.sub, " ")
+    read: Read = getattr(pattern, method)
+    return read
+
+
+def slow(read: Read, texts: list[Attack]) -> Attack | None:
+    return next((text for text in texts if is_superlinear(read, text)), None)
+
+
+def test_the_regexes_of_the_judge_take_linear_time() -> None:
+    found = {name: text for name, pattern, read in uses() if (text := slow(read, drawn(pattern))) is not None}
+    assert not found
+
+
+FUNCTIONS: dict[str, Read] = {
+    "numerals": lambda text: [*numerals(text)],
+    "times_in": times_in,
+    "sentences": sentences,
+    "clauses": clauses,
+    "gathered clauses": partial(clauses, lists=True),
+    "polarity": polarity,
+    "number": Number(2, "staplers?", ("rooms?",)).matches,
+    "time": Time("11:00", "12:00").matches,
+    "claim": Claim("stapler").matches,
+}
+UNITS = (
+    *FILLERS,
+    "a has b, no got, ",
+    "a has b, ",
+    "chocolate 1 ",
+    "he is, ",
+    "a: b",
+    "asked ",
+    "1 or ",
+    "?",
+    "a. ",
+    "3pm ",
+)
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_the_functions_that_read_texts_take_linear_time(name: str) -> None:
+    texts = [
+        Attack(prefix, unit, suffix)
+        for prefix in ("", "a has b, 1")
+        for unit in UNITS
+        for suffix in ("", "x 2")
+    ]
+    assert slow(FUNCTIONS[name], texts) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suite", ["paper", "plus"])
+def test_the_regexes_of_a_suite_take_linear_time(suite: str) -> None:
+    tasks = load_suite(suite).tasks.values()
+    found = {one.pattern for task in tasks for one in regexes(task)}
+    assert len(found) > 50
+    assert not {pattern for pattern in found if slow_text(pattern) is not None}
+
+
+@pytest.mark.parametrize(
+    "pattern", ["(a+)+b", r"a\s*\s*b", "x.*y", r"\w+n't", r"1[^.]*\bnot\b[^.]*y", "no (?!.*not)", "(a|a)*b"]
+)
+def test_a_slow_regex_is_found(pattern: str) -> None:
+    assert slow_text(pattern) is not None

@@ -1,0 +1,748 @@
+"""The linter of tasks: each kind of finding, by a task that has it and one that has not."""
+
+import json
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from hypothesis import given, reject, settings
+from hypothesis import strategies as st
+
+from codebotler.models.recorded import read_replies
+from codebotler.rtl import Formula, Regex, Without, Words, holds, parse
+from codebotler.rtl.formula import CutName
+from codebotler.trace import Trace
+from roboeval.evaluation.completions import Completion
+from roboeval.evaluation.judge import evaluate
+from roboeval.linting.findings import Finding, render
+from roboeval.linting.lint import lint
+from roboeval.linting.sample_strings import can_match, representative_texts, samples
+from roboeval.linting.satisfiability import Automaton, Reasoner, Undecided
+from roboeval.linting.trials import tried, unasked
+from roboeval.suites.catalogue import new_task
+from roboeval.suites.load import Suite, load_suite
+
+Lint = Callable[..., list[Finding]]
+
+WORLD = """
+  - about: {about}
+    robot: start_loc
+    rooms: [kitchen, conference room, start_loc]
+    objects: {{kitchen: [mug]}}
+    people: {{kitchen: [{{name: ann, answers: ["yes"]}}]}}
+    require: {require}
+"""
+RECORDED = """
+- instruction: Say hello in the kitchen.
+  replies:
+    - {about: does nothing, fails: SayAtLocation, program: "def task_program(): pass"}
+    - {about: is right, program: "def task_program():\\n  go_to('kitchen'); say('hello')"}
+"""
+
+
+def head_of(formula: str, category: str = "SayAtLocation") -> str:
+    return f"{{category: {category}, rtl: {json.dumps(formula)}}}"
+
+
+@pytest.fixture
+def linted(tmp_path: Path) -> Lint:
+    """Writes a task into a suite of its own and returns its findings, often without those on programs."""
+
+    def write(
+        checks: dict[str, str],
+        *worlds: Sequence[str],
+        accepted: dict[str, str] | None = None,
+        recorded: str = RECORDED,
+        untripped: bool = False,
+        replaced: tuple[str, str] = ("", ""),
+    ) -> list[Finding]:
+        suite = tmp_path / f"suite{len([*tmp_path.iterdir()])}"
+        (suite / "tasks").mkdir(parents=True)
+        (suite / "recorded" / "careful").mkdir(parents=True)
+        (suite / "suite.yaml").write_text("name: mine\nversion: 1\n")
+        (suite / "recorded" / "careful" / "Hello.yaml").write_text(recorded)
+        lines = ["name: Hello", "summary: Greet.", "prompts: [Say hello in the kitchen.]", "checks:"]
+        lines += [f"  {name}: {head_of(rtl)}" for name, rtl in checks.items()]
+        lines.append("worlds:")
+        for number, require in enumerate(worlds, 1):
+            quoted = "[" + ", ".join("'" + text + "'" for text in require) + "]"
+            lines.append(WORLD.replace(*replaced).format(about=f"number {number}", require=quoted))
+        if accepted:
+            lines.append("accepted:")
+            lines += [f"  - {{finding: '{name}', because: {why}}}" for name, why in accepted.items()]
+        (suite / "tasks" / "Hello.yaml").write_text("\n".join(lines) + "\n")
+        loaded = load_suite(str(suite))
+        task = loaded.task("Hello")
+        findings = lint(task, tried(task, loaded) if untripped else [])
+        return [one for one in findings if untripped or one.kind != "untripped"]
+
+    return write
+
+
+def names(findings: list[Finding]) -> list[str]:
+    return [finding.name for finding in findings]
+
+
+SPEAKS = 'tr.Exists(say("hello"))'
+GREETS_THERE = 'tr.ActAtFirst("kitchen", say("hello"))'
+GOES = 'tr.Exists(goto("kitchen"))'
+STAYS = 'not tr.Exists(goto("kitchen"))'
+
+
+def test_a_sound_task_has_no_finding(linted: Lint) -> None:
+    assert linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], untripped=True) == []
+
+
+# --- kinds
+
+
+def test_a_requirement_that_cannot_hold(linted: Lint) -> None:
+    (finding,) = linted({"odd": 'tr.Exists(say("a")) and not tr.Exists(say("a|b"))'}, ["odd"])
+    assert finding.name == "unsatisfiable: odd"
+    assert '"odd"' in finding.message
+    assert "world 1" in finding.message
+    assert finding.line == 5  # of the check, which can hold in no world
+    assert linted({"even": 'tr.Exists(say("a|b")) and not tr.Exists(say("a"))'}, ["even"]) == []
+
+
+def test_requirements_that_cannot_hold_together(linted: Lint) -> None:
+    checks = {"goes": GOES, "stays": STAYS, "speaks": SPEAKS}
+    (finding,) = linted(checks, ["speaks", "goes", "stays"])
+    assert (finding.name, finding.line) == ("unsatisfiable: goes and stays", 15)
+    assert linted(checks, ["speaks", "goes"], ["stays", "speaks"]) == []
+
+
+def test_what_needs_a_visit_to_an_absent_room_can_hold_only_if_requests_are_odd(linted: Lint) -> None:
+    checks = {"greets": 'tr.ActAtFirst("lobby", say("hello"))'}
+    findings = linted(checks, ["greets"])
+    assert names(findings) == ["absent: lobby in greets", "unsatisfiable: greets"]
+    assert [one.line for one in findings] == [13, 13]
+    assert "each visit" in findings[1].message
+
+
+def test_a_requirement_that_follows_from_another(linted: Lint) -> None:
+    checks = {"greets": GREETS_THERE, "goes": GOES, "speaks": SPEAKS}
+    (one, other) = linted(checks, ["greets", "goes", "speaks"])
+    assert (one.name, other.name) == ("implied: goes", "implied: speaks")
+    for name in ('"goes"', "world 1", '"greets"'):
+        assert name in one.message
+    assert linted(checks, ["goes", "speaks"], ["greets"]) == []
+
+
+def test_a_requirement_that_follows_from_several(linted: Lint) -> None:
+    asks_first = 'tr.AfterFirst(goto("kitchen")).BeforeFirst(say("hello")).Exists(ask("tea", ".*"))'
+    checks = {"greets": GREETS_THERE, "asks_first": asks_first}
+    checks["asks"] = 'tr.ActAtFirst("kitchen", ask("tea", ".*"))'
+    (finding,) = linted(checks, ["greets", "asks_first", "asks"])
+    for name in ('"asks"', "world 1", '"greets" and "asks_first"'):
+        assert name in finding.message
+    assert linted(checks, ["asks_first", "asks"], ["greets", "asks"]) == []
+
+
+def test_a_requirement_that_always_holds(linted: Lint) -> None:
+    (finding,) = linted({"any": 'tr.AtLeast(say("a"), 0)'}, ["any"])
+    assert '"any" in world 1' in finding.message
+    assert "without" not in finding.message
+    assert finding.line == 5
+    checks = {"none(x)": 'tr.AtLeast(say("{x}"), 0)', "speaks": SPEAKS}
+    found = linted(checks, ["speaks"], ['none("b")', "speaks"])
+    assert [(one.name, one.line) for one in found if one.kind == "implied"] == [('implied: none("b")', 22)]
+
+
+def test_what_takes_too_long_is_said(linted: Lint) -> None:
+    started = time.monotonic()
+    findings = linted({"many": 'tr.Count(say("a"), 1000000000)', "speaks": SPEAKS}, ["many", "speaks"])
+    assert names(findings) == ["undecided: world 1", "undecided: many", "undecided: speaks"]
+    assert [one.line for one in findings] == [9, 14, 14]
+    assert time.monotonic() - started < 10
+    assert linted({"some": 'tr.Count(say("a"), 100)'}, ["some"]) == []
+
+
+def test_a_check_that_nothing_requires(linted: Lint) -> None:
+    (finding,) = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
+    assert finding.name == "unused: goes"
+    assert finding.line == 6
+    assert linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"], ["not goes", "speaks"]) == []
+
+
+def test_a_check_that_no_wrong_program_trips(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
+    (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
+    assert finding.name == "untripped: not swears"
+    assert finding.line == 6
+    swears = RECORDED.replace("pass", "say('darn')")
+    assert linted(checks, ["speaks", "not swears"], recorded=swears, untripped=True) == []
+
+
+def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "swears": 'tr.Exists(say("darn"))'}
+    (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
+    assert '"not swears"' in finding.message
+    assert not re.search(r"\d", finding.message)
+    two = (
+        RECORDED
+        + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
+    )
+    (finding,) = linted(checks, ["speaks", "not swears"], recorded=two, untripped=True)
+    assert "2 wrong programs" in finding.message
+
+
+def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:
+    speaks = RECORDED.replace("pass", "say('hello')")
+    found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], recorded=speaks, untripped=True)
+    (message,) = (one.message for one in found if one.kind == "untripped")
+    for name in ("2 wrong programs", '"speaks"', '"not"'):
+        assert name in message
+
+
+def test_a_task_without_wrong_programs(linted: Lint) -> None:
+    for recorded in ("[]", RECORDED.replace("pass", "say('hello')")):
+        findings = linted({"speaks": SPEAKS}, ["speaks"], recorded=recorded, untripped=True)
+        assert [one.name for one in findings if one.kind != "misjudged"] == ["untripped: Hello"]
+
+
+@pytest.mark.parametrize("text", ['"a^b"', '"$x"', r'words(r"\bno\b", without("no"))', 'words("a", "(?!)")'])
+def test_a_regex_that_matches_nothing(linted: Lint, text: str) -> None:
+    findings = linted({"says": f"not tr.Exists(say({text}))", "speaks": SPEAKS}, ["says", "speaks"])
+    assert [one.kind for one in findings] == ["dead-regex", "implied"]
+    asked = linted({"asks": f'not tr.Exists(ask(".*", {text}))', "speaks": SPEAKS}, ["asks", "speaks"])
+    assert [one.kind for one in asked] == ["dead-regex", "implied"]
+
+
+@pytest.mark.parametrize("text", ['words("no", without("no"))', '"^a b$"', r'" 4"', '"[^a]{3}"', '"(a)b"'])
+def test_a_regex_that_matches_something(linted: Lint, text: str) -> None:
+    assert linted({"says": f"tr.Exists(say({text}))"}, ["says"]) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        r"(?=.*\bten\b)(?=.*\bpercent\b)(?!.*\bno\b).+",
+        r"(?=.*\btea\b)(?=.*\bready\b).*",
+        r"^(?=.*\bready\b)tea",
+        r"\b(alice|bob)\b.*\b(alice|bob)\b",
+        r"\bten\b[^.]*\bpercent\b",
+        r"(\bten\b.?)+\bpercent\b",
+    ],
+)
+def test_words_of_which_a_regex_says_only_that_they_stand_apart(linted: Lint, text: str) -> None:
+    found = linted({"says": f'tr.Exists(say(r"{text}"))'}, ["says"])
+    assert {one.kind for one in found} <= {"slow-regex"}
+
+
+@pytest.mark.parametrize("option", ["^ yes", "yes $", "^ yes $"])
+def test_options_may_have_outer_spaces(linted: Lint, option: str) -> None:
+    checks = {"asks": f'not tr.Exists(ask("tea", "{option}"))', "speaks": SPEAKS}
+    assert linted(checks, ["asks", "speaks"]) == []
+    said = linted({"says": f'not tr.Exists(say("{option}"))', "speaks": SPEAKS}, ["says", "speaks"])
+    assert [one.kind for one in said] == ["dead-regex", "implied"]
+
+
+def test_a_regex_that_takes_much_longer_the_longer_a_text_is(linted: Lint) -> None:
+    (finding,) = linted({"greets": 'tr.Exists(say("a.*b"))'}, ["greets"])
+    assert finding.name == "slow-regex: a.*b"
+    assert finding.line == 5
+    assert '"greets"' in finding.message
+    assert not linted({"greets": 'tr.Exists(say("a[^a]*b"))'}, ["greets"])
+
+
+def test_a_visit_that_leads_nowhere(linted: Lint) -> None:
+    (dead, absent) = linted({"goes": 'not tr.Exists(goto("^attic$"))', "speaks": SPEAKS}, ["goes", "speaks"])[
+        :2
+    ]
+    assert {dead.kind, absent.kind} == {"dead-regex", "absent"} or dead.kind == "dead-regex"
+    assert "world 1" in dead.message
+    fine = linted({"goes": 'not tr.Exists(goto("^(the )?kitchen$"))', "speaks": SPEAKS}, ["goes", "speaks"])
+    assert fine == []
+
+
+@pytest.mark.parametrize(
+    "formula",
+    ['goto("lobby")', 'pick("cup")', 'place("cup")', 'check("cup")', 'goto(without("lobby"))'],
+)
+def test_something_that_is_not_in_the_world(linted: Lint, formula: str) -> None:
+    found = linted({"does": f"not tr.Exists({formula})", "speaks": SPEAKS}, ["speaks", "does"])
+    assert [one.subject for one in found if one.kind == "absent"] == [
+        f"{re.findall('lobby|cup', formula)[0]} in does"
+    ]
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        'goto("conference")',
+        'goto("the conference room")',
+        'goto(".*")',
+        'goto("(attic)?")',
+        'pick("mug")',
+        'check("red mug")',
+        'check("person")',
+        'check("ann")',
+        'say("lobby")',
+    ],
+)
+def test_something_that_is_in_the_world(linted: Lint, formula: str) -> None:
+    found = linted({"does": f"not tr.Exists({formula})", "speaks": SPEAKS}, ["speaks", "does"])
+    assert "absent" not in [one.kind for one in found]
+
+
+def test_a_person_who_is_not_in_the_world(linted: Lint) -> None:
+    checks = {"greets(person)": 'tr.Exists(say("{person}"))'}
+    (finding,) = linted(checks, ['not greets("bob")', 'greets("ann")'])
+    assert finding.name == 'absent: bob in not greets("bob")'
+    assert finding.message.count('"bob"') == 2
+    assert "world 1" in finding.message
+
+
+def test_a_person_of_another_room_or_named_by_another_parameter(linted: Lint) -> None:
+    checks = {"greets(whom)": 'tr.Exists(say("{whom}"))'}
+    assert names(linted(checks, ['not greets("bob")', 'greets("Ann")'])) == []
+    kitchen, office = "rooms: [kitchen,", 'rooms: ["bob\'s office", kitchen,'
+    (finding,) = linted(checks, ['not greets("Bob")', 'greets("Ann")'], replaced=(kitchen, office))
+    assert finding.name == 'absent: Bob in not greets("Bob")'
+
+
+def test_one_of_several_alternatives_that_is_not_in_the_world(linted: Lint) -> None:
+    assert names(linted({"goes": 'tr.Exists(goto("kitchen|attic"))'}, ["goes"])) == ["absent: attic in goes"]
+    assert linted({"goes": 'tr.Exists(goto("kitchen|conference room"))'}, ["goes"]) == []
+
+
+@pytest.mark.parametrize(
+    ("pattern", "absent"),
+    [
+        ("(kitchen|attic)", ["attic"]),
+        ("^(?:the )?(?:kitchen|attic)$", ["^(?:the )?attic$"]),
+        ("the (kitchen|attic) please|conference room", ["the attic please"]),
+        (r"kitchen|\\battic\\b", [r"\battic\b"]),
+        ("(kitchen|attic)?", []),
+        ("(kitchen|attic)+", []),
+        ("(kitchen|conference room)", []),
+        ("(red|blue)? kitchen", []),
+        ("[|(]?kitchen", []),
+        (r"(kitchen|attic)(\\1)?", []),
+        ("kitchen|", []),
+    ],
+)
+def test_alternatives_in_a_group(linted: Lint, pattern: str, absent: list[str]) -> None:
+    found = linted({"goes": f'tr.Exists(goto("{pattern}"))'}, ["goes"])
+    assert [one.subject.removesuffix(" in goes") for one in found if one.kind == "absent"] == absent
+
+
+@pytest.mark.parametrize(
+    ("element", "absent"),
+    [
+        ('say("hello bob")', ["bob"]),
+        ('say(words("hello", r"\\b(ann|Bob)\\b"))', ["bob"]),
+        ('say(r"(?=.*bob).*")', ["bob"]),
+        ('ask("is bob in?", "yes")', ["bob"]),
+        ('ask("who?", "bob|ann")', ["bob"]),
+        ('say("bobsleigh")', []),
+        ('say("hello ann")', []),
+        ('say("carol is out")', []),
+        ('say("nobody")', []),
+    ],
+)
+def test_a_person_in_a_text_who_is_in_another_world_only(
+    tmp_path: Path, element: str, absent: list[str]
+) -> None:
+    new_task(tmp_path, "Hello")
+    path = tmp_path / "tasks" / "Hello.yaml"
+    text = path.read_text().replace("[kitchen, start_loc]", '[kitchen, start_loc, "carol\'s office"]')
+    text = text.replace("name: kim", "name: bob")
+    first, second = text.split("  - about: nobody is in the kitchen")
+    second = second.replace(
+        "    require:", "    people: {kitchen: [{name: ann}]}\n    require:\n      - mentions"
+    )
+    check = f"checks:\n  mentions: {{category: Location, rtl: {json.dumps(f'tr.Exists({element})')}}}\n"
+    first = re.sub("checks:.*\n", lambda _: check, first)
+    path.write_text(f"{first}  - about: nobody is in the kitchen{second}")
+    suite = load_suite(str(tmp_path))
+    found = lint(suite.task("Hello"), [])
+    assert [one.subject for one in found if one.kind == "absent"] == [
+        f"{name} in mentions" for name in absent
+    ]
+
+
+def test_worlds_that_require_the_same_in_other_words(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "mute": 'tr.Count(say("hello"), 0)', "goes": GOES}
+    checks["says_once"] = 'tr.AtLeast(say("hello"), 1) and not tr.AtLeast(say("hello"), 2)'
+    checks["says_1"] = 'tr.Count(say("hello"), 1)'
+    assert "same-worlds: 1 and 2" in names(linted(checks, ["speaks"], ["not mute"]))
+    assert "same-worlds: 1 and 2" in names(linted(checks, ["goes", "says_1"], ["says_once", "goes"]))
+    assert "same-worlds: 1 and 2" in names(linted(checks, ["says_1"], ["speaks", "says_once"]))
+    for one, other in ((["speaks"], ["says_1"]), (["says_1"], ["speaks"]), (["goes"], ["goes", "speaks"])):
+        assert "same-worlds" not in [each.kind for each in linted(checks, one, other)]
+
+
+def test_worlds_that_cannot_be_satisfied_do_not_require_the_same(linted: Lint) -> None:
+    checks = {"goes": GOES, "stays": STAYS, "speaks": SPEAKS}
+    found = linted(checks, ["goes", "stays", "speaks"], ["goes", "not goes"], ["speaks"])
+    assert {one.kind for one in found} == {"unsatisfiable"}
+
+
+def test_worlds_of_an_ablation_that_require_the_same(linted: Lint) -> None:
+    def ablated(*texts: str) -> list[str]:
+        require = "\n    ".join(("require: {require}", "ablation: [" + ", ".join(texts) + "]"))
+        found = linted(checks, ["speaks"], ["goes"], replaced=("require: {require}", require))
+        return [each.name for each in found if each.kind == "same-worlds"]
+
+    checks = {"speaks": SPEAKS, "goes": GOES}
+    assert ablated("speaks") == ["same-worlds: ablation 1 and 2"]
+    assert ablated() == ["same-worlds: ablation 1 and 2"]
+
+
+def test_worlds_that_require_the_same(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "goes": GOES}
+    (finding,) = linted(checks, ["speaks", "goes"], ["speaks"], ["goes", "speaks"])
+    assert (finding.name, finding.line) == ("same-worlds: 1 and 3", 25)  # where world 3 begins
+    assert linted(checks, ["speaks"], ["not speaks"], ["goes"]) == []
+
+
+# --- accepting and showing
+
+
+def test_accepted_findings(linted: Lint) -> None:
+    checks = {"speaks": SPEAKS, "goes": GOES}
+    (finding,) = linted(checks, ["speaks"], accepted={"unused: goes": "for later"})
+    assert finding.accepted == "for later"
+    (still, stale) = linted(checks, ["speaks"], accepted={"unused: gone": "for later"})
+    assert (still.name, still.accepted) == ("unused: goes", None)
+    assert stale.name == "stale-acceptance: unused: gone"
+    assert stale.line == 17
+
+
+def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    findings = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks"])
+    path = findings[0].path
+    monkeypatch.chdir(path.parent)
+    line = f"Hello.yaml:6: warning: {findings[0].message} [unused: goes]"
+    assert '"goes"' in findings[0].message
+    assert render(findings) == line
+    accepted = replace(findings[0], accepted="for later")
+    shown, more = render([*findings, accepted]).splitlines()
+    assert shown == line
+    assert re.search(r"^1 finding more .* --accepted", more)
+    assert re.search(r"^nothing was found .*\b2 findings .* --accepted", render([accepted, accepted]))
+    told = line.replace("warning", "accepted") + ": for later"
+    assert render([*findings, accepted], accepted=True) == f"{line}\n{told}"
+    assert render([accepted], accepted=True) == told
+    assert render([], accepted=True) == render([]) == "nothing was found"
+    monkeypatch.chdir(tmp_path / "suite0" / "recorded")
+    assert render(findings).startswith(f"{path}:6: ")
+
+
+# --- recorded programs that end otherwise than they are said to
+
+
+@pytest.mark.parametrize(
+    ("reply", "named"),
+    [
+        ("{about: is lazy, program: 'def task_program(): 0'}", ["pass, ", "by SayAtLocation", "world"]),
+        (
+            "{about: is lazy, fails: Location, program: 'def task_program(): 0'}",
+            ["by Location, ", "by SayAtLocation", "world"],
+        ),
+        (
+            "{about: greets, fails: Location, program: 'def task_program(): go_to(`kitchen`); say(`hello`)'}",
+            ["by Location, ", "passes"],
+        ),
+    ],
+)
+def test_a_recorded_program_that_ends_otherwise_than_it_is_said_to(
+    linted: Lint, reply: str, named: list[str]
+) -> None:
+    recorded = RECORDED + f"    - {reply}\n".replace("`", '"')
+    found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded, untripped=True)
+    (finding,) = (one for one in found if one.kind == "misjudged")
+    assert all(name in finding.message for name in named), finding
+
+
+# --- recorded programs for what nobody asks
+
+
+def test_programs_for_an_instruction_that_is_no_prompt(linted: Lint) -> None:
+    recorded = RECORDED + RECORDED.replace("Say hello", "Say helo").replace("pass", "0")
+    (finding,) = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded)
+    assert finding.name == "unasked: Say helo in the kitchen."
+    for name in ('"Say helo in the kitchen."', '"Say hello in the kitchen."'):
+        assert name in finding.message
+    assert (finding.path.parent.name, finding.path.name) == ("careful", "Hello.yaml")
+    assert finding.line == 7
+
+
+def test_a_task_that_borrows_need_not_ask_for_all_that_is_recorded(tmp_path: Path, paper: Suite) -> None:
+    recorded = tmp_path / "recorded" / "careful" / "LunchTime.yaml"
+    recorded.parent.mkdir(parents=True)
+    recorded.write_text(RECORDED)
+    task = replace(paper.task("LunchTime"), path=tmp_path / "tasks" / "LunchTime.yaml")
+    assert [*unasked(task)] == [("Say hello in the kitchen.", recorded, 2)]
+    assert [*unasked(replace(task, borrows=True))] == []
+
+
+# --- a new task
+
+
+def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path: Path) -> None:
+    new_task(tmp_path, "MakeTea")
+    suite = load_suite(str(tmp_path))
+    task = suite.task("MakeTea")
+    assert lint(task, tried(task, suite)) == []
+    replies = read_replies(tmp_path / "recorded" / "mine" / "MakeTea.yaml")[task.prompts[0]]
+    rows = [
+        Completion(task="MakeTea", prompt=0, index=i, program=reply.program)
+        for i, reply in enumerate(replies)
+    ]
+    kinds = [(row["failure"] or {"kind": None})["kind"] for row in evaluate(rows, suite, workers=1)]
+    assert kinds == [reply.fails for reply in replies] == [None, "SayAtLocation", "SayAtLocation"]
+
+
+def test_a_new_task_leaves_programs_that_are_recorded_for_it(tmp_path: Path) -> None:
+    recorded = tmp_path / "recorded" / "careful" / "MakeTea.yaml"
+    recorded.parent.mkdir(parents=True)
+    recorded.write_text("[]\n")
+    new_task(tmp_path, "MakeTea")
+    assert [*tmp_path.glob("recorded/*/*")] == [recorded]
+
+
+FACTS = "prompts: [Say hello in the kitchen.]\nfacts: [{fact: where, words: [%s], commonsense: %s}]\n"
+
+
+@pytest.mark.parametrize(
+    ("word", "commonsense", "named"),
+    [
+        ("Kitchen", "false", None),
+        ("lab", "true", None),
+        ("lab", "false", ["prompt 0", '"where"']),
+        ("kit.hen", "true", ["prompt 0", '"where"', '"kit.hen"', "common sense"]),
+    ],
+)
+def test_a_fact_that_a_prompt_does_not_say(
+    tmp_path: Path, word: str, commonsense: str, named: list[str] | None
+) -> None:
+    path = new_task(tmp_path, "MakeTea")
+    head, _, _ = path.read_text().partition("prompts:")
+    _, _, rest = path.read_text().partition("checks:")
+    path.write_text(head + FACTS % (word, commonsense) + "checks:" + rest)
+    task = load_suite(tmp_path).task("MakeTea")
+    found = [one for one in lint(task, []) if one.kind == "unsaid"]
+    assert [one.name for one in found] == ["unsaid: where"] * (named is not None)
+    assert all(name in one.message for one in found for name in named or [])
+    assert all(path.read_text().splitlines()[(one.line or 0) - 1].startswith("facts:") for one in found)
+    assert not any(one.kind == "unsaid" for one in lint(replace(task, borrows=True), []))
+
+
+# --- drawn worlds
+
+NAMES = [f"{letter}am" for letter in "bcdfghjklmnprtwz"]
+DRAWN = f"""
+name: Hello
+summary: Greet everybody by name.
+prompts: [Say hello to everybody by name.]
+worlds:
+  robot: hall
+  rooms: [lab, hall]
+  people: {{pat: {{in: [lab, nowhere]}}}}
+let:
+  names: "{NAMES}"
+checks:
+  greets(name):
+    category: SayAtLocation
+    rtl: tr.Exists(say("{{name}}"))
+  may_choose(name):
+    category: AskAtLocation
+    rtl: tr.Exists(mention("{{name}}"))
+  speaks:
+    category: SayAtLocation
+    rtl: tr.Exists(say("am"))
+require:
+  - greets(n) for n in names
+  - may_choose(n) for n in names
+  - speaks
+"""
+
+
+@pytest.fixture
+def an_end() -> Iterator[None]:
+    """End a test that would go on for hours."""
+    before = signal.signal(signal.SIGALRM, lambda *_: pytest.fail("it has not ended after a minute"))
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.usefixtures("an_end")
+def test_of_requirements_that_one_line_makes_a_few_stand_for_all(tmp_path: Path) -> None:
+    (tmp_path / "tasks").mkdir()
+    (tmp_path / "suite.yaml").write_text("name: mine\nversion: 1\nworlds: 2\nseed: 1\n")
+    (tmp_path / "tasks" / "Hello.yaml").write_text(DRAWN)
+    findings = [one for one in lint(load_suite(str(tmp_path)).task("Hello"), []) if one.kind != "untripped"]
+    assert names(findings) == ["implied: speaks"]
+
+
+# --- the paper's suite
+
+
+# --- deciding
+
+
+CUTS = ("", *(f".{name}({element})" for name in get_args(CutName) for element in ('goto("b")', 'say("x")')))
+TESTS = (
+    'Exists(say("x"))',
+    'Count(say("x"), 2)',
+    'AtLeast(say("x"), 2)',
+    'ActAtFirst("a", say("x"))',
+    'ActAtSome("a", say("x"))',
+    'ActAtSome("a", goto("a"))',
+    'Exists(ask("x", "y"))',
+)
+
+
+@pytest.mark.parametrize("cut", CUTS)
+@pytest.mark.parametrize("test", TESTS)
+def test_automata_judge_all_short_traces_as_formulas_do(test: str, cut: str) -> None:
+    formula = parse(f"tr{cut}.{test}")
+    reasoner = Reasoner([formula], ["a", "b", "xax", "a b"])
+    automaton, letters = reasoner._reading(formula)
+    events = {letter: event for event, letter in zip(reasoner.events, letters, strict=True)}
+    length = 5 if len(events) < 5 else 4
+    for word in product(events, repeat=length):
+        state = 0
+        for letter in word:
+            state = automaton.rows[state][letter]
+        assert automaton.accepts[state] == holds(formula, tuple(events[letter] for letter in word))
+        assert automaton.complement.accepts[state] != automaton.accepts[state]
+    assert automaton.accepts[0] == holds(formula, ())
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_found_traces_and_clashes_are_right(data: st.DataObject) -> None:
+    formulas = data.draw(st.lists(FORMULAS, min_size=1, max_size=3, unique=True))
+    denied = data.draw(FORMULAS)
+    reasoner = Reasoner([*formulas, denied])
+    try:
+        found = reasoner.trace(formulas, denied)
+        clash = reasoner.clash(formulas, denied)
+    except Undecided:
+        reject()
+    if found is not None:
+        assert all(holds(one, found) for one in formulas)
+        assert not holds(denied, found)
+    assert (clash is None) == (found is not None)
+    tried: Trace = tuple(data.draw(st.lists(st.sampled_from(reasoner.events), max_size=6)))
+    if clash is not None and all(holds(one, tried) for one in clash):
+        assert holds(denied, tried)
+
+
+def single_tests() -> st.SearchStrategy[str]:
+    elements = st.sampled_from(
+        ['goto("a")', 'goto(without("a"))', 'say("x|y")', 'say(words("x", without("y")))', 'ask("x", "y")']
+    )
+    cut = st.builds(
+        "{}({})".format, st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]), elements
+    )
+    cuts = st.lists(cut, max_size=2).map(lambda parts: ".".join(["tr", *parts]))
+    counts = st.builds(
+        "{}({}, {})".format, st.sampled_from(["Count", "AtLeast"]), elements, st.integers(0, 3)
+    )
+    acts = st.builds('{}("a", {})'.format, st.sampled_from(["ActAtFirst", "ActAtSome"]), elements)
+    return st.builds("{}.{}".format, cuts, st.one_of(elements.map("Exists({})".format), counts, acts))
+
+
+def formulas() -> st.SearchStrategy[Formula]:
+    larger = st.builds(
+        "({}) {} not ({})".format, single_tests(), st.sampled_from(["and", "or"]), single_tests()
+    )
+    return (single_tests() | larger | single_tests().map("not ({})".format)).map(parse)
+
+
+FORMULAS = formulas()
+
+
+def test_options_may_match_what_no_single_one_can() -> None:
+    both = parse(
+        'tr.Exists(ask("a", "^yes$")) and tr.Exists(ask("a", "^no$")) and tr.Count(ask("a", ".*"), 1)'
+    )
+    assert Reasoner([both]).clash([both]) is None
+    none = parse(
+        'tr.Exists(ask("^yes$", ".*")) and tr.Exists(ask("^no$", ".*")) and tr.Count(ask(".*", ".*"), 1)'
+    )
+    assert Reasoner([none]).clash([none]) == (none,)
+
+
+def test_a_clash_holds_no_more_than_it_must() -> None:
+    goes, stays, speaks = map(parse, (GOES, STAYS, SPEAKS))
+    reasoner = Reasoner([goes, stays, speaks])
+    assert reasoner.clash([speaks, goes, stays]) == (goes, stays)
+    assert reasoner.clash([speaks, goes]) is None
+    assert reasoner.clash([speaks, goes], goes) == (goes,)
+
+
+def test_automata_are_small() -> None:
+    formula = parse('tr.Exists(say("a")) and tr.Exists(say("a")) and tr.AtLeast(say("a"), 1)')
+    automaton, _ = Reasoner([formula])._reading(formula)
+    assert isinstance(automaton, Automaton)
+    assert len(automaton.rows) == 2
+    assert automaton.distances == (1, 0)
+
+
+def test_large_automata_are_given_up() -> None:
+    formula = parse('tr.Count(say("a"), 5000)')
+    with pytest.raises(Undecided):
+        Reasoner([formula]).trace([formula])
+
+
+# --- texts
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        "a|b",
+        r"\bno\b",
+        r"^4\b| 4",
+        "a{2,3}",
+        "[^a-z]",
+        r"\d+:\S",
+        "(?=.*6)(?=.*pm)",
+        r"(a|b)\1",
+        "[[a]b",
+        "a{500}",
+        "(?i:x)",
+        "a(?!b)",
+        r"\Bx",
+    ],
+)
+def test_samples_match(pattern: str) -> None:
+    found = samples(pattern)
+    assert found
+    for text in found:
+        assert Regex(pattern).matches(text)
+        assert text == text.strip()
+
+
+def test_representative_texts_match_in_all_combinations() -> None:
+    texts = (Regex("cat"), Regex("dog|cow"), Without("cat"), Words((Regex("cat"), Regex("dog|cow"))))
+    found = {tuple(text.matches(one) for text in texts[:3]) for one in representative_texts(texts)}
+    assert found == {
+        (False, False, True),
+        (True, False, False),
+        (True, False, True),
+        (False, True, True),
+        (True, True, False),
+        (True, True, True),
+    }
+
+
+def test_a_text_must_not_start_with_a_word() -> None:
+    starts = (Regex("not"), Regex(r"^(?!not\b)"))
+    found = {tuple(text.matches(one) for text in starts) for one in representative_texts(starts)}
+    assert found == {(False, True), (True, False), (True, True)}
+    assert not can_match(Words((Regex("^x"), Regex(r"^(?!x)"))))

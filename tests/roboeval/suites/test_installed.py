@@ -1,0 +1,134 @@
+"""Suites that packages bring: found without importing them, and refused in a sentence where names clash."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput
+from command_line import ENVIRONMENT, roboeval
+from roboeval.suites.catalogue import new_task, other_suites
+from roboeval.suites.installed import installed_suites
+from roboeval.suites.load import load_suite
+from roboeval.web.shelf import Shelf
+
+Install = Callable[..., Path]
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
+    """Puts a package with a suite on the path, with the metadata that an installer writes."""
+    site = tmp_path / "site"
+    site.mkdir()
+    monkeypatch.syspath_prepend(str(site))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.chdir(tmp_path)
+
+    def write(
+        package: str = "garden-suite",
+        name: str = "garden",
+        *,
+        point: str | None = None,
+        place: str | None = None,
+        whole: bool = True,
+    ) -> Path:
+        module = package.replace("-", "_")
+        folder = site / module
+        folder.mkdir()
+        (folder / "__init__.py").write_text("raise RuntimeError('nobody runs me')\n")
+        if whole:
+            new_task(folder, "WaterPlants")
+            text = (folder / "suite.yaml").read_text()
+            (folder / "suite.yaml").write_text(
+                text.replace(f"name: {folder.name.replace('_', '-')}", f"name: {name}")
+            )
+        info = site / f"{module}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[roboeval.suites]\n{point or name} = {place or module}\n")
+        return folder
+
+    return write
+
+
+def test_a_suite_is_found_by_its_name_without_running_its_package(install: Install) -> None:
+    folder = install()
+    assert load_suite("garden").folder == folder
+    assert [(one.name, one.package) for one in installed_suites()] == [("garden", "garden-suite 1.0")]
+    ended = roboeval("tasks", "--lint", "--suite", "garden", environment=ENVIRONMENT | dict(os.environ))
+    assert (ended.status, ended.out) == (0, "nothing was found\n"), ended
+    listed = roboeval("tasks", environment=ENVIRONMENT | dict(os.environ))
+    assert "garden (garden-suite 1.0)" in listed.err
+
+
+def test_it_may_lie_in_a_folder_of_the_package(install: Install) -> None:
+    folder = install(place="garden_suite.suites.roses")
+    (folder / "suites").mkdir()
+    for one in ("suite.yaml", "tasks", "recorded"):
+        (folder / "suites" / "roses").mkdir(exist_ok=True)
+        (folder / one).rename(folder / "suites" / "roses" / one)
+    assert list(load_suite("garden").tasks) == ["WaterPlants"]
+
+
+def test_the_pages_show_runs_that_were_judged_by_it(
+    install: Install, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install()
+    install("broken-suite", "broken", whole=False)
+    assert list(Shelf(Path("runs")).suites) == ["paper", "plus", "garden"]
+    warning = capsys.readouterr().err
+    assert "broken-suite 1.0" in warning
+    assert '"broken"' in warning
+
+
+def test_two_packages_with_one_name(install: Install) -> None:
+    install()
+    install("other-suite")
+    with pytest.raises(BadInput, match=r'"garden": garden-suite 1\.0 \(garden_suite\) and other-suite 1\.0'):
+        load_suite("garden")
+
+
+def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
+    install()
+    new_task(Path("garden"), "WaterPlants")
+    with pytest.raises(BadInput, match=r"garden-suite 1\.0 and .* \./garden "):
+        load_suite("garden")
+    assert load_suite("./garden").folder == Path("garden").resolve()
+
+
+def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) -> None:
+    folder = install(name="paper")
+    assert load_suite("paper").folder != folder
+    assert any("garden-suite 1.0" in each and '"paper"' in each for each in other_suites("paper"))
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"whole": False}, r'"garden" is garden_suite, .*suite\.yaml in .*garden_suite'),
+        ({"place": "gone"}, r'"garden" is gone, .*no package "gone"'),
+        ({"place": "garden_suite:SUITE"}, r'no package "garden_suite:SUITE"'),
+        ({"point": "roses", "name": "garden"}, r'line 1: .*"garden", .*"roses"'),
+    ],
+)
+def test_a_broken_package(install: Install, changed: dict[str, str], named: str) -> None:
+    install(**changed)
+    asked = changed.get("point", "garden")
+    with pytest.raises(BadInput, match=named):
+        load_suite(asked)
+    ended = roboeval("tasks", "--suite", asked, environment=ENVIRONMENT | dict(os.environ))
+    assert (ended.status, ended.err.count("\n"), "Traceback" in ended.err) == (2, 1, False)
+
+
+def test_nobody_starts_a_task_in_a_suite_of_somebody_else(install: Install) -> None:
+    install()
+    for suite, why in (
+        ("garden", "garden-suite 1.0"),
+        ("plus", "RoboEval"),
+    ):
+        ended = roboeval(
+            "tasks", "--new", "MakeTea", "--suite", suite, environment=ENVIRONMENT | dict(os.environ)
+        )
+        assert (ended.status, why in ended.err) == (2, True)
+        assert not Path(suite).exists()

@@ -1,0 +1,254 @@
+"""Task and suite files: what they may say, and one sentence for each way they can be wrong."""
+
+import copy
+import pickle
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.rtl import parse
+from roboeval.suites.catalogue import new_task
+from roboeval.suites.load import load_suite
+from small_suite import SUITE, TASK, a_suite
+
+
+def test_a_requirement_is_its_check_with_the_arguments_filled_in(tmp_path: Path) -> None:
+    goes, not_bye = load_suite(a_suite(tmp_path)).task("T").scenarios[0].require
+    assert goes.formula == parse('tr.Exists(goto("kitchen"))')
+    assert not_bye.formula == parse('not tr.Exists(say("bye"))')
+    assert (not_bye.text, not_bye.check, not_bye.category) == ('not says("bye")', "says", "SayAtLocation")
+
+
+def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
+    task = TASK.replace(
+        """'tr.Exists(say("{what}"))'""", """'tr.Exists(say("a")) or tr.Exists(say("{what}"))'"""
+    )
+    requirement = load_suite(a_suite(tmp_path, task)).task("T").scenarios[0].require[1]
+    assert requirement.formula == parse('not (tr.Exists(say("a")) or tr.Exists(say("bye")))')
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "named"),
+    [
+        ("summary: s\n", "", 1, '"summary"'),
+        ("name: T", "name: U", 1, 'named "U"'),
+        ("prompts: [p]", "prompts: []", 3, '"prompts"'),
+        ("category: Location", "category: Place", 5, "'Place'"),
+        ("goes:", "2 goes:", 5, '"2 goes"'),
+        (
+            "says(what)",
+            '"says(what, )"',
+            6,
+            '"says(what, )"',
+        ),
+        (
+            "says(what)",
+            '"says(what, what)"',
+            6,
+            'two parameters "what"',
+        ),
+        ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is no valid formula'),
+        ("goto(", "gote(", 5, 'the check "goes" is no valid formula'),
+        ("[goes,", "[gose,", 11, 'no check "gose"'),
+        ("[goes,", '[goes("x"),', 11, 'the check "goes" takes no argument'),
+        ('says("bye")', "says(bye)", 11, "no requirement"),
+        ('says("bye")', 'says(what="bye")', 11, "no requirement"),
+        (
+            'says("bye")]\n',
+            'says("bye")]\n    ablation: []\n  - {about: b, robot: r, rooms: [r], require: [goes]}\n',
+            7,
+            "ablation",
+        ),
+        (
+            'say("{what}")',
+            'say("{waht}")',
+            6,
+            '"waht"',
+        ),
+        ("tr.Exists(goto(", 'tr.Exists(goto("{room}",', 5, '"room"'),
+        (
+            'say("{what}")',
+            'say("x{3}")',
+            6,
+            "{what}",
+        ),
+        (
+            'says("bye")]\n',
+            'says("bye")]\n  - robot: r\n    about: one\n    rooms: [r]\n    require: [goes]\n',
+            13,
+            'world 2 is about "one"',
+        ),
+        (
+            'says("bye")]\n',
+            'says("bye")]\n  - robot: r\n    about: " One "\n    rooms: [r]\n    require: [goes]\n',
+            13,
+            'world 2 is about " One "',
+        ),
+        ("require: [goes,", "demand: [goes,", 8, '"require" is missing'),
+        ("robot: kitchen", "robot: hall", 9, '"hall"'),
+        (
+            "prompts: [p]",
+            'prompts: [p]\nfacts:\n  - {fact: f, words: ["("]}',
+            5,
+            '"(" is no valid regular expression',
+        ),
+        ("summary: s", "summary: s\nsummary: t", 3, '"summary"'),
+        ("summary: s", "summary: [s", 3, "YAML"),
+    ],
+)
+def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, line: int, named: str) -> None:
+    assert old in TASK
+    with pytest.raises(BadInput) as caught:
+        load_suite(a_suite(tmp_path, TASK.replace(old, new, 1)))
+    assert (caught.value.file, caught.value.line) == (tmp_path / "tasks" / "T.yaml", line)
+    assert named in caught.value.sentence
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("suite", "line", "named"),
+    [
+        ("name: mine\nversion: one\n", 2, ['"version"', "whole number"]),
+        (
+            "name: mine\nversion: 1\nrules: {limits: {seconds: .inf}}\n",
+            3,
+            ['"seconds"', "finite"],
+        ),
+        (SUITE + "rules: {limits: {calls: yes}}\n", 3, ['"calls"', "whole number"]),
+        (
+            SUITE + "rules: {limits: {ticks: 1000000001}}\n",
+            3,
+            ['"ticks"', "1000000001", "1000000000"],
+        ),
+        (
+            SUITE + "worlds: 10001\n",
+            3,
+            ['"worlds"', "10001", "10000"],
+        ),
+        (
+            SUITE + "rules: {clock_starts: 5}\n",
+            3,
+            ['"clock_starts" is 5', "1970"],
+        ),
+        (
+            SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00\n",
+            4,
+            ['"clock_starts" is 2024-01-01 12:00:00', "1970 to 2099"],
+        ),
+        (
+            SUITE + "rules:\n  clock_starts: 9999-12-31T23:59:59Z\n",
+            4,
+            ['"clock_starts" is 9999-12-31', "1970 to 2099"],
+        ),
+        (SUITE + "rules: {literals: loud}\n", 3, ['"literals"', "'loud'"]),
+        (SUITE + "rules: {gravity: 9.81}\n", 3, ['"gravity"']),
+        (SUITE + "rules: {skill_seconds: 2}\n", 3, ['"skill_seconds" is 2']),
+        (SUITE + "rules: {limits: {calls: 0}}\n", 3, ['"calls" is 0']),
+        (
+            "version: 1\nname: my-ablation\n",
+            2,
+            ['"my-ablation"', '"-ablation"'],
+        ),
+        ("", None, ["empty"]),
+    ],
+)
+def test_a_rule_that_is_not_known_gets_a_sentence(
+    tmp_path: Path, suite: str, line: int | None, named: list[str]
+) -> None:
+    with pytest.raises(BadInput) as caught:
+        load_suite(a_suite(tmp_path, suite=suite))
+    assert (caught.value.file, caught.value.line) == (tmp_path / "suite.yaml", line)
+    assert all(name in caught.value.sentence for name in named), caught.value
+
+
+def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
+    suite = load_suite(a_suite(tmp_path, suite=SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00+02:00\n"))
+    assert suite.rules.clock_starts.timestamp() == 1_704_103_200
+
+
+def test_an_unknown_suite_gets_a_sentence() -> None:
+    with pytest.raises(BadInput, match=r'"nonsense": .*paper, plus'):
+        load_suite("nonsense")
+
+
+def test_the_hash_covers_what_verdicts_rest_on_and_no_comments(tmp_path: Path) -> None:
+    digests = []
+    for number, task in enumerate([TASK, "# a comment\n" + TASK, TASK.replace('"bye"', '"good bye"')]):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        digests.append(load_suite(a_suite(folder, task)).digest)
+    assert digests[0] == digests[1] != digests[2]
+    folder = tmp_path / "stricter"
+    folder.mkdir()
+    assert load_suite(a_suite(folder, suite=SUITE + "rules: {limits: {calls: 7}}\n")).digest != digests[0]
+
+
+def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) -> None:
+    folder = tmp_path / "my suite"
+    new_task(folder, "MakeTea")
+    suite = load_suite(str(folder))
+    required = [[r.text for r in scenario.require] for scenario in suite.task("MakeTea").scenarios]
+    assert required == [["announces_tea"], ['visits("kitchen")', "not announces_tea"]]
+    (folder / "tasks" / "MakeTea.yaml").write_text("mine")
+    with pytest.raises(BadInput, match="already"):
+        new_task(folder, "MakeTea")
+    assert (folder / "tasks" / "MakeTea.yaml").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["../x", "", "makeTea", "Make Tea", "Make-Tea", "Tee\n", "T\u00e4ufer"])
+def test_a_bad_name_for_a_task(tmp_path: Path, name: str) -> None:
+    with pytest.raises(BadInput, match="name for a task"):
+        new_task(tmp_path, name)
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"),
+    [("My Suite", "my-suite"), ("plus", "my-plus"), ("3", "mine"), ("tea-ablation", "tea"), ("茶", "mine")],
+)
+def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
+    tmp_path: Path, folder: str, name: str
+) -> None:
+    new_task(tmp_path / folder, "MakeTea")
+    assert load_suite(str(tmp_path / folder)).name == name
+
+
+def test_a_suite_is_not_started_within_another(tmp_path: Path) -> None:
+    new_task(tmp_path / "lab", "MakeTea")
+    with pytest.raises(BadInput, match="within a suite") as error:
+        new_task(tmp_path / "lab" / "tasks", "MakeCoffee")
+    assert error.value.file == tmp_path / "lab" / "tasks"
+    assert [path.name for path in (tmp_path / "lab" / "tasks").iterdir()] == ["MakeTea.yaml"]
+
+
+def test_a_suite_is_read_anew_only_when_its_files_have_changed(tmp_path: Path) -> None:
+    folder = a_suite(tmp_path)
+    before = load_suite(folder)
+    assert load_suite(folder) is before
+    (tmp_path / "tasks" / "T.yaml").write_text(TASK.replace("about: one", "about: another"))
+    after = load_suite(folder)
+    assert [scenario.world.about for scenario in after.task("T").scenarios] == ["another"]
+    (tmp_path / "tasks" / "U.yaml").write_text(TASK.replace("name: T", "name: U"))
+    assert [*load_suite(folder).tasks] == ["T", "U"]
+
+
+def test_the_rules_of_the_paper() -> None:
+    suite = load_suite("paper")
+    assert (suite.rules.limits.seconds, suite.rules.limits.calls, suite.rules.limits.ticks) == (
+        3600,
+        1000,
+        200_000,
+    )
+    assert suite.rules.literals == "lowercase"
+    assert suite.rules.clock_starts.isoformat() == "2024-01-01T12:00:00+00:00"
+
+
+@pytest.mark.parametrize("name", ["paper", "plus"])
+def test_a_suite_can_be_copied_and_sent_and_stand_in_a_set(name: str) -> None:
+    suite = load_suite(name)
+    again = pickle.loads(pickle.dumps(suite))
+    assert {suite, again, copy.deepcopy(suite)} == {suite}
+    if suite.further is not None:
+        task = suite.tasks["LunchTime"]
+        assert again.further(task, 9, 5) == suite.further(task, 9, 5)

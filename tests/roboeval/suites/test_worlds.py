@@ -1,0 +1,244 @@
+"""Drawn worlds: what a description may say, what is drawn from it, and what each world then requires."""
+
+import ast
+import re
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from codebotler.badinput import BadInput
+from roboeval.mutation.worlds import worlds_of
+from roboeval.suites.expression import ExpressionError, PersonFact, each_of, parsed, value
+from roboeval.suites.load import _suite_of, load_suite
+from roboeval.suites.pairwise import covering, met, pairs, spread
+from roboeval.suites.schema import MOST_WORLDS
+
+SUITE = "name: mine\nversion: 1\nabout: my tasks\nworlds: 12\nseed: 3\n"
+TASK = """\
+name: Tea
+summary: Tell everybody that tea is ready.
+prompts: ["Tell everybody that tea is ready."]
+worlds:
+  robot: hall
+  rooms: [lab, office, hall]
+  people:
+    kim: {in: [lab, office, nowhere], answers: [["yes", "no"], {option: -1}], after_looks: [0, 2]}
+    lou: {name: lou|louise, in: lab, topics: {tea: ["0|none", "2|two"]}, leaves: true}
+  things:
+    mug: {in: [office, nowhere]}
+  may_wait_forever: count(p for p in people if p.room) < 2
+  corners:
+    - {about: nobody is in, set: {"*.in": nowhere}}
+    - {about: lou wants two, set: {lou.topic tea: 2|two, kim.answer 1: "no"}}
+let:
+  here: '[p for p in people if p.room]'
+  cups: 'sum(number(p.topics["tea"]) for p in here if p.name == "lou")'
+checks:
+  tells(room, who):
+    category: SayAtLocation
+    rtl: tr.Exists(at("{room}", say("{who}")))
+  counts(cups):
+    category: SayAtLocation
+    rtl: tr.Exists(say(number({cups}, "cup")))
+  looks:
+    category: CheckEntityAtLocation
+    rtl: tr.Exists(check(r"\\b{people}\\b"))
+require:
+  - tells(p.room, p.name) for p in here if p.room != "hall"
+  - counts(cups) if cups
+  - not counts(3)
+  - looks
+"""
+
+
+def suite(folder: Path, task: str = TASK) -> Path:
+    (folder / "tasks").mkdir()
+    (folder / "suite.yaml").write_text(SUITE)
+    (folder / "tasks" / "Tea.yaml").write_text(task)
+    return folder
+
+
+def test_worlds_are_drawn_from_a_description(tmp_path: Path) -> None:
+    mine = load_suite(str(suite(tmp_path)))
+    scenarios = mine.tasks["Tea"].scenarios
+    assert (mine.worlds, mine.seed) == (12, 3)
+    assert len(scenarios) >= 12
+    assert [s.world.about for s in scenarios[:2]] == ["nobody is in", "lou wants two"]
+    assert len({s.world for s in scenarios}) == len(scenarios)
+    nobody, two = scenarios[:2]
+    assert nobody.world.may_wait_forever
+    assert not two.world.may_wait_forever
+    assert [r.text for r in nobody.require] == ["not counts(3)", "looks"]
+    assert [r.text for r in two.require] == [
+        'tells("lab", "kim")',
+        'tells("lab", "lou")',
+        "counts(2)",
+        "not counts(3)",
+        "looks",
+    ]
+    (kim, lou) = two.world.rooms[0].people
+    assert (kim.name, kim.answers, lou.name, lou.topics) == (
+        "kim",
+        ("no", -1),
+        "lou|louise",
+        (("tea", "2|two"),),
+    )
+    assert lou.leaves
+    assert two.world.rooms[1].objects == ("mug",)
+    assert "lou|louise" in str(two.require[-1].formula)
+
+
+def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: Path) -> None:
+    mine = load_suite(str(suite(tmp_path)))
+    again, other, more = mine.with_worlds(12, 3), mine.with_worlds(seed=4), mine.with_worlds(40)
+    assert again.digest == mine.digest == mine.with_own_worlds().digest
+    assert len({mine.digest, other.digest, more.digest}) == 3
+    assert len(more.tasks["Tea"].scenarios) >= 40
+    assert more.with_own_worlds().digest == mine.digest
+    assert other.tasks["Tea"].scenarios[2:] != mine.tasks["Tea"].scenarios[2:]
+    assert other.tasks["Tea"].scenarios[:2] == mine.tasks["Tea"].scenarios[:2]
+
+
+def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:
+    mine = load_suite(suite(tmp_path))
+    for seed in range(30):
+        mine.with_worlds(seed=seed)
+    assert 0 < _suite_of.cache_info().currsize < 12
+
+
+def test_more_worlds_than_fit_into_memory_are_not_drawn(tmp_path: Path) -> None:
+    mine, most = load_suite(suite(tmp_path)), MOST_WORLDS
+    with pytest.raises(BadInput, match=f"{most + 1}.* {most:,}"):
+        mine.with_worlds(most + 1)
+    with pytest.raises(BadInput, match=f"{most + 1}.* {most:,}"):
+        worlds_of(mine, mine.tasks["Tea"], most + 1, 1)
+
+
+def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:
+    with pytest.raises(BadInput, match="written by hand"):
+        load_suite("paper").with_worlds(200)
+
+
+PHRASES = TASK.replace('say(number({cups}, "cup"))', 'say(words(r"{some}", number({cups}, "cup")))').replace(
+    "checks:\n", "phrases:\n  some: [tea, cups? for]\nchecks:\n"
+)
+
+
+def test_checks_name_phrases(tmp_path: Path) -> None:
+    task = load_suite(str(suite(tmp_path, PHRASES))).tasks["Tea"]
+    told = next(r for r in task.scenarios[1].require if r.text == "counts(2)")
+    assert "(?:tea|cups? for)" in str(told.formula)
+    assert task.phrases == (("some", ("tea", "cups? for")),)
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "named"),
+    [
+        ("some:", "people:", ['"people"', "phrases"]),
+        ("some:", "two words:", ['"two words"', "phrases"]),
+        ('{some}"', 'tea"', ['"some"', "{some}"]),
+        ("[tea,", """['"tea"',""", ['"tea"', "quotation mark"]),
+        ("[tea, cups? for]", "[]", ['"some"', "too few"]),
+    ],
+)
+def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list[str]) -> None:
+    assert good in PHRASES
+    with pytest.raises(BadInput) as error:
+        load_suite(str(suite(tmp_path, PHRASES.replace(good, bad))))
+    assert all(name in error.value.sentence for name in named), error.value
+    assert error.value.line is not None
+
+
+@pytest.mark.parametrize(
+    ("good", "bad", "line", "named"),
+    [
+        ("in: lab,", "in: attic,", 9, '"attic"'),
+        ('"*.in": nowhere', '"kim.in": hall', 14, '"kim.in" names can be "hall"'),
+        ("counts(cups) if cups", "counts(cup) if cups", 31, '"cup"'),
+        ("not counts(3)", "not counts(here)", 32, "argument"),
+        ("not counts(3)", "not 3", 32, "no requirement"),
+        ("not counts(3)", "counts(3", 32, "cannot be read"),
+        ("not counts(3)", "missing(3)", 32, '"missing"'),
+        ('p.topics["tea"]', 'p.topics["milk"]', 18, "cannot be computed"),
+        ("if p.room]'", "if p.age]'", 17, '".age"'),
+        ("{option: -1}", "{option: 0}", 8, "no option 0"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(
+    tmp_path: Path, good: str, bad: str, line: int, named: str
+) -> None:
+    assert good in TASK
+    folder = suite(tmp_path, TASK.replace(good, bad))
+    with pytest.raises(BadInput, match=re.escape(named)) as error:
+        load_suite(str(folder))
+    assert (error.value.file, error.value.line) == (folder / "tasks" / "Tea.yaml", line)
+
+
+@pytest.mark.parametrize("sizes", [{"a": 3, "b": 2, "c": 4, "d": 2}, {"a": 2, "b": 2}, {"a": 5}, {}])
+def test_every_two_values_meet(sizes: dict[str, int]) -> None:
+    rows = covering(sizes, Random(1))
+    seen = set().union(*map(met, rows)) if rows else set()
+    assert seen >= pairs(sizes)
+    assert len(spread(sizes, 30, Random(1))) >= 30
+    assert covering(sizes, Random(1)) == rows
+    if len(sizes) == 1:
+        assert {row["a"] for row in rows} == set(range(5))
+
+
+def test_every_task_of_plus_has_its_worlds_and_its_pairs() -> None:
+    for task in load_suite("plus").tasks.values():
+        assert len(task.scenarios) >= 30, task.name
+        assert len({s.world for s in task.scenarios}) == len(task.scenarios), task.name
+        assert len({s.world.about for s in task.scenarios}) == len(task.scenarios), task.name
+
+
+FACTS = {
+    "people": [PersonFact("kim", "lab", ("yes", 2), {"tea": "3|three"}, 0), PersonFact("lou", "", (), {}, 4)],
+    "rooms": ("lab", "hall"),
+    "n": 3,
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("count(p for p in people if p.room)", 1),
+        ("[p.name for p in people if p.room in rooms or p.after_looks > 2]", ["kim", "lou"]),
+        ('number(people[0].topics["tea"]) + 2 * n - 1', 8),
+        ('any("yes" in p.answers for p in people) and not all(p.room for p in people)', True),
+        ('f"{people[0].name} is in" if n == 3 else "no"', "kim is in"),
+        ("max([1, n, 2]) // 2", 1),
+        ("1 < n <= 3 != 4", True),
+    ],
+)
+def test_expressions(text: str, wanted: object) -> None:
+    assert value(parsed(text), FACTS) == wanted
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os')",
+        "people.__class__",
+        "(lambda: 1)()",
+        "[x for x in rooms for y in rooms]",
+        "n ** n",
+        "open",
+        "1 // 0",
+        "number('x')",
+        "[a for a, b in people]",
+        "[a for a in 'text']",
+        "rooms[9]",
+        "x := 3",
+    ],
+)
+def test_nothing_else_is_an_expression(text: str) -> None:
+    with pytest.raises(ExpressionError):
+        value(parsed(text), FACTS)
+
+
+def test_a_loop_binds_one_name() -> None:
+    node = parsed("[p for p in people if p.room]")
+    assert isinstance(node, ast.ListComp)
+    assert [each["p"].name for each in each_of(node.generators[0], FACTS)] == ["kim"]

@@ -1,0 +1,68 @@
+"""What the linter says of the suites that ship: nothing that their task files do not accept."""
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from codebotler.rtl import holds
+from codebotler.trace import Event, Option
+from roboeval.linting.findings import Finding, render
+from roboeval.linting.lint import lint
+from roboeval.linting.trials import tried
+from roboeval.suites.load import Suite, load_suite
+
+
+@pytest.fixture(scope="module")
+def of_paper() -> list[Finding]:
+    suite = load_suite("paper")
+    return [one for task in suite.tasks.values() for one in lint(task, tried(task, suite, workers=2))]
+
+
+def test_the_papers_suite_has_no_open_finding(of_paper: list[Finding]) -> None:
+    assert [one.name for one in of_paper if one.accepted is None] == []
+    assert re.search(rf"^nothing was found .*\b{len(of_paper)} findings\b.* --accepted", render(of_paper))
+
+
+def test_a_finding_of_the_papers_suite_comes_back(paper: Suite) -> None:
+    task = paper.task("HalloweenShopping")
+    findings = lint(replace(task, accepted=()), [])
+    assert [one.name for one in findings if one.kind != "untripped"] == ["same-worlds: 4 and 5"]
+    assert all(one.accepted is None for one in findings)
+    assert [one.accepted is None for one in lint(task, [])] == [True, False]
+
+
+IMPLIED = {
+    ("GetDrink", "kitchen_after_lobby"),
+    ("SetTemperature", "comes_back"),
+    ("ElevatorTour", "asks_about_tour"),
+    ("ElevatorTour", "speaks_before_leading"),
+    ("LunchBreak", 'asks_to_lunch("alice")'),
+    ("LunchBreak", 'asks_to_lunch("bob")'),
+    ("CountSavory", 'not questions_after_looking("alice")'),
+    ("CountSavory", 'not questions_after_looking("david")'),
+    # Beyond those that mutated traces had shown:
+    ("SayGoodDay", "looks_into_every_lab"),
+    ("MovieMessenger", "tells_mark_something"),
+    ("StaplerDelivery", "takes_none_from_first_printer_room"),
+}
+
+
+def test_what_follows_in_the_papers_suite(of_paper: list[Finding]) -> None:
+    implied = {(one.path.stem, one.subject) for one in of_paper if one.kind == "implied"}
+    assert {one for one in implied if not one[1].startswith("visits_")} == IMPLIED
+
+
+def test_the_order_of_mail_delivery_does_not_follow(of_paper: list[Finding], paper: Suite) -> None:
+    """520,000 mutated traces had not shown it, but it can be the only one to fail."""
+    assert "implied: visits_all_offices_before_returning" not in {one.name for one in of_paper}
+    back_at_once = [Event("goto", "mail room"), Event("pick", "bin"), Event("goto", "mail room")]
+    says = [Event("place", "bin"), Event("say", "alice, bob, charlie")]
+    asks = [
+        event
+        for name in ("alice", "bob", "charlie")
+        for event in (Event("goto", f"{name}'s office"), Event("ask", "any mail?", (Option("yes"),)))
+    ]
+    trace = (*back_at_once, *says, *asks)
+    failed = [r.text for r in paper.task("MailDelivery").scenarios[0].require if not holds(r.formula, trace)]
+    assert failed == ["visits_all_offices_before_returning"]

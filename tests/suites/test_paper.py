@@ -1,0 +1,144 @@
+"""The 16 tasks: five phrasings each that say what the requirements rest on, and recorded programs for all."""
+
+import ast
+import re
+from collections import Counter
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any
+
+import pytest
+
+from codebotler.models.recorded import Reply, recorded_model
+from roboeval.evaluation.completions import Completion, recorded_completions
+from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.judge import evaluate
+from roboeval.suites.load import Suite, Task, load_suite
+
+TASKS = list(load_suite("paper").tasks.values())
+MODELS = ("careful", "hasty")
+
+each_task = pytest.mark.parametrize("task", TASKS, ids=lambda task: task.name)
+each_model = pytest.mark.parametrize("model", MODELS)
+
+
+def test_the_suite_has_the_tasks_of_the_paper(paper: Suite) -> None:
+    assert len(paper.tasks) == 16
+    assert sum(len(task.scenarios) for task in paper.tasks.values()) == 52
+    ablated = {name for name, task in paper.tasks.items() if task.ablation is not None}
+    assert ablated == {"CountSavory", "GrilledCheese", "LunchTime", "SetTemperature"}
+
+
+@each_task
+def test_five_phrasings_differ(task: Task) -> None:
+    assert len(task.prompts) == 5
+    for one, other in combinations(task.prompts, 2):
+        mine, theirs = set(one.lower().split()), set(other.lower().split())
+        assert len(mine & theirs) / len(mine | theirs) < 0.7
+
+
+@each_task
+def test_every_prompt_says_what_the_requirements_rest_on(task: Task) -> None:
+    assert task.facts
+    for fact in task.facts:
+        for prompt in task.prompts:
+            found = any(re.search(word, prompt, re.IGNORECASE) for word in fact.words)
+            assert found != fact.commonsense, (fact.fact, prompt)
+
+
+@each_task
+def test_no_prompt_names_the_start_or_a_skill(task: Task) -> None:
+    for prompt in task.prompts:
+        assert not re.search(r"start_loc|go_to|is_in_room|get_all|python|function", prompt, re.IGNORECASE)
+
+
+def test_tasks_of_common_sense_list_it(paper: Suite) -> None:
+    for task in paper.tasks.values():
+        if task.ablation is not None:
+            assert any(fact.commonsense for fact in task.facts), task.name
+
+
+def shape(program: str) -> str:
+    """A program without its names and literals: what is left is how it was thought out."""
+    try:
+        tree = ast.parse(program)
+    except SyntaxError:
+        return re.sub(r"\w+", "x", program)
+    for node in ast.walk(tree):
+        for field, value in ast.iter_fields(node):
+            if field in ("id", "name", "arg", "attr", "kind", "type_comment"):
+                setattr(node, field, "x")
+            elif field == "value" and isinstance(node, ast.Constant):
+                setattr(node, field, type(value).__name__)
+    return ast.dump(tree)
+
+
+@each_task
+@each_model
+def test_programs_were_thought_out_differently(task: Task, model: str) -> None:
+    replies = recorded_model(f"recorded:{model}").replies
+    shapes = [frozenset(shape(reply.program) for reply in replies[prompt]) for prompt in task.prompts]
+    differing = max(
+        len(group)
+        for size in range(1, 6)
+        for group in combinations(range(5), size)
+        if all(not shapes[a] & shapes[b] for a, b in combinations(group, 2))
+    )
+    assert differing >= 4
+
+
+@each_model
+def test_every_prompt_has_recorded_programs(paper: Suite, model: str) -> None:
+    replies = recorded_model(f"recorded:{model}").replies
+    prompts = {prompt for task in paper.tasks.values() for prompt in task.prompts}
+    assert prompts <= set(replies)
+    assert len(prompts) == 80
+    assert all(len(replies[prompt]) >= (1 if model == "careful" else 2) for prompt in prompts)
+
+
+@pytest.fixture(scope="session")
+def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Reply, dict[str, Any]]]]:
+    def judged(model: str) -> Iterator[tuple[Completion, Reply, dict[str, Any]]]:
+        completions = list(recorded_completions(f"recorded:{model}", paper))
+        replies = recorded_model(f"recorded:{model}")
+        for completion, row in zip(completions, evaluate(completions, paper, workers=2), strict=True):
+            assert completion.instruction is not None
+            yield completion, replies.reply(completion.instruction, completion.index), {**row}
+
+    return {model: list(judged(model)) for model in MODELS}
+
+
+Verdicts = dict[str, list[tuple[Completion, Reply, dict[str, Any]]]]
+
+
+@each_model
+def test_recorded_programs_fail_as_they_say(verdicts: Verdicts, model: str) -> None:
+    for completion, reply, row in verdicts[model]:
+        kind = None if row["failure"] is None else row["failure"]["kind"]
+        assert kind == reply.fails, (completion.key, row["failure"])
+
+
+def test_the_reference_programs_pass(verdicts: Verdicts) -> None:
+    first = [row for completion, _, row in verdicts["careful"] if completion.key[1:] == (0, 0)]
+    assert len(first) == 16
+    assert all(row["passed"] for row in first)
+
+
+def test_careful_passes_most_and_hasty_fails_in_every_way(verdicts: Verdicts) -> None:
+    careful = [row["passed"] for _, _, row in verdicts["careful"]]
+    assert sum(careful) / len(careful) > 0.8
+    failures = [row["failure"] for _, _, row in verdicts["hasty"] if not row["passed"]]
+    assert {failure["class"] for failure in failures} == set(CLASSES)
+    assert len({failure["kind"] for failure in failures}) >= 12
+
+
+@each_task
+def test_a_task_has_four_programs_that_are_wrong_for_different_reasons(
+    verdicts: Verdicts, task: Task
+) -> None:
+    reasons: Counter[tuple[str, str | None]] = Counter()
+    for rows in verdicts.values():
+        for completion, _, row in rows:
+            if completion.task == task.name and not row["passed"]:
+                reasons[row["failure"]["kind"], row["failure"]["check"]] += 1
+    assert len(reasons) >= 4

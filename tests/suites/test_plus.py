@@ -1,0 +1,199 @@
+"""The suite `plus`: its tasks judge as their instructions ask, and what is beside that changes nothing."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import cycle
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+import yaml
+
+from codebotler.simulator.engine import run
+from codebotler.world import World
+from roboeval.evaluation.failures import Verdict
+from roboeval.evaluation.judge import judge
+from roboeval.linting.lint import lint
+from roboeval.linting.trials import Verdicts, recorded_programs, recorded_replies, tried
+from roboeval.mutation.variants import variants
+from roboeval.suites.load import Suite, Task, load_suite
+
+HERE = Path(__file__).parent
+KNOWN: list[dict[str, Any]] = yaml.safe_load((HERE / "known.yaml").read_text())
+TASKS = sorted(load_suite("paper").tasks)
+each_task = pytest.mark.parametrize("name", TASKS)
+
+
+@cache
+def plus() -> Suite:
+    return load_suite("plus")
+
+
+@cache
+def plus_of_another_seed() -> Suite:
+    return plus().with_worlds(40, 77)
+
+
+def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None) -> list[list[Verdict]]:
+    """How each program does in all worlds of a task, or in changed ones with the same requirements."""
+    scenarios = task.scenarios
+    shown = worlds or [scenario.world for scenario in scenarios]
+    pairs = [(program, world) for program in programs for world in shown]
+    outcomes = iter([*run(pairs, workers=2, rules=plus().rules)])
+    return [[judge(next(outcomes), scenario) for scenario in scenarios] for _ in programs]
+
+
+def passes(several: Verdicts) -> bool:
+    return all(verdict.satisfied for verdict in several)
+
+
+@cache
+def verdicts_on_recorded(name: str) -> Sequence[Verdicts]:
+    """How the programs that are recorded for a task do."""
+    return tried(plus().tasks[name], plus(), workers=2)
+
+
+@cache
+def verdicts_on_variants(name: str) -> Sequence[Verdicts]:
+    """How the programs do that were written from the instruction alone."""
+    task = plus().tasks[name]
+    return verdicts([variant.program for variant in variants(task)], task)
+
+
+def test_the_suite_of_the_paper_is_what_it_was() -> None:
+    assert load_suite("paper").digest == "ea395de1c023ae42bcf293f8da46567226ecc850722a2ec3a081fb90c44b5ffb"
+    assert sorted(plus().tasks) == TASKS
+    for name, task in plus().tasks.items():
+        assert task.prompts == load_suite("paper").tasks[name].prompts
+
+
+@each_task
+def test_what_other_checks_misjudge_is_judged_right(name: str) -> None:
+    of_task = [known for known in KNOWN if known["task"] == name]
+    judged = verdicts([known["program"] for known in of_task], plus().tasks[name])
+    wrong = [
+        (known["key"], [(v.world, [r.text for r in v.failed]) for v in several if not v.satisfied][:3])
+        for known, several in zip(of_task, judged, strict=True)
+        if passes(several) != known["is_right"]
+    ]
+    assert wrong == []
+
+
+# Where the recorded programs are judged otherwise than by the paper, and who is right.
+OTHERWISE = {
+    "puts it down under another name than it was picked up": True,
+    "puts down the bin under another name than it was picked up": True,
+    "puts down something it did not pick under that name": True,
+    "comes back to tell me the choice before bringing the drink": True,
+    "sees what there is in the kitchen before asking": True,
+    "says in an office that it is done": True,
+    "looks for Zarko in the lobby too": True,
+    "one question with the ingredients as options": False,
+    'reports "is not coming" for those who decline, naming them all the same': True,
+    "two lists side by side": False,
+    "goes through the names with an index": False,
+    "looks for her in the other office too": True,
+    "announces the errand before setting out": True,
+    "offers p.m. with full stops, which does not match what Mark answers": True,
+    "looks the offices up by name and returns early": False,
+    "returns to the start between Sally and Mark": True,
+    'says "nobody is here today" in an empty lab': True,
+    "her yes fits none of the friendly answers, so it counts as a no": True,
+    "makes sure that there are staplers in the supply room before it starts looking": True,
+    "one long sentence that names the rooms with and without a stapler together": True,
+    "says that staplers are missing, without any of the words asked for": True,
+    "greets everybody between seeing and asking them": True,
+}
+
+
+@each_task
+def test_recorded_programs_are_judged_as_they_are_meant(name: str) -> None:
+    task = plus().tasks[name]
+    wrong = [
+        (
+            reply.about,
+            [(v.world, v.outcome.error, [r.text for r in v.failed]) for v in several if not v.satisfied][:2],
+        )
+        for reply, several in zip(recorded_replies(task), verdicts_on_recorded(name), strict=True)
+        if passes(several) != OTHERWISE.get(reply.about, reply.fails is None)
+        or OTHERWISE.get(reply.about) == (reply.fails is None)
+    ]
+    assert wrong == []
+
+
+@each_task
+def test_the_linter_finds_nothing(name: str) -> None:
+    assert lint(plus().tasks[name], verdicts_on_recorded(name)) == []
+
+
+@each_task
+def test_programs_written_from_the_instruction_alone_pass(name: str) -> None:
+    right = variants(plus().tasks[name])
+    assert len(right) >= 10
+    judged = verdicts_on_variants(name)
+    failed = [variant.name for variant, one in zip(right, judged, strict=True) if not passes(one)]
+    assert failed == []
+
+
+HARMLESS = """
+_drive = go_to
+def go_to(room):
+    _drive(room)
+    is_in_room("fire extinguisher")
+    time.sleep(1)
+"""
+
+
+AROUND = [
+    "say('Hello, I am on my way.'); _task(); say('All done!')",
+    "_task(); say('That was no problem at all.')",
+    "say('One moment, please.'); _task(); say('That was all.')",
+    "_task(); say('It took me 5 minutes. Thank you, and have a nice day.')",
+    "say('Off I go, it is not far.'); _task(); say('Any questions? Just ask!')",
+    "_task(); say('Everything went well.')",
+    "say('I will do all of that right away.'); _task(); say('I have done everything that I was asked to.')",
+]
+
+
+@each_task
+def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
+    task = plus().tasks[name]
+    several = [*zip(recorded_programs(task), verdicts_on_recorded(name), strict=True)][::9]
+    right = [variant.program for variant in variants(task)]
+    several += [*zip(right, verdicts_on_variants(name), strict=True)][: len(AROUND)]
+    changed = [
+        f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n    {around}\n"
+        for around, (program, _) in zip(cycle(AROUND), several, strict=False)
+    ]
+    otherwise = [
+        (program, v.world, [r.text for r in v.failed])
+        for program, (_, before), after in zip(changed, several, verdicts(changed, task), strict=True)
+        for v, w in zip(after, before, strict=True)
+        if v.satisfied != w.satisfied
+    ]
+    assert otherwise == []
+
+
+@each_task
+def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
+    task = plus().tasks[name]
+    meant = [r.program for r in recorded_replies(task) if OTHERWISE.get(r.about, r.fails is None)][::8]
+    right = [*meant, *(variant.program for variant in variants(task)[::4])]
+    random = Random(name)
+    worlds = [
+        replace(s.world, rooms=tuple(random.sample(s.world.rooms, len(s.world.rooms))))
+        for s in task.scenarios
+    ]
+    assert all(map(passes, verdicts(right, task, worlds)))
+
+
+@each_task
+def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
+    task = plus_of_another_seed().tasks[name]
+    assert {s.world for s in task.scenarios} != {s.world for s in plus().tasks[name].scenarios}
+    chosen = recorded_replies(task)[::9]
+    judged = verdicts([reply.program for reply in chosen], task)
+    for reply, several in zip(chosen, judged, strict=True):
+        assert passes(several) == OTHERWISE.get(reply.about, reply.fails is None), reply.about
