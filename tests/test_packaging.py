@@ -160,7 +160,7 @@ def test_a_shell_completes_commands_options_and_names(name: str, words: str, com
 
 @pytest.mark.parametrize("name", ["codebotler", "roboeval"])
 def test_what_completes_is_a_script_of_the_shell(name: str) -> None:
-    command = f"{shlex.quote(sys.executable)} -m {name}.cli --show-completion bash; true"
+    command = f"{shlex.quote(sys.executable)} -m {name} --show-completion bash; true"
     shown = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=True).stdout
     assert f"_{name}_completion {name}" in shown
     subprocess.run(["bash", "-n"], input=shown, text=True, check=True)
