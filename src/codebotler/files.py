@@ -6,9 +6,9 @@ import contextlib
 import errno
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,31 +21,20 @@ CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no
 # --- JSON lines
 
 
-def read_rows(
-    path: Path,
-    *,
-    limit: int = MAX_ROW,
-    growing: bool = False,
-    name: Path | str | None = None,
-    example: str | None = None,
-    see: Callable[[bytes], None] = lambda _: None,
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Read a file of JSON lines: the line's number, counted from 1, and its object.
+def read_lines(
+    path: Path, *, limit: int = MAX_ROW, name: Path | str | None = None
+) -> Iterator[tuple[int, bytes]]:
+    """Read a file line by line: the line's number, counted from 1, and its bytes.
 
     Args:
         path: the file.
         limit: the longest line in bytes.
-        growing: whether it is one that we write: then a broken last line without an end was torn by a crash,
-            and is passed over.
         name: what sentences call the file; its path by default.
-        example: a row, for who does not know what one looks like.
-        see: gets every line as it stands there.
 
     Raises:
-        BadInput: the file is missing, or a line is too long or no JSON object.
+        BadInput: the file is missing, or a line is too long.
     """
     name = name or path
-    mend = "" if example is None else f"; a row looks like {example}"
     try:
         file = path.open("rb")
     except FileNotFoundError:
@@ -53,35 +42,59 @@ def read_rows(
     except OSError as error:
         raise BadInput(f"cannot be read ({error.strerror})", file=name) from None
     with file:
-        for number in _count():
+        for number in count(1):
             line = file.readline(limit + 1)
             if not line:
                 return
-            see(line)
             if len(line) > limit:
                 raise BadInput(f"this row is longer than {limit:,} bytes", file=name, line=number)
-            if line.strip():
-                row = _parsed(line, name, number, mend)
-                if row is None and growing and not line.endswith(b"\n"):
-                    return
-                if row is None:
-                    raise BadInput(f"this line is no JSON{mend}", file=name, line=number)
-                yield number, row
+            yield number, line
 
 
-def _count() -> Iterator[int]:
-    number = 0
-    while True:
-        yield (number := number + 1)
+def read_rows(
+    path: Path,
+    *,
+    growing: bool = False,
+    name: Path | str | None = None,
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Read a file of JSON lines: the line's number, counted from 1, and its object.
+
+    Args:
+        path: the file.
+        growing: whether it is one that we write: then a broken last line without an end was torn by a crash,
+            and is passed over.
+        name: what sentences call the file; its path by default.
+
+    Raises:
+        BadInput: the file is missing, or a line is too long or no JSON object.
+    """
+    name = name or path
+    for number, line in read_lines(path, name=name):
+        if line.strip():
+            try:
+                row = parsed_row(line)
+            except BadInput as error:
+                raise BadInput(error.sentence, file=name, line=number) from None
+            if row is None and growing and not line.endswith(b"\n"):
+                return
+            if row is None:
+                raise BadInput("this line is no JSON", file=name, line=number)
+            yield number, row
 
 
-def _parsed(line: bytes, name: Path | str, number: int, mend: str) -> dict[str, Any] | None:
+def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
+    """The JSON object that a line says; None if it is no JSON.
+
+    Raises:
+        BadInput: it is JSON, but no object.
+    """
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
         return None
     if not isinstance(row, dict):
-        raise BadInput(f"this line is no JSON object{mend}", file=name, line=number)
+        mend = "" if example is None else f"; a row looks like {example}"
+        raise BadInput(f"this line is no JSON object{mend}")
     return row
 
 

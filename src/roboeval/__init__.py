@@ -10,6 +10,7 @@ __all__ = [
     "Suite",
     "__version__",
     "evaluate",
+    "load_results",
     "load_suite",
     "read_completions",
     "recorded_completions",
@@ -18,9 +19,11 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from roboeval.evaluation.completions import Completion, Row, read_completions, recorded_completions
+    from roboeval.evaluation.completions import Completion, read_completions, recorded_completions
     from roboeval.evaluation.judge import evaluate
+    from roboeval.evaluation.results import load_results
     from roboeval.evaluation.rewards import reward
+    from roboeval.evaluation.rows import Row
     from roboeval.suites.load import Suite, load_suite
 else:  # each name is imported when it is first used
     from codebotler.facade import facade
@@ -29,9 +32,10 @@ else:  # each name is imported when it is first used
         __name__,
         {
             "Completion": "evaluation.completions",
-            "Row": "evaluation.completions",
+            "Row": "evaluation.rows",
             "Suite": "suites.load",
             "evaluate": "evaluation.judge",
+            "load_results": "evaluation.results",
             "load_suite": "suites.load",
             "read_completions": "evaluation.completions",
             "recorded_completions": "evaluation.completions",

@@ -7,19 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from rich.console import Group, RenderableType
-from rich.padding import Padding
-from rich.text import Text
-
-from codebotler.terminal import shortened, visible
-from roboeval.analysis.similarity import Change, Fix, Lines, Passing, passing, shape, shortest_fix, similarity
-from roboeval.evaluation.completions import Key, how_many, name_of
-from roboeval.evaluation.explanation import GONE, reason
-from roboeval.evaluation.tables import RowData, key_of, kind_of
-from roboeval.suites.load import Suite
+from roboeval.analysis.similarity import Fix, Lines, Passing, passing, shape, shortest_fix, similarity
+from roboeval.evaluation.completions import Key, name_of
+from roboeval.evaluation.explanation import reason
+from roboeval.evaluation.results import Results
+from roboeval.evaluation.rows import RowData, key_of
 
 ALIKE = 0.6  # of their lines two shapes share to be of one group
-MOST_LINES = 60  # of a difference that people are shown
 
 Ground: TypeAlias = tuple[str, str, str, str | None]
 """Of which task and why: class, kind and failed check."""
@@ -62,22 +56,11 @@ class Cluster:
         return sorted({prompt for _, prompt, _ in self.members})
 
 
-def trimmed(row: RowData) -> RowData:
-    """A row with only those traces that say why it fails: the deciding world's."""
-    why = row["failure"]
-    deciding = None if why is None else why["world"]
-    verdicts = [
-        verdict if number == deciding else {"world": verdict["world"]}
-        for number, verdict in enumerate(row["verdicts"])
-    ]
-    return {**row, "verdicts": verdicts if why else []}
-
-
 def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[RowData]]:
     """Put failing completions together, the largest groups first.
 
     Args:
-        failed: rows of those that failed, as `trimmed` leaves them.
+        failed: rows of those that failed.
         programs: what was judged; what is gone is not there.
     """
     grounds: defaultdict[Ground, list[RowData]] = defaultdict(list)
@@ -89,30 +72,21 @@ def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[
     return sorted(found, key=lambda rows: (-len(rows), key_of(rows[0])))
 
 
-def clusters(
-    groups: Iterable[Sequence[RowData]],
-    passed: Iterable[Key],
-    programs: Mapping[Key, str],
-    suite: Suite,
-    *,
-    ablated: bool = False,
-) -> Iterator[Cluster]:
+def clusters(groups: Iterable[Sequence[RowData]], results: Results) -> Iterator[Cluster]:
     """Say of each group why it fails and what would have helped.
 
     Args:
         groups: of rows, as `groups` puts them together.
-        passed: completions that passed, among which fixes are looked for.
-        programs: what was judged; what is gone is not there.
-        suite: by which it was judged.
-        ablated: whether common sense only was required.
+        results: in which they are, among whose programs that pass fixes are looked for.
     """
+    programs = results.programs
     right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
-    for key in sorted(passed):
+    for key in sorted(results.passed):
         if key in programs:
             right[key[0]].append((name_of(key), programs[key]))
     candidates = {task: passing(named) for task, named in right.items()}
     for rows in groups:
-        yield _cluster(rows, programs, candidates.get(rows[0]["task"], []), suite, ablated=ablated)
+        yield _cluster(rows, programs, candidates.get(rows[0]["task"], []), results)
 
 
 def _grouped(
@@ -140,9 +114,7 @@ def _cluster(
     rows: Sequence[RowData],
     programs: Mapping[Key, str],
     candidates: Sequence[Passing],
-    suite: Suite,
-    *,
-    ablated: bool,
+    results: Results,
 ) -> Cluster:
     often = Counter(programs.get(key_of(row)) for row in rows)
     most = max(often.values())
@@ -154,12 +126,9 @@ def _cluster(
         members=tuple(sorted(map(key_of, rows))),
         representative=key_of(row),
         program=program,
-        told=reason(row, suite, ablated=ablated),
+        told=reason(row, results.suite, ablated=results.is_ablated),
         fix=None if program is None else shortest_fix(program, candidates),
     )
-
-
-# --- for machines and people
 
 
 def cluster_data(cluster: Cluster) -> dict[str, Any]:
@@ -178,28 +147,3 @@ def cluster_data(cluster: Cluster) -> dict[str, Any]:
         if fix is None
         else {"program": fix.name, "changed": fix.changed, "difference": list(map("".join, fix.changes))},
     }
-
-
-def cluster_view(cluster: Cluster) -> RenderableType:
-    """A group for a person: how many, why, and what would have helped."""
-    size = how_many(len(cluster.members))
-    name = visible(name_of(cluster.representative))
-    head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_of(cluster.failure))
-    lines = [Text(f'such as {name}, in "{visible(str(cluster.told["world"]))}"', "dim")]
-    check = cluster.failure["check"]
-    lines.append(Text(shortened(f"{check}: {cluster.why}" if check else cluster.why)))
-    if cluster.program is None:
-        lines.append(Text(GONE, "yellow"))
-    if cluster.fix is not None:
-        changed = f"{cluster.fix.changed} line{'s' * (cluster.fix.changed != 1)}"
-        lines.append(Text(f"{visible(cluster.fix.name)} passes, and differs in {changed}:", "dim"))
-        lines += map(_change, cluster.fix.changes[:MOST_LINES])
-        left = len(cluster.fix.changes) - MOST_LINES
-        lines += [Text(f"... {left} more lines", "dim")] if left > 0 else []
-    return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
-
-
-def _change(change: Change) -> Text:
-    sign, line = change
-    style = {"-": "red", "+": "green"}.get(sign, "dim")
-    return Text(f"{sign} {shortened(line.expandtabs(4))}", style)

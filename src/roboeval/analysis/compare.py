@@ -7,18 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from rich import box
-from rich.console import Group, RenderableType
-from rich.table import Table
-from rich.text import Text
-
 from codebotler.badinput import BadInput
-from codebotler.storyboard import grid
+from codebotler.english import counted
 from codebotler.terminal import visible
 from roboeval.analysis.metrics import Estimate
 from roboeval.analysis.statistics import (
     DIFFERENCE,
-    FEW,
     ROUNDING,
     Needed,
     by_bootstrap,
@@ -28,7 +22,6 @@ from roboeval.analysis.statistics import (
 )
 from roboeval.suites.load import Suite
 
-SMALL = 0.0001
 PromptScores = Mapping[tuple[str, int], float]
 """pass@1 by task and prompt."""
 
@@ -208,9 +201,6 @@ def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, agai
     )
 
 
-# --- for people and machines
-
-
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
     """A comparison as plain data."""
     return {
@@ -234,47 +224,9 @@ def _ends(estimate: Estimate) -> dict[str, float]:
     return {"low": estimate.low, "high": estimate.high}
 
 
-def render(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
-    """A comparison as text and tables.
-
-    Args:
-        comparison: of two runs.
-        names: of both.
-    """
-    a, b = map(visible, names)
-    rows = grid("left", "right", "left")
-    rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")
-    rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}")
-    rows.add_row(
-        "difference",
-        f"{comparison.over_tasks.mean:+.3f}",
-        f"over {prompts(comparison.prompts)} that both have",
-    )
-    few = "too narrow for so few tasks" if len(comparison.tasks) < FEW else ""
-    for name, estimate, told in (
-        ("95% interval, prompts drawn at random", comparison.over_prompts, _p(comparison.p_prompts)),
-        ("95% interval, tasks drawn at random", comparison.over_tasks, _p(comparison.p_tasks)),
-        ("the same by bootstrap", comparison.bootstrap, few),
-    ):
-        rows.add_row(name, f"{estimate.low:+.3f} to {estimate.high:+.3f}", told)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("task", overflow="fold")
-    for head in (a, b, "difference", "adds", "prompts"):
-        table.add_column(Text(head), justify="right")
-    for task in comparison.tasks:
-        cells = (f"{task.first:.3f}", f"{task.second:.3f}", f"{task.difference:+.3f}", f"{task.share:+.3f}")
-        table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
-    sentence = Text(verdict(comparison, (a, b)), "bold")
-    return Group(sentence, Text(), rows, Text(), *map(Text, to_tell(comparison)), Text(), table)
-
-
-def _p(value: float) -> str:
-    return f"p = {value:.4f}" if value >= SMALL else f"p < {SMALL}"
-
-
 def prompts(count: int) -> str:
     """Such as `1 prompt` or `20 prompts`."""
-    return f"{count:,} prompt{'s' * (count != 1)}"
+    return counted(count, "prompt")
 
 
 def to_tell(comparison: Comparison) -> list[str]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+
+import polars as pl
 
 
 def pass_at_k(n: int, c: int, k: int) -> float:
@@ -122,22 +123,43 @@ class TaskScore:
         return max(prompt.pass_at(k) for prompt in self.prompts)
 
 
-def score_by_prompt(rows: Iterable[tuple[str, int, bool]]) -> tuple[TaskScore, ...]:
-    """Count what passed, by task in the order of the rows and by prompt number.
+def completions_of(table: pl.DataFrame) -> pl.DataFrame:
+    """One row for each judged completion of a table of results.
 
     Args:
-        rows: task, prompt and whether it passed, of each completion.
+        table: as `load_results` gives it.
     """
-    results: defaultdict[str, defaultdict[int, list[bool]]] = defaultdict(lambda: defaultdict(list))
-    for task, prompt, passed in rows:
-        results[task][prompt].append(passed)
-    return tuple(
-        TaskScore(
-            task,
-            tuple(PromptScore(task, i, len(passes), sum(passes)) for i, passes in sorted(prompts.items())),
-        )
-        for task, prompts in results.items()
+    return table.filter(pl.col("world_number") == 0)
+
+
+def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
+    """How often completions pass, by task and prompt (paper, section IV.C).
+
+    Args:
+        table: as `load_results` gives it.
+        order: of the tasks; others come behind these, as they stand in the table.
+    """
+    counted = (
+        completions_of(table)
+        .group_by("task", "prompt", maintain_order=True)
+        .agg(n=pl.len(), c=pl.col("passed").sum())
+        .sort("prompt", maintain_order=True)
     )
+    prompts: dict[str, list[PromptScore]] = {
+        task: [] for task in [*order, *table["task"].unique(maintain_order=True)]
+    }
+    for task, prompt, n, c in counted.iter_rows():
+        prompts[task].append(PromptScore(task, prompt, n, c))
+    return tuple(TaskScore(task, tuple(scores)) for task, scores in prompts.items() if scores)
+
+
+def pass_at_1(table: pl.DataFrame) -> dict[tuple[str, int], float]:
+    """pass@1 by task and prompt.
+
+    Args:
+        table: as `load_results` gives it.
+    """
+    return {(p.task, p.prompt): p.pass_at(1) for score in task_scores(table) for p in score.prompts}
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:

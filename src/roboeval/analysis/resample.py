@@ -12,15 +12,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rich import box
-from rich.console import Group, RenderableType
-from rich.table import Table
-from rich.text import Text
+import polars as pl
 
-from codebotler.terminal import visible
 from roboeval.analysis.metrics import Estimate, clustered_interval
-from roboeval.evaluation.completions import Key
-from roboeval.evaluation.tables import RowData
 
 LIMITS = (0, 2, 4, 8, 100)
 THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
@@ -83,17 +77,8 @@ def chances(trials: Sequence[Trial], retries: int) -> Chances:
     )
 
 
-def ran(row: RowData) -> bool:
-    """Whether a judged completion ended without an error in every world; one that may wait for ever may."""
-    return all(
-        verdict["status"] == "finished"
-        or (verdict["status"] == "timeout" and (verdict["satisfied"] or verdict["failed_checks"]))
-        for verdict in row["verdicts"]
-    )
-
-
 @dataclass(frozen=True)
-class Prompt:
+class CheckedPrompt:
     """The completions of one prompt."""
 
     task: str
@@ -101,12 +86,25 @@ class Prompt:
     trials: tuple[Trial, ...]
 
 
-def by_prompt(trials: Iterable[tuple[Key, Trial]]) -> tuple[Prompt, ...]:
-    """Put the completions of each prompt together, in the order of tasks and prompts."""
+def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
+    """The completions of each prompt as the check and the judge see them, in the order of tasks and prompts.
+
+    A completion runs if it ends without an error in every world; one that waits where it may wait for ever
+    has not erred.
+
+    Args:
+        table: as `load_results` gives it, of a run whose programs were all checked.
+    """
+    judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
+    completions = table.group_by("task", "prompt", "index", maintain_order=True).agg(
+        pl.col("accepted").first(),
+        ((pl.col("status") == "finished") | ((pl.col("status") == "timeout") & judged)).all().alias("ran"),
+        pl.col("passed").first(),
+    )
     together: defaultdict[tuple[str, int], list[Trial]] = defaultdict(list)
-    for (task, prompt, _), trial in trials:
-        together[task, prompt].append(trial)
-    return tuple(Prompt(*key, tuple(those)) for key, those in sorted(together.items()))
+    for task, prompt, _, accepted, ran, passed in completions.iter_rows():
+        together[task, prompt].append(Trial(accepted, ran, passed))
+    return tuple(CheckedPrompt(*key, tuple(those)) for key, those in sorted(together.items()))
 
 
 @dataclass(frozen=True)
@@ -130,7 +128,7 @@ class Limit:
     by_prompt: tuple[Chances, ...]
 
 
-def resampled(prompts: Sequence[Prompt], retries: int) -> Limit:
+def resampled(prompts: Sequence[CheckedPrompt], retries: int) -> Limit:
     """What a limit of retries would have given.
 
     Args:
@@ -152,7 +150,7 @@ def _mean(values: Sequence[float]) -> float:
     return sum(values) / len(values)
 
 
-def curve_data(prompts: Sequence[Prompt], limits: Sequence[int]) -> dict[str, Any]:
+def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
     """The data of the paper's two figures, for machines.
 
     Args:
@@ -186,36 +184,3 @@ def curve_data(prompts: Sequence[Prompt], limits: Sequence[int]) -> dict[str, An
             _mean([chances(prompt.trials, n).accepted for prompt in prompts]) for n in range(max(limits) + 1)
         ],
     }
-
-
-def render(prompts: Sequence[Prompt], limits: Sequence[int], *, title: str) -> RenderableType:
-    """The same as a table for people.
-
-    Args:
-        prompts: at least one.
-        limits: numbers of retries.
-        title: which run it is about.
-    """
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    heads = ("retries", "pass@1", *(f"pass@1\n≥ {t:g}" for t in THRESHOLDS), "accepted", "run at all")
-    for name in heads:
-        table.add_column(name, justify="right", no_wrap=True)
-    for limit in (resampled(prompts, retries) for retries in limits):
-        shares = (*limit.prompts.values(), limit.accepted, limit.ran)
-        table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
-    hopeless = sum(not any(trial.accepted for trial in prompt.trials) for prompt in prompts)
-    return Group(
-        Text(visible(title), style="bold"),
-        Text("a program that the check rejects is asked for again, so many times at most; that gives:"),
-        Text(),
-        table,
-        Text(),
-        Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
-        Text("accepted: the share of programs, at the end, that the check accepts", style="dim"),
-        Text("run at all: the share that runs without an error in all the worlds of its task", style="dim"),
-        *([Text(f"no completion of {_prompts(hopeless)} is accepted")] if hopeless else []),
-    )
-
-
-def _prompts(count: int) -> str:
-    return f"{count} prompt{'s' * (count != 1)}"

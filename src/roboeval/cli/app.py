@@ -9,13 +9,14 @@ import typer
 from codebotler import __version__
 from codebotler.cli import obey
 from codebotler.terminal import noting_all, print_text
-from roboeval.cli.evaluate import evaluate, export, import_, show
+from roboeval.cli.compare import compare, resample
+from roboeval.cli.evaluate import evaluate, import_
 from roboeval.cli.find import find
 from roboeval.cli.generate import generate, run
 from roboeval.cli.mutate import mutate
-from roboeval.cli.report import compare, report
-from roboeval.cli.resample import resample
+from roboeval.cli.report import report
 from roboeval.cli.serve import serve
+from roboeval.cli.show import export, show
 from roboeval.cli.tasks import tasks
 
 app = typer.Typer(

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboeval.cli.completion import task_names
 from roboeval.cli.options import (
     AblationOption,
     JsonOption,
@@ -15,9 +14,9 @@ from roboeval.cli.options import (
     SuiteOption,
     as_judged,
     cores,
-    expect_current,
     load,
-    open_evaluation,
+    open_current,
+    task_names,
 )
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
@@ -52,7 +51,7 @@ def find(
     Of those that did something in some world, those that fail are put together by the reason.
     """
     from roboeval.analysis.cluster import clusters, groups
-    from roboeval.analysis.search import Question, search
+    from roboeval.analysis.search import Question, Search
     from roboeval.evaluation.completions import how_many
 
     if negated and formula is None:
@@ -60,18 +59,15 @@ def find(
     known = as_judged(run, load(suite), ablated=ablation)
     question = Question(formula, negated, None if task is None else known.task(task).name, world)
     expect_question(question, known, ablated=ablation)
-    evaluation = open_evaluation(run, known, suite, ablated=ablation)
-    looking = evaluation.read_by(lambda lines: search(lines, question, workers=workers or cores()))
-    every = list(watched(looking, "looking", evaluation.scope.total))
-    expect_current(evaluation, known, suite)
+    searching = Search(question, workers=workers or cores())
+    results = open_current(run, suite, ablated=ablation, see=searching.see).results
+    every = list(watched(searching.found(), "looking", len(results.places)))
     found = [one for one in every if one.worlds]
-    programs = {completion.key: completion.program for completion in evaluation.judged()}
-    failed = [one.row for one in found if one.row is not None]
-    right = [one.key for one in every if one.passed]
+    failed = [results.failed[one.key] for one in found if not one.passed]
     total = sum(question.task in {None, one.key[0]} for one in every)
-    together = groups(failed, programs)
+    together = groups(failed, results.programs)
     shown = together if json else together[:most]
-    telling = clusters(shown, right, programs, known, ablated=ablation)
+    telling = clusters(shown, results)
     told = list(watched(telling, "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if undecided:
@@ -136,8 +132,7 @@ def show_found(
     from rich.console import Group
     from rich.text import Text
 
-    from roboeval.analysis.cluster import cluster_view
-    from roboeval.analysis.search import found_view
+    from roboeval.cli.views.groups import cluster_view, found_view
     from roboeval.evaluation.completions import how_many
 
     parts = [found_view(found, total)]

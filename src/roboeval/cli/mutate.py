@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
-from roboeval.cli.completion import task_names
-from roboeval.cli.options import SuiteOption, WorkersOption, cores, load, named
+from roboeval.cli.options import SuiteOption, WorkersOption, cores, load, named, task_names
 from roboeval.cli.output import note, print_rich, watched
 
 if TYPE_CHECKING:

@@ -5,18 +5,56 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.completion import engine_names, listed_task_names, suite_names
-from roboeval.cli.output import fail, note
+from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.evaluation import Evaluation
+    from roboeval.evaluation.results import Results
     from roboeval.suites.load import Suite
+
+
+# --- what a shell completes
+
+
+def suite_names(incomplete: str) -> list[str]:
+    """The suites that ship with RoboEval or are installed; the shell itself knows the folders."""
+    from roboeval.suites.installed import installed_suites
+    from roboeval.suites.load import shipped_suites
+
+    names = {*shipped_suites(), *(suite.name for suite in installed_suites())}
+    return sorted(name for name in names if name.startswith(incomplete))
+
+
+def task_names(context: typer.Context, incomplete: str) -> list[str]:
+    """The tasks of the suite that the line names, or of the paper's; none where there is no such suite."""
+    from codebotler.badinput import BadInput
+    from roboeval.suites.load import suite_folder, task_files
+
+    try:
+        files = task_files(suite_folder(context.params.get("suite") or "paper"))
+    except BadInput:
+        return []
+    return [file.stem for file in files if file.stem.startswith(incomplete)]
+
+
+def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
+    """The same for the last of several tasks, which commas separate."""
+    *whole, last = incomplete.split(",")
+    return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
+
+
+def engine_names(incomplete: str) -> list[str]:
+    """Where programs can be run."""
+    return [name for name in ("local", "ray") if name.startswith(incomplete)]
+
+
+# --- options
 
 
 def named(what: str) -> Callable[[str], Path]:
@@ -57,6 +95,9 @@ IsolationOption = Annotated[
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
+# --- what a user names
+
+
 def load(suite: str) -> Suite:
     """Read a suite by name or folder."""
     from roboeval.suites.load import load_suite
@@ -95,25 +136,40 @@ def _words(verb: str, *arguments: object, suite: str, ablated: bool = False) -> 
     return [*words, "--ablation"] if ablated else words
 
 
-def options_of(evaluation: Evaluation, suite: Suite) -> list[str]:
-    """What else a command needs to go on with an evaluation."""
-    from roboeval.evaluation.run import tasks_to_judge
+@dataclass(frozen=True)
+class Opened:
+    """A judged run that a user names.
 
-    tasks = evaluation.scope.tasks
-    drawn = [("--worlds", suite.worlds), ("--seed", suite.seed)] if suite.folder else []
-    own = suite.with_own_worlds() if suite.worlds is not None else suite
-    worlds = [text for name, number in drawn if own.digest != suite.digest for text in (name, str(number))]
-    if tasks in {None, tasks_to_judge(suite, None, ablated=bool(evaluation.head.get("ablation")))[0]}:
-        return worlds
-    return ["--tasks", ",".join(sorted(tasks or ())), *worlds]
+    Args:
+        results: as they lie in the run.
+        suite: by which it was judged, in the same worlds.
+        again: the command that goes on with judging it, to be pasted.
+    """
+
+    results: Results
+    suite: Suite
+    again: str
 
 
-def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) -> Evaluation:
-    """An evaluation that a user names."""
+def open_run(
+    run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
+) -> Opened:
+    """Read a judged run that a user names.
+
+    Args:
+        run: its folder.
+        suite_name: as the user writes it.
+        ablated: whether the verdicts on common sense only are meant.
+        see: sees each line of the evaluation's file.
+
+    Raises:
+        BadInput: it is no run, was not judged so, or is damaged.
+    """
     from codebotler.badinput import BadInput
-    from roboeval.evaluation.evaluation import Evaluation
+    from roboeval.evaluation.results import read_results
     from roboeval.evaluation.run import Run, evaluation_key
 
+    suite = as_judged(run, load(suite_name), ablated=ablated)
     folder, key = Run(run), evaluation_key(suite, ablated=ablated)
     if not folder.completions.is_file():
         raise BadInput("is no run: it holds no completions.jsonl", file=run)
@@ -124,35 +180,68 @@ def open_evaluation(run: Path, suite: Suite, suite_name: str, *, ablated: bool) 
             raise BadInput(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run)
         again = command("evaluate", run, suite=suite_name, ablated=ablated)
         raise BadInput(f"has not been judged; `{again}` does it", file=run)
-    evaluation = Evaluation(folder, key)
-    if not folder.programs(key).is_file():
-        again = command("evaluate", run, *options_of(evaluation, suite), suite=suite_name, ablated=ablated)
-        raise BadInput(
-            f"is missing, so that nobody knows which programs were judged; `{again}` judges them again",
-            file=folder.programs(key),
-        )
-    if evaluation.head.get("digest") != suite.digest:
+    results = read_results(
+        folder, key, suite, see=see, watch=lambda lines, total: watched(lines, "reading", total)
+    )
+    if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
-    return evaluation
+    again = command("evaluate", run, *_to_go_on(results, suite), suite=suite_name, ablated=ablated)
+    return Opened(results, suite, again)
 
 
-def expect_current(evaluation: Evaluation, suite: Suite, suite_name: str) -> None:
-    """Refuse verdicts on programs that have changed since; to be called when all rows were read.
+def open_current(
+    run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
+) -> Opened:
+    """Read a judged run of which every verdict counts; see `open_run`.
 
     Raises:
-        BadInput: a row judges another program than stands in the run now, or there is no row.
+        BadInput: besides, a row judges another program than stands in the run now, or there is no row.
     """
     from codebotler.badinput import BadInput
 
-    ablated = bool(evaluation.head.get("ablation"))
-    path = evaluation.run.path
-    again = command("evaluate", path, *options_of(evaluation, suite), suite=suite_name, ablated=ablated)
-    if (complaint := evaluation.complaint()) is not None:
-        raise BadInput(f"{complaint}; `{again} --redo` judges what stands there")
-    if evaluation.count == 0:
-        raise BadInput(f"no completion has been judged; `{again}` goes on", file=path)
-    if (unfinished := evaluation.unfinished()) is not None:
-        note(f"{unfinished}, and only these count; `{again}` goes on")
+    opened = open_run(run, suite_name, ablated=ablated, see=see)
+    if (complaint := complaint_of(opened.results)) is not None:
+        raise BadInput(f"{complaint}; `{opened.again} --redo` judges what stands there")
+    if opened.results.table.is_empty():
+        raise BadInput(f"no completion has been judged; `{opened.again}` goes on", file=run)
+    if (unfinished := unfinished_of(opened.results)) is not None:
+        note(f"{unfinished}, and only these count; `{opened.again}` goes on")
+    return opened
+
+
+def complaint_of(results: Results) -> str | None:
+    """That rows judge other programs than stand in the run now, if any does."""
+    from roboeval.evaluation.completions import name_of
+
+    stale = results.stale
+    if not stale:
+        return None
+    others = len(stale) - 1
+    rows = f"{name_of(stale[0])} and {others:,} other {'rows' if others > 1 else 'row'} judge"
+    if not others:
+        rows = f"{name_of(stale[0])} judges"
+    return f"{rows} another program than stands in {results.run.completions} now"
+
+
+def unfinished_of(results: Results) -> str | None:
+    """That there is more to judge than was judged, if so."""
+    from roboeval.evaluation.completions import how_many
+
+    count, total = len(results.places), results.scope.total
+    return None if count >= total else f"{count:,} of {how_many(total)} judged"
+
+
+def _to_go_on(results: Results, suite: Suite) -> list[str]:
+    """What else a command needs to go on with an evaluation."""
+    from roboeval.evaluation.run import tasks_to_judge
+
+    tasks = results.tasks
+    drawn = [("--worlds", suite.worlds), ("--seed", suite.seed)] if suite.folder else []
+    own = suite.with_own_worlds() if suite.worlds is not None else suite
+    worlds = [text for name, number in drawn if own.digest != suite.digest for text in (name, str(number))]
+    if tasks in {None, tasks_to_judge(suite, None, ablated=bool(results.head.get("ablation")))[0]}:
+        return worlds
+    return ["--tasks", ",".join(sorted(tasks or ())), *worlds]
 
 
 def cores() -> int:

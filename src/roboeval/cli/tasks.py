@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.completion import task_names
-from roboeval.cli.options import JsonOption, SuiteOption, command, cores, load
+from roboeval.cli.options import JsonOption, SuiteOption, command, cores, load, task_names
 from roboeval.cli.output import fail, note, print_json, print_rich, print_text, watched
 
 if TYPE_CHECKING:

@@ -9,12 +9,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, SupportsIndex, TypeAlias, TypedDict
+from typing import Any, SupportsIndex, TypeAlias
 
 from codebotler.arguments import expect_text, expect_whole
 from codebotler.badinput import BadInput
 from codebotler.english import counted
-from codebotler.files import MAX_ROW, read_rows, to_line
+from codebotler.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.models.recorded import recorded_model
 from roboeval.suites.load import Suite, expect_suite
 
@@ -98,42 +98,13 @@ class Completion:
         return hashlib.sha256(self.program.encode(errors="surrogatepass")).hexdigest()
 
 
-class Judgement(TypedDict):
-    """What is said of a program.
-
-    Args:
-        passed: whether the program does what is required in all worlds.
-        failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
-        verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
-            `line`, `failed_checks` and `trace`; where the trace is too long for a row, it ends early, and
-            `cut` says how many `events` more there are, and the `sha256` of the JSON of all of it.
-    """
-
-    passed: bool
-    failure: dict[str, Any] | None
-    verdicts: list[dict[str, Any]]
-
-
-class Row(Judgement):
-    """One row of an evaluation: what is said of a completion's program.
-
-    Args:
-        task: the task's name.
-        prompt: which phrasing, counted from 0.
-        index: which sample, counted from 0.
-    """
-
-    task: str
-    prompt: int
-    index: int
-
-
 def read_completions(
     path: str | PathLike[str],
     suite: Suite | None = None,
     *,
     growing: bool = False,
     name: Path | str | None = None,
+    faults: list[BadInput] | None = None,
 ) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
 
@@ -142,36 +113,56 @@ def read_completions(
         suite: whose tasks and prompts they must be of; any by default.
         growing: whether it stands in a run, where a torn last line is passed over.
         name: what sentences call the file; its path by default.
+        faults: gets what is wrong with lines, which are then left out, rather than that it is raised.
 
     Raises:
         BadInput: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
     """
-    if not isinstance(path, PathLike):
-        expect_text(path, "the path")
     path = Path(path)
     name = name or path
-    if suite is not None:
-        expect_suite(suite)
     seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
-    for number, row in read_rows(path, growing=growing, name=name, example=EXAMPLE):
+    for number, line in _lines(path, name, faults):
         try:
-            completion = Completion.of(row)
+            if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
+                _expect_new(completion.key, seen, number)
+                yield completion
         except BadInput as error:
-            raise BadInput(error.sentence, file=name, line=number) from None
-        lines = seen[sys.intern(completion.task), completion.prompt]
-        first_line = lines.setdefault(completion.index, number)
-        if first_line != number:
-            raise BadInput(
-                f"{name_of(completion.key)} stands here again; it stood in line {first_line} already",
-                file=name,
-                line=number,
-            )
-        check_length(row, name, number)
-        if suite is not None and (problem := unknown(completion.key, suite)):
-            raise BadInput(problem, file=name, line=number)
-        yield completion
-    if not seen:
+            fault = BadInput(error.sentence, file=name, line=number)
+            if faults is None:
+                raise fault from None
+            faults.append(fault)
+    if not seen and faults is None:
         raise BadInput("there is no completion in it", file=name)
+
+
+def _lines(path: Path, name: Path | str, faults: list[BadInput] | None) -> Iterator[tuple[int, bytes]]:
+    try:
+        yield from read_lines(path, name=name)
+    except BadInput as error:
+        if faults is None:
+            raise
+        faults.append(error)
+
+
+def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
+    """The completion that a line says; None where the line is torn."""
+    row = parsed_row(line, EXAMPLE)
+    if row is None:
+        if growing and not line.endswith(b"\n"):
+            return None
+        raise BadInput(f"this line is no JSON; a row looks like {EXAMPLE}")
+    completion = Completion.of(row)
+    check_length(row, None)
+    if suite is not None and (problem := unknown(completion.key, suite)):
+        raise BadInput(problem)
+    return completion
+
+
+def _expect_new(key: Key, seen: dict[tuple[str, int], dict[int, int]], number: int) -> None:
+    task, prompt, index = key
+    first_line = seen[sys.intern(task), prompt].setdefault(index, number)
+    if first_line != number:
+        raise BadInput(f"{name_of(key)} stands here again; it stood in line {first_line} already")
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterable, Iterator, Mapping
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
 from codebotler.badinput import BadInput
-from codebotler.files import Appender, length_before, to_line, to_text, write_whole
-from roboeval.evaluation.completions import Completion, Key, Row, name_of
+from codebotler.files import Appender, to_line, to_text, write_whole
+from roboeval.evaluation.completions import Completion, Key, name_of
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import evaluation, head, judgements
-from roboeval.evaluation.rows import HASH_LINE, Seal, is_sealed, read_judged
+from roboeval.evaluation.rows import JudgedRow, Seal, is_sealed, judged_row, read_lines_of
 from roboeval.evaluation.run import Run, evaluation_key, load_head
 from roboeval.suites.load import Suite
 
@@ -29,7 +29,7 @@ def evaluate_run(
     workers: int = 1,
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
-) -> Iterator[Row]:
+) -> Iterator[JudgedRow]:
     """Judge a run's completions, going on where an earlier evaluation stopped; yields all rows in order.
 
     Args:
@@ -40,49 +40,50 @@ def evaluate_run(
         redo: whether to start over.
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing.
-        engine: where programs are run; by default in so many lanes of this machine.
+        engine: where programs are run; by default on so many cores of this machine.
 
     Raises:
         BadInput: the run is being written, or was judged otherwise or holds other completions than it did.
     """
     key = evaluation_key(suite, ablated=ablated)
+    chosen = engine or Local(workers, require_isolation=require_isolation)
     with run.writing():
         run.rows(key).parent.mkdir(exist_ok=True)
         if redo:
-            for path in (run.rows(key), run.programs(key), run.head(key)):
+            for path in (run.rows(key), run.head(key)):
                 path.unlink(missing_ok=True)
         about = {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
         was = _go_on_or_refuse(run.head(key), about, run.rows(key))
-        with (
-            contextlib.closing(Appender(run.programs(key))) as programs,
-            contextlib.closing(Appender(run.rows(key))) as rows,
-        ):
+        with contextlib.closing(Appender(run.rows(key))) as rows:
             completions = run.source(suite).of(tasks)
             left_out = LeftOut(run.head(key))
-            seal = yield from _judged(rows, programs, completions, was, left_out)
+            seal = yield from _judged_before(rows, completions, was, left_out)
             left = [*left_out.waiting.values(), *islice(completions, 1)]
             if is_sealed(was) and (left or seal.is_broken(was)):
                 write_whole(run.head(key), to_text({**about, **left_out.data()}))
-            chosen = engine or Local(workers, require_isolation=require_isolation)
-            is_whole = True
-            for completion, told in judgements(
-                chain(left, completions), suite, ablated=ablated, engine=chosen
-            ):
-                if told is None:
-                    left_out.add(completion)
-                    is_whole = False
-                    continue
-                # The hash comes first: a crash in between leaves one too many, and no row without one.
-                programs.append(f"{completion.program_sha256}\n".encode())
-                row = evaluation(completion, told)
-                rows.append(line := to_line(row))
-                seal.add(line)
-                yield row
+            judged = judgements(chain(left, completions), suite, ablated=ablated, engine=chosen)
+            is_whole = yield from _judge(judged, rows, seal, left_out)
             finished = {**about, **left_out.data(), **seal.data()}
             if is_whole and finished != was:
-                programs.sync()
                 rows.sync()
                 write_whole(run.head(key), to_text(finished))
+
+
+def _judge(
+    judged: Iterable[tuple[Completion, Any]], rows: Appender, seal: Seal, left_out: LeftOut
+) -> Generator[JudgedRow, None, bool]:
+    """Add the rows of completions, and say whether each has one."""
+    is_whole = True
+    for completion, judgement in judged:
+        if judgement is None:
+            left_out.add(completion)
+            is_whole = False
+            continue
+        line = to_line(evaluation(completion, judgement))
+        rows.append(line)
+        seal.add(line)
+        yield judged_row(line)
+    return is_whole
 
 
 class LeftOut:
@@ -114,41 +115,25 @@ class LeftOut:
 LEFT_OUT = "took_too_long"
 
 
-def _judged(
-    rows: Appender,
-    programs: Appender,
-    completions: Iterator[Completion],
-    was: Mapping[str, Any],
-    left_out: LeftOut,
-) -> Generator[Row, None, Seal]:
-    """The rows that are there, and their seal; afterwards both files end where to go on."""
-    count, seal, waiting = 0, Seal(), left_out.waiting
-    for number, row, judged in read_judged(rows.path, programs.path, was, seal):
-        if judged is None:  # the machine lost its power before the hash was on the disk
-            rows.cut(length_before(rows.path, number))
-            seal = Seal.of(rows.path)
-            break
-        found = row["task"], row["prompt"], row["index"]
-        completion = waiting.pop(found) if found in waiting else next(completions, None)
-        while completion is not None and completion.key != found and completion in left_out:
+def _judged_before(
+    rows: Appender, completions: Iterator[Completion], was: Mapping[str, Any], left_out: LeftOut
+) -> Generator[JudgedRow, None, Seal]:
+    """The rows that are there, and their seal; completions go on behind the last one."""
+    seal, waiting = Seal(), left_out.waiting
+    for line in read_lines_of(rows.path, was, seal=seal):
+        row = line.row
+        completion = waiting.pop(row.key) if row.key in waiting else next(completions, None)
+        while completion is not None and completion.key != row.key and completion in left_out:
             waiting[completion.key] = completion
             completion = next(completions, None)
-        if completion is None or completion.key != found:
+        if completion is None or completion.key != row.key:
             expected = "nothing more" if completion is None else name_of(completion.key)
-            raise BadInput(
-                f"judges {name_of(found)} where the completions have {expected}; --redo starts over",
-                file=rows.path,
-                line=number,
-            )
-        if completion.program_sha256 != judged:
-            raise BadInput(
-                f"the program of {name_of(found)} has changed since it was judged; --redo starts over",
-                file=rows.path,
-                line=number,
-            )
-        count += 1
+            sentence = f"judges {name_of(row.key)} where the completions have {expected}"
+            raise BadInput(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
+        if completion.program_sha256 != row.program_sha256:
+            sentence = f"the program of {name_of(row.key)} has changed since it was judged"
+            raise BadInput(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
         yield row
-    programs.cut(HASH_LINE * count)
     return seal
 
 

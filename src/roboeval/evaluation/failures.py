@@ -2,43 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import get_args
 
 from codebotler.trace import Outcome, Status
+from roboeval.evaluation.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
 
 PYTHON, ROBOT, TASK = "PythonError", "RobotExecutionError", "TaskCompletionError"
-CLASSES = (PYTHON, ROBOT, TASK)
 
-PYTHON_KINDS = (
-    "SyntaxError",
-    "NameError",
-    "TypeError",
-    "AttributeError",
-    "ValueError",
-    "KeyError",
-    "IndexError",
-    "TimeoutError",
-    "UnboundLocalError",
-)
-"""The kinds that are always shown; others appear as they come."""
 
-ROBOT_KINDS = (
-    "GoToInvalidLocation",
-    "PickInvalidObject",
-    "PickWhileHolding",
-    "PlaceNoObject",
-    "AskNoPerson",
-    "AskEmptyOptions",
-    "AskInvalidOptions",
-)
-"""The paper's six and AskInvalidOptions."""
+@dataclass(frozen=True)
+class FailureClass:
+    """A class of failures.
 
-CATEGORIES: tuple[Category, ...] = get_args(Category)
-"""The classes of checks; a failed check's category is the kind of a TaskCompletionError."""
+    Args:
+        name: as rows of evaluations call it.
+        label: what people read, of one of them.
+        plural: what people read, of several.
+        kinds: those that tables always show; others appear as they come.
+    """
+
+    name: str
+    label: str
+    plural: str
+    kinds: tuple[str, ...]
+
+
+CLASSES: Mapping[str, FailureClass] = {
+    one.name: one
+    for one in (
+        FailureClass(
+            PYTHON,
+            "Python error",
+            "Python errors",
+            (
+                "SyntaxError",
+                "NameError",
+                "TypeError",
+                "AttributeError",
+                "ValueError",
+                "KeyError",
+                "IndexError",
+                "TimeoutError",
+                "UnboundLocalError",
+            ),
+        ),
+        FailureClass(
+            ROBOT,
+            "robot error",
+            "robot errors",
+            (
+                "GoToInvalidLocation",
+                "PickInvalidObject",
+                "PickWhileHolding",
+                "PlaceNoObject",
+                "AskNoPerson",
+                "AskEmptyOptions",
+                "AskInvalidOptions",  # beyond the paper's six
+            ),
+        ),
+        FailureClass(TASK, "failed check", "failed checks", get_args(Category)),
+    )
+}
+"""All classes; the kind of a failed check is the check's category. A new class is one more entry here."""
+
+
+def label_of(name: str) -> str:
+    """What people read of a class; of one that is unknown its name."""
+    return CLASSES[name].label if name in CLASSES else name
 
 
 @dataclass(frozen=True)
@@ -56,32 +90,6 @@ class Verdict:
     outcome: Outcome
     failed: tuple[Requirement, ...]
     satisfied: bool
-
-
-@dataclass(frozen=True)
-class Failure:
-    """The one reason for which a completion fails.
-
-    Args:
-        failure_class: one of the three classes.
-        kind: the kind within it.
-        world: position of the first unsatisfied world, counted from 0.
-        check: the first failed requirement there; None where an error decided.
-    """
-
-    failure_class: str
-    kind: str
-    world: int
-    check: str | None = None
-
-    def data(self) -> dict[str, Any]:
-        """As a row of an evaluation writes it."""
-        return {
-            "class": self.failure_class,
-            "kind": self.kind,
-            "world": self.world,
-            "check": self.check,
-        }
 
 
 def failure(verdicts: Sequence[Verdict]) -> Failure | None:

@@ -9,6 +9,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
+from msgspec import to_builtins
+
 from codebotler import __version__
 from codebotler.badinput import BadInput
 from codebotler.rtl import CannotJudge, holds
@@ -18,10 +20,10 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
-from roboeval.evaluation.completions import Completion, Judgement, Row, name_of, unknown
+from roboeval.evaluation.completions import Completion, name_of, unknown
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
-from roboeval.evaluation.rowsize import bounded
+from roboeval.evaluation.rows import Judgement, Row, bounded
 from roboeval.evaluation.timelimit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Requirement, Scenario, Suite, expect_suite
 
@@ -163,7 +165,14 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
 
 def evaluation(completion: Completion, told: Judgement) -> Row:
     """The row of an evaluation: which completion, and what is said of its program."""
-    return {"task": completion.task, "prompt": completion.prompt, "index": completion.index, **told}
+    task, prompt, index = completion.key
+    return {
+        "task": task,
+        "prompt": prompt,
+        "index": index,
+        "program_sha256": completion.program_sha256,
+        **told,
+    }
 
 
 def judgement(verdicts: list[Verdict]) -> Judgement:
@@ -172,7 +181,7 @@ def judgement(verdicts: list[Verdict]) -> Judgement:
     return bounded(
         {
             "passed": why is None,
-            "failure": None if why is None else why.data(),
+            "failure": None if why is None else to_builtins(why),
             "verdicts": [verdict_data(verdict) for verdict in verdicts],
         }
     )

@@ -1,49 +1,258 @@
-"""Rows of an evaluation as its file holds them: nothing unknown is in them; a finished file has a seal."""
+"""The rows of an evaluation: what one holds, how large it may be, and the seal of a finished file."""
 
 from __future__ import annotations
 
 import hashlib
-import io
-from collections.abc import Iterator, Mapping
-from operator import itemgetter
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import NoneType
-from typing import Any, cast
+from typing import Any, TypeAlias, TypedDict
+
+import msgspec
 
 from codebotler.badinput import BadInput
-from codebotler.files import read_rows
+from codebotler.files import read_lines, to_line
 from codebotler.skills import SKILLS
 from codebotler.trace import Status
-from roboeval.evaluation.completions import Row
 
-MAX_EVALUATION = 1_000_000_000  # of a row that was written before rows were bounded
-HASH_LINE = 65  # bytes: 64 hexadecimal digits and a line end
-NO_ROW = "this line is no row of an evaluation"
-STATUSES = frozenset(map(str, Status))
+MOST = 1_000_000  # bytes of a row
+MOST_OF_WORLD = 20_000  # bytes for each world, where there are so many worlds that they come to more
+LONGEST_LINE = 1_000_000_000  # bytes of a row that was written before rows were bounded
+NAMES = 2_000  # of a row's bytes are left for its completion: the task's name is that of a file
+BETWEEN = 2  # bytes between two events
+HASH = "0" * 64
 KINDS = frozenset(SKILLS.recordings)
+NO_ROW = "this line is no row of an evaluation"
+BROKEN = "was damaged or changed after the evaluation was finished"
+ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
+"""What has to be told apart from an escape of half a surrogate pair, which is the group."""
 
-Form = Mapping[str, tuple[type, ...]]
-ROW: Form = {
-    "task": (str,),
-    "prompt": (int,),
-    "index": (int,),
-    "passed": (bool,),
-    "failure": (dict, NoneType),
-    "verdicts": (list,),
-}
-FAILURE: Form = {"class": (str,), "kind": (str,), "world": (int,), "check": (str, NoneType)}
-VERDICT: Form = {
-    "world": (str,),
-    "satisfied": (bool,),
-    "status": (str,),
-    "error": (dict, NoneType),
-    "line": (int, NoneType),
-    "failed_checks": (list,),
-    "trace": (list,),
-}
-ERROR: Form = {"kind": (str,), "message": (str,)}
-VERDICT_CUT: Form = {**VERDICT, "cut": (dict,)}
-CUT: Form = {"events": (int,), "sha256": (str,)}
+
+class Judgement(TypedDict):
+    """What is said of a program.
+
+    Args:
+        passed: whether the program does what is required in all worlds.
+        failure: `class`, `kind`, `world` and `check` of the first failure; None if it passed.
+        verdicts: for each world, in order, what happened there: `world`, `satisfied`, `status`, `error`,
+            `line`, `failed_checks` and `trace`; where the trace is too long for a row, it ends early, and
+            `cut` says how many `events` more there are, and the `sha256` of the JSON of all of it.
+    """
+
+    passed: bool
+    failure: dict[str, Any] | None
+    verdicts: list[dict[str, Any]]
+
+
+class Row(Judgement):
+    """One row of an evaluation: what is said of a completion's program.
+
+    Args:
+        task: the task's name.
+        prompt: which phrasing, counted from 0.
+        index: which sample, counted from 0.
+        program_sha256: the hash of the program that was judged.
+    """
+
+    task: str
+    prompt: int
+    index: int
+    program_sha256: str
+
+
+RowData: TypeAlias = Mapping[str, Any]
+"""A row of an evaluation, or a part of one, as JSON has it."""
+
+
+def key_of(row: RowData) -> tuple[str, int, int]:
+    """What no other row of an evaluation shares."""
+    return row["task"], row["prompt"], row["index"]
+
+
+# --- rows as they are read
+
+
+class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A part of a row."""
+
+
+class Failure(_Part, frozen=True):
+    """The one reason for which a completion fails (paper, section V.B).
+
+    Args:
+        failure_class: one of the three classes.
+        kind: the kind within it.
+        world: position of the first unsatisfied world, counted from 0.
+        check: the first failed requirement there; None where an error decided.
+    """
+
+    failure_class: str = msgspec.field(name="class")
+    kind: str
+    world: int
+    check: str | None = None
+
+
+class ErrorOfRun(_Part, frozen=True):
+    """The error by which a run ended."""
+
+    kind: str
+    message: str
+
+
+class CutTrace(_Part, frozen=True):
+    """How much of a trace was too long to be kept, and the hash of all of it."""
+
+    events: int
+    sha256: str
+
+
+class WorldVerdict(_Part, frozen=True):
+    """What a row says of one world; `trace` holds one JSON list an event."""
+
+    world: str
+    satisfied: bool
+    status: Status
+    error: ErrorOfRun | None
+    line: int | None
+    failed_checks: tuple[str, ...]
+    trace: tuple[msgspec.Raw, ...]
+    cut: CutTrace | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def events(self) -> int:
+        """How many events the trace had when it was judged."""
+        return len(self.trace) + (0 if self.cut is msgspec.UNSET else self.cut.events)
+
+
+class JudgedRow(_Part, frozen=True):
+    """A row as it is read from the file; see `Row`."""
+
+    task: str
+    prompt: int
+    index: int
+    program_sha256: str
+    passed: bool
+    failure: Failure | None
+    verdicts: tuple[WorldVerdict, ...]
+
+    def __post_init__(self) -> None:
+        if self.passed != (self.failure is None):
+            raise ValueError("a completion that passes has no failure, and any other has one")
+        if self.failure is not None and not 0 <= self.failure.world < len(self.verdicts):
+            raise ValueError("no such world decided")
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        """What no other row of an evaluation shares."""
+        return self.task, self.prompt, self.index
+
+
+DECODER = msgspec.json.Decoder(JudgedRow)
+
+
+def judged_row(line: bytes, *, check_kinds: bool = False) -> JudgedRow:
+    """The row of an evaluation that a line says.
+
+    Args:
+        line: of JSON.
+        check_kinds: whether to look into each event, too.
+
+    Raises:
+        BadInput: it is none, or something in it is unknown.
+    """
+    try:
+        row = _decoded(line)
+        if check_kinds:
+            _expect_known_kinds(row)
+    except (msgspec.DecodeError, UnicodeDecodeError, ValueError, TypeError, LookupError) as error:
+        raise BadInput(f"{NO_ROW} ({error})") from None
+    return row
+
+
+def _decoded(line: bytes) -> JudgedRow:
+    try:
+        return DECODER.decode(line)
+    except msgspec.ValidationError:
+        raise
+    except msgspec.DecodeError:
+        # UTF-8 cannot hold half of a surrogate pair: it is kept as the text of its escape.
+        return DECODER.decode(ESCAPES.sub(lambda found: (b"\\" if found[1] else b"") + found[0], line))
+
+
+def _expect_known_kinds(row: JudgedRow) -> None:
+    for verdict in row.verdicts:
+        for event in verdict.trace:
+            kind = msgspec.json.decode(event)[0]
+            if kind not in KINDS:
+                raise ValueError(f'"{kind}" is no kind of event')
+
+
+@dataclass(frozen=True)
+class Line:
+    """A row with its place in the file.
+
+    Args:
+        number: of its line, counted from 1.
+        at: where its line begins, in bytes.
+        size: of the line, in bytes.
+        row: what it says.
+    """
+
+    number: int
+    at: int
+    size: int
+    row: JudgedRow
+
+
+def read_lines_of(
+    path: Path,
+    head: Mapping[str, Any],
+    *,
+    seal: Seal | None = None,
+    see: Callable[[bytes], None] | None = None,
+    faults: list[BadInput] | None = None,
+) -> Iterator[Line]:
+    """Read an evaluation, once and in order; a torn last line is passed over.
+
+    Args:
+        path: the file of the rows.
+        head: what KEY.json says.
+        seal: takes the lines into account as they are read.
+        see: sees the line of each row that is read.
+        faults: gets what is wrong with lines, which are then passed over, rather than that it is raised.
+
+    Raises:
+        BadInput: the file is missing, a line is no row of an evaluation, or, once all were read, they are
+            others than those of the finished evaluation.
+    """
+    seal = seal or Seal()
+    at = 0
+    for number, line in read_lines(path, limit=LONGEST_LINE):
+        seal.add(line)
+        try:
+            if line.strip():
+                row = judged_row(line, check_kinds=not is_sealed(head))
+                if see is not None:
+                    see(line)
+                yield Line(number, at, len(line), row)
+        except BadInput as error:
+            if not line.endswith(b"\n"):
+                break
+            fault = BadInput(f"{error.sentence}; --redo starts over", file=path, line=number)
+            if faults is None:
+                raise fault from None
+            faults.append(fault)
+        at += len(line)
+    if seal.is_broken(head):
+        broken = BadInput(f"{BROKEN}; --redo starts over", file=path)
+        if faults is None:
+            raise broken
+        if not faults:
+            faults.append(broken)
+
+
+# --- the seal of a finished file
 
 
 class Seal:
@@ -57,15 +266,6 @@ class Seal:
         self._count += bool(line.strip())
         self._hash.update(line)
 
-    @classmethod
-    def of(cls, path: Path) -> Seal:
-        """The seal of a file."""
-        seal = cls()
-        with path.open("rb") as file:
-            for line in file:
-                seal.add(line)
-        return seal
-
     def data(self) -> dict[str, Any]:
         """As KEY.json writes it."""
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
@@ -78,120 +278,47 @@ class Seal:
         """
         return is_sealed(head) and any(head.get(name) != value for name, value in self.data().items())
 
-    def check(self, head: Mapping[str, Any], path: Path) -> None:
-        """Refuse other rows than those of the finished evaluation.
-
-        Raises:
-            BadInput: the file was damaged or changed.
-        """
-        if self.is_broken(head):
-            raise BadInput(f"{BROKEN}; --redo starts over", file=path)
-
-
-BROKEN = "was damaged or changed after the evaluation was finished"
-
 
 def is_sealed(head: Mapping[str, Any]) -> bool:
     """Whether a KEY.json tells of a finished evaluation; one of an earlier version never does."""
     return "rows" in head or "sha256" in head
 
 
-def row_of(data: object) -> Row:
-    """The row of an evaluation that a line says.
-
-    Raises:
-        BadInput: it is none, or something in it is unknown.
-    """
-    row = _expect(data, ROW, "row")
-    verdicts, why = row["verdicts"], row["failure"]
-    for verdict in verdicts:
-        _expect_verdict(verdict)
-    if why is not None and not 0 <= _expect(why, FAILURE, "failure")["world"] < len(verdicts):
-        raise BadInput(NO_ROW)
-    if row["passed"] != (why is None):
-        raise BadInput(NO_ROW)
-    return cast("Row", row)
+# --- how large a row may be
 
 
-def _expect_verdict(data: object) -> None:
-    is_cut = isinstance(data, dict) and "cut" in data
-    verdict = _expect(data, VERDICT_CUT if is_cut else VERDICT, "verdict")
-    if is_cut:
-        _expect(verdict["cut"], CUT, "cut")
-    if verdict["error"] is not None:
-        _expect(verdict["error"], ERROR, "error")
-    checks = verdict["failed_checks"]
-    if verdict["status"] not in STATUSES or (checks and {*map(type, checks)} != {str}):
-        raise BadInput(NO_ROW)
-    try:
-        unknown = {*map(itemgetter(0), verdict["trace"])}.difference(KINDS)
-    except (TypeError, LookupError):
-        raise BadInput(NO_ROW) from None
-    if unknown:
-        raise BadInput(f'{NO_ROW}: "{min(map(str, unknown))}" is no kind of event')
+def bounded(judgement: Judgement) -> Judgement:
+    """A judgement that fits into a row, with traces cut where they must be; a shorter one as it is.
 
-
-def _expect(data: object, form: Form, what: str) -> dict[str, Any]:
-    if type(data) is not dict:
-        raise BadInput(NO_ROW)
-    if data.keys() != form.keys():
-        unknown = sorted(data.keys() - form.keys())
-        raise BadInput(f'{NO_ROW}: "{unknown[0]}" is no part of a {what}' if unknown else NO_ROW)
-    for name, types in form.items():
-        if type(data[name]) not in types:
-            raise BadInput(NO_ROW)
-    return data
-
-
-def read_evaluations(
-    path: Path, head: Mapping[str, Any], seal: Seal | None = None
-) -> Iterator[tuple[int, Row]]:
-    """Read the rows of an evaluation with the numbers of their lines.
+    Each world has an equal share of the bytes. Of a trace that takes more, `cut` says how many events are
+    left out, and the SHA-256 of the JSON of all of it.
 
     Args:
-        path: the file of the rows.
-        head: what KEY.json says.
-        seal: takes the lines into account as they are read.
-
-    Raises:
-        BadInput: the file is missing, a line is no row of an evaluation, or, once all were read, they are
-            others than those of the finished evaluation.
+        judgement: with whole traces.
     """
-    seal = seal or Seal()
-    try:
-        for number, row in read_rows(path, limit=MAX_EVALUATION, growing=True, see=seal.add):
-            yield number, _at(path, number, row)
-    except BadInput as error:
-        if error.line is None:
-            raise
-        raise BadInput(f"{error.sentence}; --redo starts over", file=path, line=error.line) from None
-    seal.check(head, path)
+    verdicts = judgement["verdicts"]
+    most = max(MOST, MOST_OF_WORLD * len(verdicts)) - NAMES
+    if not verdicts or len(to_line(judgement)) <= most:
+        return judgement
+    bare = [{**verdict, "trace": [], "cut": _cut(verdict["trace"], HASH)} for verdict in verdicts]
+    share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
+    return {**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]}
 
 
-def _at(path: Path, number: int, data: object) -> Row:
-    try:
-        return row_of(data)
-    except BadInput as error:
-        raise BadInput(error.sentence, file=path, line=number) from None
+def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
+    trace = verdict["trace"]
+    size = 0
+    for kept, event in enumerate(trace):
+        size += len(_json(event)) + BETWEEN
+        if size > share:
+            whole = hashlib.sha256(_json(trace)).hexdigest()
+            return {**verdict, "trace": trace[:kept], "cut": _cut(trace[kept:], whole)}
+    return verdict
 
 
-def read_judged(
-    rows: Path, programs: Path, head: Mapping[str, Any], seal: Seal | None = None
-) -> Iterator[tuple[int, Row, str | None]]:
-    """Read the rows of an evaluation with the numbers of their lines and the hashes of their programs.
+def _cut(events: Sequence[object], sha256: str) -> dict[str, Any]:
+    return {"events": len(events), "sha256": sha256}
 
-    Args:
-        rows: the file of the rows.
-        programs: the file that holds, for each row in order, the hash of the program that it judges.
-        head: what KEY.json says.
-        seal: takes the lines of the rows into account as they are read.
 
-    Raises:
-        BadInput: as `read_evaluations` does.
-    """
-    hashes = programs.open("rb") if programs.exists() else io.BytesIO()
-    with hashes:
-        for number, row in read_evaluations(rows, head, seal):
-            line = hashes.read(HASH_LINE)
-            whole = len(line) == HASH_LINE
-            yield number, row, line.decode(errors="replace").rstrip("\n") if whole else None
+def _json(data: object) -> bytes:
+    return to_line(data).removesuffix(b"\n")

@@ -1,0 +1,108 @@
+"""One task of a run, prompt by prompt, and one prompt, program by program."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import polars as pl
+
+from roboeval.analysis.metrics import completions_of
+from roboeval.evaluation.completions import Completion, Key
+from roboeval.evaluation.explanation import reason
+from roboeval.evaluation.results import Results
+
+
+def task_data(results: Results, task: str) -> dict[str, Any]:
+    """A task, prompt by prompt: how many completions passed, and how the others failed.
+
+    Args:
+        results: that have completions of the task.
+        task: its name.
+    """
+    suite = results.suite
+    of_task = completions_of(results.table).filter(pl.col("task") == task).sort("prompt", maintain_order=True)
+    return {
+        "task": task,
+        "summary": suite.tasks[task].summary if suite is not None and task in suite.tasks else None,
+        "prompts": [
+            {**_prompt_head(results, of_prompt), "failures": _failure_kinds(of_prompt)}
+            for of_prompt in of_task.partition_by("prompt", maintain_order=True)
+        ],
+    }
+
+
+def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
+    """A prompt, program by program, with the one reason why each fails; equal programs stand together.
+
+    Args:
+        results: that have completions of the prompt.
+        task: its name.
+        prompt: counted from 0.
+    """
+    of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
+    programs = results.programs
+    together: dict[object, list[Key]] = defaultdict(list)
+    for index in of_prompt["index"]:
+        key = task, prompt, index
+        together[programs.get(key, index)].append(key)
+    return {
+        "task": task,
+        **_prompt_head(results, of_prompt),
+        "programs": [
+            {
+                "indices": [index for _, _, index in same],
+                "gone": same[0] not in programs,
+                **_reason(results, same[0]),
+            }
+            for same in together.values()
+        ],
+    }
+
+
+def _reason(results: Results, key: Key) -> dict[str, Any]:
+    if key not in results.failed:
+        return {"passed": True, "failure": None}
+    return reason(results.failed[key], results.suite, ablated=results.is_ablated)
+
+
+def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
+    """What a prompt told the model, and how many of its completions passed."""
+    keys = [*of_prompt.filter(~pl.col("stale")).select("task", "prompt", "index").iter_rows()]
+    written = [results.completions[key] for key in keys]
+    return {
+        "prompt": of_prompt["prompt"][0],
+        "instructions": _different(written, "instruction"),
+        "models": _different(written, "model"),
+        "completions": of_prompt.height,
+        "gone": of_prompt.height - len(written),
+        "passed": int(of_prompt["passed"].sum()),
+        "pass@1": int(of_prompt["passed"].sum()) / of_prompt.height,
+    }
+
+
+def _different(written: Sequence[Completion], name: str) -> list[str]:
+    values = dict.fromkeys(getattr(completion, name) for completion in written)
+    return [value for value in values if value is not None]
+
+
+def _failure_kinds(of_prompt: pl.DataFrame) -> list[dict[str, Any]]:
+    counted = (
+        of_prompt.drop_nulls("failure_class")
+        .group_by("failure_class", "failure_kind", maintain_order=True)
+        .agg(count=pl.len(), example=pl.col("index").first())
+        .sort("count", descending=True, maintain_order=True)
+    )
+    return [
+        {"class": name, "kind": kind, "count": count, "example": example}
+        for name, kind, count, example in counted.iter_rows()
+    ]
+
+
+def by_hand(models: Collection[str | None]) -> str:
+    """What a title adds if recorded programs are among those of some models, which stand for no real one."""
+    recorded = [model for model in models if model is not None and model.startswith("recorded:")]
+    if not recorded:
+        return ""
+    return f" ({'' if len(recorded) == len(models) else 'some '}programs written by hand)"

@@ -1,0 +1,175 @@
+"""Commands that compare: two runs, two suites, and a run with what checking its programs would have given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.cli.options import (
+    AblationOption,
+    EngineOption,
+    JsonOption,
+    Opened,
+    RunArgument,
+    SuiteOption,
+    WorkersOption,
+    engine_named,
+    named,
+    open_current,
+)
+from roboeval.cli.output import fail, note, print_json, print_rich, watched
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.results import Results
+
+
+def compare(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(help="Two runs that were judged; with --suites, one or more.", parser=named("a run")),
+    ],
+    suite: SuiteOption = "paper",
+    suites: Annotated[
+        str | None,
+        typer.Option(help="Two suites, such as paper,plus: what the second changes, of each run."),
+    ] = None,
+    most: Annotated[
+        int, typer.Option("--groups", min=0, help="With --suites: how many groups of programs to show.")
+    ] = 10,
+    ablation: AblationOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Say by how much one run is better, and how sure that is.
+
+    That is: by how much the second run passes more often than the first.
+    """
+    if suites is not None:
+        compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
+    elif len(runs) == PAIR:
+        compare_runs(runs, suite, ablated=ablation, as_json=json)
+    else:
+        fail(
+            f"a comparison takes two runs, and {len(runs)} {'is' if len(runs) == 1 else 'are'} named; "
+            "with --suites it takes any number"
+        )
+
+
+PAIR = 2
+
+
+def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
+    """Print which of two runs is better."""
+    from roboeval.analysis.compare import compared, comparison_data, prompts, told_of, unlike
+    from roboeval.analysis.metrics import pass_at_1
+    from roboeval.cli.views.comparison import comparison_view
+
+    opened = [open_current(path, suite, ablated=ablated) for path in paths]
+    expect_alike(paths, opened)
+    result = compared(*(pass_at_1(one.results.table) for one in opened))
+    abouts = [told_of(one.results.about, one.results.head) for one in opened]
+    for difference in unlike(*abouts):
+        note(f"warning: {difference}")
+    if result.left_out:
+        note(f"left out, since only one of them has them: {prompts(result.left_out)}")
+    names = str(paths[0]), str(paths[1])
+    if as_json:
+        print_json({**comparison_data(result, names), "warnings": unlike(*abouts)})
+    else:
+        print_rich(comparison_view(result, names))
+
+
+def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
+    """Print what a second suite changes."""
+    from roboeval.analysis.verdict_changes import changes_data, verdict_changes
+    from roboeval.cli.views.comparison import changes_view
+    from roboeval.evaluation.completions import how_many
+
+    if len({path.resolve() for path in paths}) < len(paths):
+        fail("a run is named twice; name each once")
+    found = []
+    for path in paths:
+        first, second = (open_current(path, one, ablated=ablated).results for one in two_suites(suites))
+        found.append(verdict_changes(str(path), first, second))
+    for one in found:
+        if one.left_out:
+            note(f"{one.name}: left out, since only one suite has judged them: {how_many(one.left_out)}")
+    if as_json:
+        print_json(changes_data(found))
+    else:
+        print_rich(changes_view(found, most=most))
+
+
+def two_suites(text: str) -> tuple[str, str]:
+    """The suites that a user names, in their order."""
+    names = [name.strip() for name in text.split(",")]
+    if len(names) != PAIR or len({*names}) != PAIR or not all(names):
+        fail(f'--suites takes two suites with a comma between them, such as paper,plus, and not "{text}"')
+    return names[0], names[1]
+
+
+def expect_alike(paths: Sequence[Path], opened: Sequence[Opened]) -> None:
+    """Refuse runs that were judged by suites of different content."""
+    from roboeval.analysis.compare import expect_same_suite
+
+    named_heads = {str(path): one.results.head for path, one in zip(paths, opened, strict=True)}
+    again = {str(path): one.again for path, one in zip(paths, opened, strict=True)}
+    expect_same_suite(named_heads, opened[0].suite, again)
+
+
+def resample(
+    run: RunArgument,
+    retries: Annotated[
+        list[int] | None, typer.Option(min=0, help="A limit of retries; may be given several times.")
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Worlds that are imagined to check a program.")
+    ] = 5,
+    seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
+    suite: SuiteOption = "paper",
+    workers: WorkersOption = None,
+    engine: EngineOption = "local",
+    json: JsonOption = False,
+) -> None:
+    """Say what checking programs before a run would have saved.
+
+    From a judged run: what asking again for those that a check rejects would have given.
+    """
+    from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
+    from roboeval.cli.views.groups import resample_view
+
+    checker = engine_named(engine, workers)
+    results = open_current(run, suite, ablated=False).results
+    prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
+    limits = sorted(set(retries)) if retries else LIMITS
+    if json:
+        name = results.head["suite"]
+        print_json({"suite": name, "samples": samples, "seed": seed, **curve_data(prompts, limits)})
+    else:
+        print_rich(resample_view(prompts, limits, title=str(run)))
+
+
+def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
+    """The table of a run with what the check says of each program; that stays in the run.
+
+    Args:
+        results: of the run, by a suite that is at hand.
+        samples: how many worlds to imagine for each program.
+        seed: from which they are drawn.
+        engine: where programs are checked.
+    """
+    from roboeval.evaluation.checks import Checks
+    from roboeval.evaluation.results import with_answers
+
+    assert results.suite is not None, "it judged them"
+    judged = [results.completions[key] for key in results.places]
+    checks = Checks(results.run, results.suite, samples=samples, seed=seed)
+    different = {(completion.task, completion.program) for completion in judged}
+    for _ in watched(checks.add(judged, engine=engine), "checking", len(different)):
+        pass
+    return with_answers(results.table, checks.problems)

@@ -1,0 +1,140 @@
+"""Commands that show what was judged: show, export."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from roboeval.cli.options import (
+    AblationOption,
+    JsonOption,
+    RunArgument,
+    SuiteOption,
+    complaint_of,
+    named,
+    open_current,
+    open_run,
+    task_names,
+    unfinished_of,
+)
+from roboeval.cli.output import fail, note, print_json, print_rich
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from roboeval.evaluation.completions import Key
+    from roboeval.evaluation.results import Results, Scope
+    from roboeval.suites.load import Suite
+
+
+def show(
+    run: RunArgument,
+    what: Annotated[
+        str | None,
+        typer.Argument(help="TASK, TASK/PROMPT or TASK/PROMPT/INDEX.", autocompletion=task_names),
+    ] = None,
+    suite: SuiteOption = "paper",
+    ablation: AblationOption = False,
+    k: Annotated[list[int] | None, typer.Option("--k", min=1, help="Also pass@k for this k.")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Print a run's tables, or show why a completion fails."""
+    from roboeval.analysis.selection import parse_selection
+
+    opened = open_run(run, suite, ablated=ablation)
+    results = opened.results
+    selection = parse_selection(what, opened.suite)
+    if selection.task is None:
+        ks = sorted({1, *(k or [])})
+        print_summary(
+            results.table,
+            opened.suite,
+            results.scope,
+            title=str(run),
+            ablated=ablation,
+            as_json=json,
+            k=ks,
+            stale=results.stale,
+        )
+    else:
+        if k:
+            fail(f"--k is about a whole run; leave {selection} out, or --k")
+        if ablation:
+            note("ablation: only common sense was required")
+        selection.expect_judged(results)
+        show_part(results, selection.task, selection.prompt, selection.index, as_json=json)
+    if (complaint := complaint_of(results)) is not None:
+        note(f"{complaint}; `{opened.again} --redo` judges what stands there")
+    if (unfinished := unfinished_of(results)) is not None:
+        note(f"{unfinished}; `{opened.again}` goes on")
+
+
+def print_summary(
+    table: pl.DataFrame,
+    suite: Suite,
+    scope: Scope,
+    *,
+    title: str,
+    ablated: bool,
+    as_json: bool,
+    k: Sequence[int] = (1,),
+    stale: Iterable[Key] = (),
+) -> None:
+    """Print the tables of an evaluation."""
+    from roboeval.analysis.summary import summary, summary_data
+    from roboeval.cli.views.results import summary_view
+    from roboeval.evaluation.completions import name_of
+
+    counted = summary(table, suite, scope, k=k, ablated=ablated)
+    if as_json:
+        print_json({**summary_data(counted), "stale": list(map(name_of, stale))})
+    else:
+        print_rich(summary_view(counted, title=title))
+
+
+def show_part(results: Results, task: str, prompt: int | None, index: int | None, *, as_json: bool) -> None:
+    """Print a task, a prompt or a completion."""
+    from roboeval.analysis.tasks import prompt_data, task_data
+    from roboeval.cli.views.completions import completion_view, prompt_view
+    from roboeval.cli.views.results import task_view
+    from roboeval.evaluation.explanation import completion_data
+
+    if prompt is None:
+        data, view = task_data(results, task), task_view
+    elif index is None:
+        data, view = prompt_data(results, task, prompt), prompt_view
+    else:
+        key = task, prompt, index
+        completion = None if key in results.stale else results.completions.get(key)
+        data = completion_data(results.row(key), completion, results.suite, ablated=results.is_ablated)
+        view = completion_view
+    if as_json:
+        print_json({**data, "ablation": results.is_ablated})
+    else:
+        print_rich(view(data))
+
+
+def export(
+    run: RunArgument,
+    format: Annotated[  # noqa: A002 - the option's name
+        str | None, typer.Option(help="csv or parquet; by default what --out ends in, or else csv.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="The file; by default beside the verdicts.", parser=named("a file"))
+    ] = None,
+    suite: SuiteOption = "paper",
+    ablation: AblationOption = False,
+) -> None:
+    """Write a run's verdicts as one flat table."""
+    from codebotler.replacing import expect_replaceable
+    from roboeval.analysis.export import BEGINNINGS, kind_of, write
+
+    kind = format or kind_of(out)
+    results = open_current(run, suite, ablated=ablation).results
+    path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
+    expect_replaceable(path, *BEGINNINGS)
+    write(results.table, path, kind)
+    note(f"the table is in {path}")

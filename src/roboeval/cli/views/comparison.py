@@ -1,0 +1,122 @@
+"""How much better one run is than another, and what a second suite changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.storyboard import grid
+from codebotler.terminal import visible
+from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.compare import Comparison, prompts, to_tell, verdict
+from roboeval.analysis.statistics import FEW
+from roboeval.analysis.verdict_changes import VerdictChanges, place, said, said_of_order, said_of_prompts
+from roboeval.cli.views.groups import cluster_view
+
+SMALL = 0.0001
+COUNTS = ("both", "first_only", "second_only", "neither")
+
+
+def comparison_view(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
+    """A comparison as text and tables.
+
+    Args:
+        comparison: of two runs.
+        names: of both.
+    """
+    a, b = map(visible, names)
+    rows = grid("left", "right", "left")
+    rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")
+    rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}")
+    rows.add_row(
+        "difference",
+        f"{comparison.over_tasks.mean:+.3f}",
+        f"over {prompts(comparison.prompts)} that both have",
+    )
+    few = "too narrow for so few tasks" if len(comparison.tasks) < FEW else ""
+    for name, estimate, told in (
+        ("95% interval, prompts drawn at random", comparison.over_prompts, _p(comparison.p_prompts)),
+        ("95% interval, tasks drawn at random", comparison.over_tasks, _p(comparison.p_tasks)),
+        ("the same by bootstrap", comparison.bootstrap, few),
+    ):
+        rows.add_row(name, f"{estimate.low:+.3f} to {estimate.high:+.3f}", told)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("task", overflow="fold")
+    for head in (a, b, "difference", "adds", "prompts"):
+        table.add_column(Text(head), justify="right")
+    for task in comparison.tasks:
+        cells = (f"{task.first:.3f}", f"{task.second:.3f}", f"{task.difference:+.3f}", f"{task.share:+.3f}")
+        table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
+    sentence = Text(verdict(comparison, (a, b)), "bold")
+    return Group(sentence, Text(), rows, Text(), *map(Text, to_tell(comparison)), Text(), table)
+
+
+def _p(value: float) -> str:
+    return f"p = {value:.4f}" if value >= SMALL else f"p < {SMALL}"
+
+
+def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
+    """What a second suite changes, as text and tables.
+
+    Args:
+        found: at least one.
+        most: how many groups of programs are shown of each run and direction.
+    """
+    sentences = [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
+    parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences]
+    parts += [Text(), _scores(found)]
+    for one in found:
+        parts += [Text(), _tasks(one)]
+        first, second = one.suites
+        parts += _groups(one.first_only, most, f"{first} only, and what {second} says")
+        parts += _groups(one.second_only, most, f"{second} only, and what {first} says")
+    return Group(*parts)
+
+
+def _table(*heads: str) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for number, head in enumerate(heads):
+        table.add_column(Text(head), justify="right" if number else "left", overflow="fold")
+    return table
+
+
+def _scores(found: Sequence[VerdictChanges]) -> Table:
+    first, second = found[0].suites
+    table = _table("pass@1", first, second, "difference", "95% over prompts", "place")
+    scores = [{one.name: one.pass_at_1[side] for one in found} for side in (0, 1)]
+    for one in found:
+        before, after = one.pass_at_1
+        ends = one.comparison.over_prompts
+        places = [place(one.name, of) for of in scores]
+        table.add_row(
+            Text(visible(one.name)),
+            f"{before:.3f}",
+            f"{after:.3f}",
+            f"{after - before:+.3f}",
+            f"{ends.low:+.3f} to {ends.high:+.3f}",
+            " -> ".join(map(str, dict.fromkeys(places))),
+        )
+    return table
+
+
+def _tasks(one: VerdictChanges) -> Table:
+    first, second = one.suites
+    table = _table(visible(one.name), "both", f"{first} only", f"{second} only", "neither")
+    for task in one.tasks:
+        counts = asdict(task)
+        table.add_row(Text(visible(task.task)), *(f"{counts[name]:,}" for name in COUNTS))
+    return table
+
+
+def _groups(every: Sequence[Cluster], most: int, what: str) -> list[RenderableType]:
+    if not every:
+        return []
+    head = f"pass under {what}, in {len(every):,} group{'s' * (len(every) != 1)}:"
+    left = len(every) - most
+    more = [Text(f"{left:,} smaller groups; --groups shows more", "dim")] if left > 0 else []
+    return [Text(), Text(head, "bold"), Text(), *map(cluster_view, every[:most]), *more]

@@ -1,0 +1,104 @@
+"""Completions that were found, failures in groups, and what asking again would have given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.terminal import shortened, visible
+from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
+from roboeval.analysis.search import Found
+from roboeval.analysis.similarity import Change
+from roboeval.cli.views.results import kind_view
+from roboeval.evaluation.completions import how_many, name_of
+from roboeval.evaluation.explanation import GONE
+
+MOST_LINES = 60  # of a difference between programs
+
+
+def found_view(found: Sequence[Found], total: int) -> RenderableType:
+    """How many completions were found, by task, for a person.
+
+    Args:
+        found: those that do what was looked for.
+        total: how many were looked at.
+    """
+    head = Text(f"found {len(found):,} of {how_many(total)}", "bold")
+    if not found:
+        return head
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("task", overflow="fold")
+    for name in ("found", "passed", "such as"):
+        table.add_column(name, justify="right" if name != "such as" else "left")
+    by_task: dict[str, list[Found]] = {}
+    for one in found:
+        by_task.setdefault(one.key[0], []).append(one)
+    for task, those in by_task.items():
+        passed = sum(one.passed for one in those)
+        example = f"{name_of(those[0].key)}, world {those[0].worlds[0][0]}"
+        table.add_row(Text(visible(task)), f"{len(those):,}", f"{passed:,}", Text(visible(example), "dim"))
+    return Group(head, Text(), table)
+
+
+def cluster_view(cluster: Cluster) -> RenderableType:
+    """A group for a person: how many, why, and what would have helped."""
+    size = how_many(len(cluster.members))
+    name = visible(name_of(cluster.representative))
+    head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
+    lines = [Text(f'such as {name}, in "{visible(str(cluster.told["world"]))}"', "dim")]
+    check = cluster.failure["check"]
+    lines.append(Text(shortened(f"{check}: {cluster.why}" if check else cluster.why)))
+    if cluster.program is None:
+        lines.append(Text(GONE, "yellow"))
+    if cluster.fix is not None:
+        changed = f"{cluster.fix.changed} line{'s' * (cluster.fix.changed != 1)}"
+        lines.append(Text(f"{visible(cluster.fix.name)} passes, and differs in {changed}:", "dim"))
+        lines += map(_change, cluster.fix.changes[:MOST_LINES])
+        left = len(cluster.fix.changes) - MOST_LINES
+        lines += [Text(f"... {left} more lines", "dim")] if left > 0 else []
+    return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
+
+
+def _change(change: Change) -> Text:
+    sign, line = change
+    style = {"-": "red", "+": "green"}.get(sign, "dim")
+    return Text(f"{sign} {shortened(line.expandtabs(4))}", style)
+
+
+def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str) -> RenderableType:
+    """The same as a table for people.
+
+    Args:
+        prompts: at least one.
+        limits: numbers of retries.
+        title: which run it is about.
+    """
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    heads = ("retries", "pass@1", *(f"pass@1\n≥ {t:g}" for t in THRESHOLDS), "accepted", "run at all")
+    for name in heads:
+        table.add_column(name, justify="right", no_wrap=True)
+    for limit in (resampled(prompts, retries) for retries in limits):
+        shares = (*limit.prompts.values(), limit.accepted, limit.ran)
+        table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
+    hopeless = sum(not any(trial.accepted for trial in prompt.trials) for prompt in prompts)
+    return Group(
+        Text(visible(title), style="bold"),
+        Text("a program that the check rejects is asked for again, so many times at most; that gives:"),
+        Text(),
+        table,
+        Text(),
+        Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
+        Text("accepted: the share of programs, at the end, that the check accepts", style="dim"),
+        Text("run at all: the share that runs without an error in all the worlds of its task", style="dim"),
+        *([Text(f"no completion of {_prompts(hopeless)} is accepted")] if hopeless else []),
+    )
+
+
+def _prompts(count: int) -> str:
+    return f"{count} prompt{'s' * (count != 1)}"

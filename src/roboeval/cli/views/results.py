@@ -1,0 +1,156 @@
+"""Tables of a run, of one of its tasks, and how failures are named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rich import box
+from rich.columns import Columns
+from rich.console import Console, ConsoleOptions, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.storyboard import grid
+from codebotler.terminal import visible
+from roboeval.analysis.summary import Failures, Missing, Summary, judged_count
+from roboeval.analysis.tasks import by_hand
+from roboeval.evaluation.completions import how_many
+from roboeval.evaluation.failures import CLASSES, label_of
+
+NOT_RECORDED = "instruction not recorded"
+ALL_GONE = "the programs that were judged no longer stand in this run"
+
+
+def summary_view(summary: Summary, *, title: str) -> RenderableType:
+    """The tables of an evaluation.
+
+    Args:
+        summary: what they show.
+        title: what was judged.
+    """
+    head = Text(visible(title) + by_hand(summary.scope.models), style="bold")
+    if summary.ablated:
+        head.append(" (ablation: only common sense was required)", style="not bold")
+    n, failed = judged_count(summary.prompts), sum(each.count for each in summary.failures)
+    parts: list[RenderableType] = [head]
+    if n < (total := summary.scope.total):
+        parts.append(Text(f"{n:,} of {how_many(total)} judged", style="yellow"))
+    elif n > total:
+        parts.append(Text(f"{how_many(n)} judged, but only {total:,} there now", style="yellow"))
+    parts += [Text(), _TaskTable(summary), Text(), *_overall(summary), *_missed(summary.missing)]
+    if failed:
+        told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all completions:"
+        tables = Columns([_failure_table(each) for each in summary.failures], padding=(1, 3))
+        parts += [Text(), Text(told), Text(), tables]
+    return Group(*parts)
+
+
+def _missed(missing: Missing) -> Iterator[Text]:
+    for reason, tasks in [
+        ("no completions of", missing.no_completions),
+        ("not judged yet:", missing.not_judged),
+        ("not selected:", missing.not_selected),
+    ]:
+        if tasks:
+            yield Text(f"{reason} {', '.join(map(visible, tasks))}", style="dim")
+
+
+@dataclass(frozen=True)
+class _TaskTable:
+    """The scores of tasks; where there is no room for all columns, names of tasks stay whole."""
+
+    summary: Summary
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Table]:
+        boundless = options.update(max_width=10_000)
+        tables = list(self._tables())
+        fitting = (t for t in tables if console.measure(t, options=boundless).maximum <= options.max_width)
+        yield next(fitting, tables[-1])
+
+    def _tables(self) -> Iterator[Table]:
+        """The table with fewer and fewer columns."""
+        passes = [f"pass@{k}" for k in self.summary.k]
+        yield self._table("completions", *passes, "worst prompt", "best prompt")
+        yield self._table("completions", *passes, "worst\nprompt", "best\nprompt")
+        yield self._table("completions", *passes)
+        for count in range(len(passes), 0, -1):
+            yield self._table(*passes[:count])
+
+    def _table(self, *columns: str) -> Table:
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+        table.add_column("task", overflow="fold")
+        for name in columns:
+            table.add_column(name, justify="right", no_wrap=True)
+        first = self.summary.k[0]
+        for task in self.summary.tasks:
+            shares = {f"pass@{k}": task.pass_at(k).mean for k in self.summary.k}
+            shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
+            cells = {name: Text(f"{share:.2f}", _mood(share)) for name, share in shares.items()}
+            cells["completions"] = Text(f"{judged_count(task.prompts):,}")
+            table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))
+        return table
+
+
+def _mood(share: float) -> str:
+    return "green" if share == 1 else "red" if share == 0 else ""
+
+
+def _overall(summary: Summary) -> list[Text]:
+    prompts = len(summary.prompts)
+    lines = []
+    for k, estimate in zip(summary.k, summary.overall, strict=True):
+        line = Text.assemble(f"pass@{k} over all prompts: ", (f"{estimate.mean:.3f}", "bold"))
+        if prompts > 1:
+            line.append(f" (95% interval {estimate.low:.3f} to {estimate.high:.3f}, {prompts} prompts)")
+        lines.append(line)
+    return lines
+
+
+def _failure_table(failures: Failures) -> Table:
+    table = grid("left", "right", "right")
+    for each in [failures, *failures.kinds]:
+        name = _name(failures) if each is failures else f"  {visible(each.name)}"
+        style = "bold" if each is failures else "" if each.count else "dim"
+        table.add_row(Text(name), f"{each.count:,}", f"{each.share:.1%}", style=style)
+    return table
+
+
+def _name(failures: Failures) -> str:
+    return CLASSES[failures.name].plural if failures.name in CLASSES else visible(failures.name)
+
+
+def task_view(data: Mapping[str, Any]) -> RenderableType:
+    """A task, prompt by prompt.
+
+    Args:
+        data: as `task_data` gives it.
+    """
+    task = data["task"]
+    models = {model for prompt in data["prompts"] for model in prompt["models"]}
+    parts: list[RenderableType] = [Text(visible(task) + by_hand(models), style="bold")]
+    if data["summary"]:
+        parts.append(Text(visible(data["summary"])))
+    for prompt in data["prompts"]:
+        parts += [Text(), *prompt_lines(task, prompt)]
+        table = grid("right", "left", "left")
+        for failure in prompt["failures"]:
+            example = Text(f"such as {visible(task)}/{prompt['prompt']}/{failure['example']}", "dim")
+            table.add_row(f"  {failure['count']:,}", kind_view(failure), example)
+        parts.append(table)
+    return Group(*parts)
+
+
+def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
+    """The head of a prompt: how often it passes, and what the model was told."""
+    score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
+    head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
+    if prompt["gone"] == prompt["completions"]:
+        return [head, Text(ALL_GONE, "yellow")]
+    return [head, *(Text(visible(text), "italic") for text in prompt["instructions"] or [NOT_RECORDED])]
+
+
+def kind_view(failure: Mapping[str, Any]) -> Text:
+    """A failure's class and kind."""
+    return Text.assemble((f"{visible(label_of(failure['class']))}: {visible(failure['kind'])}", "red"))

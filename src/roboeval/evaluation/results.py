@@ -1,0 +1,463 @@
+"""A judged run as one table: a row for each completion and world, from which all numbers are counted."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from types import UnionType
+from typing import Any
+
+import msgspec
+import numpy as np
+import polars as pl
+
+from codebotler.badinput import BadInput
+from codebotler.files import read_rows
+from roboeval.evaluation.completions import Completion, Key, read_completions
+from roboeval.evaluation.rows import JudgedRow, Line, Row, RowData, WorldVerdict, read_lines_of
+from roboeval.evaluation.run import Run, evaluation_key, load_head
+from roboeval.suites.load import ABLATED, Suite, load_suite
+
+CHUNK = 10_000  # rows of the table that are held as Python objects at one time
+MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
+
+COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
+    "task": pl.String,
+    "prompt": pl.Int64,
+    "index": pl.Int64,
+    "model": pl.String,
+    "program_sha256": pl.String,
+    "passed": pl.Boolean,
+    "failure_class": pl.String,
+    "failure_kind": pl.String,
+    "failure_world": pl.Int64,
+    "failure_check": pl.String,
+    "stale": pl.Boolean,
+    "input_tokens": pl.Int64,
+    "output_tokens": pl.Int64,
+    "latency_s": pl.Float64,
+    "cost": pl.Float64,
+    "accepted": pl.Boolean,
+}
+"""What a row says of its completion; see docs/results.md."""
+
+WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
+    "world_number": pl.Int64,
+    "world": pl.String,
+    "satisfied": pl.Boolean,
+    "status": pl.String,
+    "error_kind": pl.String,
+    "error_message": pl.String,
+    "line": pl.Int64,
+    "failed_checks": pl.String,
+    "category": pl.String,
+    "events": pl.Int64,
+}
+"""What a row says of one world."""
+
+
+def load_results(
+    run: str | PathLike[str],
+    suite: str | PathLike[str] = "paper",
+    *,
+    ablation: bool = False,
+    price: tuple[float, float] | None = None,
+) -> pl.DataFrame:
+    """The verdicts of a judged run as one table, with a row for each completion and world.
+
+    Args:
+        run: the folder of the run.
+        suite: by which it was judged: a name, or a folder.
+        ablation: whether to take the verdicts on common sense only.
+        price: of a million tokens of input and of output, from which `cost` is reckoned.
+
+    Returns:
+        a table in the order of the completions and of the worlds of their tasks. `task`, `prompt`, `index`,
+        `model`, `program_sha256`, `passed`, the failure (`failure_class`, `failure_kind`, `failure_world`,
+        `failure_check`: the first failure of the completion), `stale` (whether another program stands in the
+        run by now), `input_tokens`, `output_tokens`, `latency_s`, `cost` and `accepted` (whether the check
+        found no problem; null where nobody checked) are the same in all rows of a completion;
+        `world_number`, `world`, `satisfied`, `status`, `error_kind`, `error_message`, `line`,
+        `failed_checks` (joined by "; "), `category` (of the first failed check) and `events` are about the
+        world. Numbers count from 0.
+
+    Raises:
+        BadInput: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
+    """
+    known, folder = load_suite(suite), Run(Path(run))
+    key = evaluation_key(known, ablated=ablation)
+    expect_judged(folder, key)
+    results = read_results(folder, key, known)
+    if price is None:
+        return results.table
+    return results.table.with_columns(
+        cost=(pl.col("input_tokens") * price[0] + pl.col("output_tokens") * price[1]) / 1e6
+    )
+
+
+def expect_judged(run: Run, key: str) -> None:
+    """Refuse what is no run, and one without an evaluation.
+
+    Raises:
+        BadInput: so it is.
+    """
+    if not run.completions.is_file():
+        raise BadInput("is no run: it holds no completions.jsonl", file=run.path)
+    if not run.rows(key).is_file():
+        there = ", ".join(run.judged_by()) or "nothing"
+        raise BadInput(
+            f'has no evaluation "{key}" (there is {there}); `roboeval evaluate` makes it', file=run.path
+        )
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What there is to judge.
+
+    Args:
+        completions: how many there are by task, also of tasks that were not selected.
+        tasks: which were selected; None for all.
+        models: who wrote the completions of those; None where nobody recorded it.
+    """
+
+    completions: Mapping[str, int]
+    tasks: frozenset[str] | None = None
+    models: frozenset[str | None] = frozenset()
+
+    @classmethod
+    def of(cls, completions: Iterable[Completion], tasks: frozenset[str] | None) -> Scope:
+        """Look through completions once."""
+        counts: Counter[str] = Counter()
+        models: set[str | None] = set()
+        for completion in completions:
+            counts[completion.task] += 1
+            if tasks is None or completion.task in tasks:
+                models.add(completion.model)
+        return cls(counts, tasks, frozenset(models))
+
+    @property
+    def total(self) -> int:
+        """How many completions there are to judge."""
+        return sum(n for task, n in self.completions.items() if self.selects(task))
+
+    def selects(self, task: str) -> bool:
+        """Whether a task is to be judged."""
+        return self.tasks is None or task in self.tasks
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """One evaluation of a run.
+
+    Args:
+        run: whose.
+        key: the name of its files.
+        suite: by which it was judged, if it is at hand.
+        head: what KEY.json says: by what was judged.
+        about: what run.json says: how the completions were asked for.
+        completions: those that stand in the run now, in order.
+        table: as `load_results` gives it.
+        failed: the rows of the completions that failed, without the traces of worlds that did not decide.
+        places: where the row of each completion lies in the file: its first byte, and how many.
+        faults: what is wrong with lines of the files, if it was not raised.
+    """
+
+    run: Run
+    key: str | None
+    suite: Suite | None
+    head: Mapping[str, Any]
+    about: Mapping[str, Any]
+    completions: Mapping[Key, Completion]
+    table: pl.DataFrame
+    failed: Mapping[Key, RowData] = field(repr=False)
+    places: Mapping[Key, tuple[int, int]] = field(repr=False)
+    faults: tuple[BadInput, ...] = ()
+
+    @property
+    def tasks(self) -> frozenset[str] | None:
+        """The tasks that were selected; None for all."""
+        return selected_tasks(self.head, self.run.head(self.key or ""))
+
+    @property
+    def scope(self) -> Scope:
+        """What there is to judge."""
+        return Scope.of(self.completions.values(), self.tasks)
+
+    @property
+    def is_ablated(self) -> bool:
+        """Whether common sense only was required."""
+        return (self.key or "").endswith(ABLATED)
+
+    @property
+    def passed(self) -> list[Key]:
+        """The completions that passed."""
+        return [key for key in self.places if key not in self.failed]
+
+    @property
+    def stale(self) -> list[Key]:
+        """The completions whose verdicts are on other programs than stand in the run now."""
+        rows = self.table.filter(pl.col("stale"), pl.col("world_number") == 0)
+        return [*rows.select("task", "prompt", "index").iter_rows()]
+
+    @property
+    def programs(self) -> Mapping[Key, str]:
+        """The programs that were judged, but those that have changed or are gone since."""
+        stale = set(self.stale)
+        return {key: c.program for key, c in self.completions.items() if key not in stale}
+
+    def row(self, key: Key) -> Row:
+        """The row of a completion with all its traces, read again from its place in the file.
+
+        Raises:
+            BadInput: it does not stand there any more.
+        """
+        at, size = self.places[key]
+        path = self.run.rows(self.key or "")
+        try:
+            with path.open("rb") as file:
+                file.seek(at)
+                row: Row = json.loads(file.read(size))
+            if (row["task"], row["prompt"], row["index"]) == key:
+                return row
+        except (OSError, ValueError, LookupError, TypeError, RecursionError):
+            pass
+        raise BadInput("was written anew meanwhile; look again", file=path)
+
+
+def selected_tasks(head: Mapping[str, Any], path: Path) -> frozenset[str] | None:
+    """The tasks that a KEY.json names; None for all.
+
+    Raises:
+        BadInput: somebody wrote something else there.
+    """
+    tasks = head.get("tasks")
+    if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) for task in tasks)):
+        raise BadInput('"tasks" is no list of names; --redo starts over', file=path)
+    return None if tasks is None else frozenset(tasks)
+
+
+def read_results(
+    run: Run,
+    key: str | None,
+    suite: Suite | None = None,
+    *,
+    faults: list[BadInput] | None = None,
+    see: Callable[[bytes], None] | None = None,
+    watch: Callable[[Iterator[Line], int], Iterable[Line]] = lambda lines, _: lines,
+) -> Results:
+    """Read an evaluation of a run; each of its files is read once.
+
+    Args:
+        run: whose.
+        key: the name of the evaluation's files; None where nothing has been judged.
+        suite: by which it was judged, for the categories of failed checks; none are given without it.
+        faults: gets what is wrong with files and lines, which are then left out, rather than that it is
+            raised.
+        see: sees each row's line.
+        watch: passes the lines of the rows on as they are read, and is given how many there are to be.
+
+    Raises:
+        BadInput: a file is missing or damaged.
+    """
+    head = {} if key is None else _head(run.head(key), faults)
+    about = _head(run.about, faults) if run.about.exists() else {}
+    tasks = selected_tasks(head, run.head(key or ""))
+    completions = {
+        (sys.intern(completion.task), completion.prompt, completion.index): completion
+        for completion in read_completions(run.completions, growing=True, faults=faults)
+    }
+    total = sum(tasks is None or task in tasks for task, _, _ in completions)
+    builder = TableBuilder(completions, _categories(suite), _accepted(run, key))
+    places: dict[Key, tuple[int, int]] = {}
+    failed: dict[Key, RowData] = {}
+    lines = iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults)
+    for line in watch(lines, total):
+        builder.add(line.row)
+        places[line.row.key] = line.at, line.size
+        if not line.row.passed:
+            failed[line.row.key] = deciding(line.row)
+    return Results(
+        run=run,
+        key=key,
+        suite=suite,
+        head=head,
+        about=about,
+        completions=completions,
+        table=builder.table(),
+        failed=failed,
+        places=places,
+        faults=tuple(faults or ()),
+    )
+
+
+def _head(path: Path, faults: list[BadInput] | None) -> Mapping[str, Any]:
+    try:
+        return load_head(path)
+    except BadInput as error:
+        if faults is None:
+            raise
+        faults.append(error)
+        return {}
+
+
+def deciding(row: JudgedRow) -> RowData:
+    """A row that keeps only the verdict that decided, of the others the worlds' names; none if it passed."""
+    world = None if row.failure is None else row.failure.world
+    verdicts = [
+        _plain(verdict) if number == world else {"world": verdict.world}
+        for number, verdict in enumerate(row.verdicts)
+    ]
+    rest: dict[str, Any] = {name: getattr(row, name) for name in ROW_NAMES}
+    failure = None if row.failure is None else msgspec.to_builtins(row.failure)
+    return {**rest, "failure": failure, "verdicts": [] if world is None else verdicts}
+
+
+ROW_NAMES = ("task", "prompt", "index", "program_sha256", "passed")
+
+
+def _plain(verdict: WorldVerdict) -> dict[str, Any]:
+    plain = {name: getattr(verdict, name) for name in ("world", "satisfied", "line")}
+    plain["status"] = verdict.status.value
+    plain["error"] = None if verdict.error is None else msgspec.to_builtins(verdict.error)
+    plain["failed_checks"] = list(verdict.failed_checks)
+    plain["trace"] = [json.loads(bytes(event)) for event in verdict.trace]
+    return plain if verdict.cut is msgspec.UNSET else {**plain, "cut": msgspec.to_builtins(verdict.cut)}
+
+
+def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
+    """The category of each requirement, by its task and its text."""
+    tasks = () if suite is None else suite.tasks.values()
+    return {
+        (task.name, requirement.text): requirement.category
+        for task in tasks
+        for scenario in (*task.scenarios, *(task.ablation or ()))
+        for requirement in scenario.require
+    }
+
+
+def _accepted(run: Run, key: str | None) -> Mapping[tuple[str, str], bool]:
+    """Whether the check found no problem, by task and hash of the program, where it was asked."""
+    path = run.checks((key or "").removesuffix(ABLATED))
+    if not path.is_file():
+        return {}
+    rows = (row for _, row in read_rows(path, growing=True))
+    return {(row["task"], row["program_sha256"]): not row["problems"] for row in rows}
+
+
+def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
+    """A table whose `accepted` says what a check says.
+
+    Args:
+        table: as `load_results` gives it.
+        problems: what the check found, by task and hash of the program.
+    """
+    names = ["task", "program_sha256"]
+    answers = [(*key, not found) for key, found in problems.items()]
+    accepted = pl.DataFrame(
+        answers, schema={**dict.fromkeys(names, pl.String), "accepted": pl.Boolean}, orient="row"
+    )
+    joined = table.drop("accepted").join(accepted, on=names, how="left", maintain_order="left")
+    return joined.select(table.columns)
+
+
+class TableBuilder:
+    """Collects rows of an evaluation, column by column.
+
+    Args:
+        completions: those that stand in the run now.
+        categories: of requirements, by task and text.
+        accepted: whether the check found no problem, by task and hash of the program.
+    """
+
+    def __init__(
+        self,
+        completions: Mapping[Key, Completion] = {},
+        categories: Mapping[tuple[str, str], str] = {},
+        accepted: Mapping[tuple[str, str], bool] = {},
+    ) -> None:
+        self._completions, self._categories, self._accepted = completions, categories, accepted
+        self._frame = pl.DataFrame(schema={**COMPLETION_COLUMNS, **WORLD_COLUMNS})
+        self._start()
+
+    def _start(self) -> None:
+        self._rows: list[tuple[Any, ...]] = []
+        self._worlds: list[tuple[Any, ...]] = []
+        self._counts: list[int] = []
+
+    def add(self, row: JudgedRow) -> None:
+        """Add a completion with its verdicts."""
+        if len(self._worlds) >= CHUNK:
+            self._store()
+        written = self._completions.get(row.key)
+        failure = row.failure
+        why: tuple[str | int | None, ...] = (None,) * 4
+        if failure is not None:
+            why = failure.failure_class, failure.kind, failure.world, failure.check
+        self._rows.append(
+            (
+                row.task,
+                row.prompt,
+                row.index,
+                None if written is None else _storable(written.model),
+                row.program_sha256,
+                row.passed,
+                *why,
+                written is None or written.program_sha256 != row.program_sha256,
+                *_usage(written),
+                None,
+                self._accepted.get((row.task, row.program_sha256)),
+            )
+        )
+        self._counts.append(len(row.verdicts))
+        for number, verdict in enumerate(row.verdicts):
+            checks, error = verdict.failed_checks, verdict.error
+            self._worlds.append(
+                (
+                    number,
+                    verdict.world,
+                    verdict.satisfied,
+                    verdict.status.value,
+                    None if error is None else error.kind,
+                    None if error is None else error.message,
+                    verdict.line,
+                    "; ".join(checks) or None,
+                    self._categories.get((row.task, checks[0])) if checks else None,
+                    verdict.events,
+                )
+            )
+
+    def table(self) -> pl.DataFrame:
+        """All that was added, as `load_results` describes it."""
+        self._store()
+        return self._frame.rechunk()
+
+    def _store(self) -> None:
+        completions = pl.DataFrame(self._rows, schema=dict(COMPLETION_COLUMNS), orient="row")
+        worlds = pl.DataFrame(self._worlds, schema=dict(WORLD_COLUMNS), orient="row")
+        each = np.repeat(np.arange(len(self._counts)), self._counts)
+        self._frame.vstack(completions[each].hstack(worlds), in_place=True)
+        self._start()
+
+
+def _usage(written: Completion | None) -> tuple[float | None, ...]:
+    """The tokens of input and of output, and the seconds, of a completion, where they were recorded."""
+    more = {} if written is None else written.more
+    usage = more.get("usage")
+    usage = usage if isinstance(usage, dict) else {}
+    tokens = [_number(usage.get(name), int) for name in ("input_tokens", "output_tokens")]
+    return *tokens, _number(more.get("latency_s"), int | float)
+
+
+def _number(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    return value if is_number and 0 <= value <= MOST else None
+
+
+def _storable(text: str | None) -> str | None:
+    """A text that UTF-8 can hold; half of a surrogate pair is written out as an escape."""
+    return None if text is None else text.encode(errors="backslashreplace").decode()
