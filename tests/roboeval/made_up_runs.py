@@ -9,11 +9,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from roboeval.evaluation.tables import RowData
+
 from codebotler.files import to_line
 from codebotler.simulator.rules import Rules
 from roboeval.analysis.resample import Trial, by_prompt
 from roboeval.evaluation.run import Run
-from roboeval.evaluation.tables import RowData
 from roboeval.report.reading import JudgedRun, Written, scored
 from roboeval.suites.load import Suite
 from seals import unseal

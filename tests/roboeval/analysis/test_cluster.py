@@ -3,10 +3,11 @@
 import json
 from typing import Any
 
-from made_up_runs import SUITE
-from roboeval.analysis.cluster import cluster_data, cluster_view, clusters, groups, trimmed
+from made_results import results_of
+from roboeval.analysis.cluster import cluster_data, clusters, groups
+from roboeval.cli.views.groups import cluster_view
 from roboeval.evaluation.completions import Key
-from small_run import HOSTILE, SHOWN, printed
+from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 GOES = """\
 def task_program():
@@ -65,11 +66,11 @@ def test_same_task_same_check_similar_program() -> None:
 
 
 def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
-    rows = [trimmed(failed(0, n)) for n in range(3)]
+    rows = [failed(0, n) for n in range(3)]
     programs = {("Visit", 0, 0): "pass", ("Visit", 0, 1): program, ("Visit", 0, 2): program}
     programs["Visit", 4, 0] = RIGHT
-    together = [[*rows]]
-    (one,) = clusters(together, [("Visit", 4, 0)], programs, SUITE)
+    results = results_of([*rows, {**row(4, 0), "passed": True}], SUITE, programs)
+    (one,) = clusters([[*results.failed.values()]], results)
     return one
 
 
@@ -92,19 +93,20 @@ def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
     shown = printed(cluster_view(told(f"say({HOSTILE}")), width=200)
     assert SHOWN.removesuffix("\\n") in shown
     assert "\x1b" not in shown
-    assert shown.startswith("3 completions of Visit, TaskCompletionError: Location")
+    assert shown.startswith("3 completions of Visit, failed check: Location")
 
 
 def test_programs_that_are_gone() -> None:
     rows = [failed(0, 0), failed(0, 1)]
-    (group,) = groups(rows, {})
-    (one,) = clusters([group], [], {}, SUITE)
+    results = results_of(rows, SUITE)
+    (group,) = groups(results.failed.values(), results.programs)
+    (one,) = clusters([group], results)
     assert one.program is None
     assert one.fix is None
     assert "no longer stands" in printed(cluster_view(one), width=200)
 
 
 def test_only_the_world_that_decides_keeps_its_trace() -> None:
-    kept = trimmed(failed(0, 0))
+    (kept,) = results_of([failed(0, 0)]).failed.values()
     assert kept["verdicts"][0] == {"world": "w"}
     assert kept["verdicts"][1]["trace"] == [["goto", "hall"]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,21 @@ import polars as pl
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.analysis.export import COLUMNS, kind_of, table, write
+from made_results import results_of
+from roboeval.analysis.export import kind_of, write
 from roboeval.evaluation.completions import Completion
+from roboeval.evaluation.results import COMPLETION_COLUMNS, WORLD_COLUMNS
+from roboeval.evaluation.rows import RowData
 
 PROGRAM = "def task_program():\n    go_to('x')\n"
 COMPLETION = Completion(task="Visit", prompt=1, index=2, program=PROGRAM, model="recorded:careful")
+
+
+COLUMNS = {**COMPLETION_COLUMNS, **WORLD_COLUMNS}
+
+
+def table(rows: Iterable[RowData], completions: Sequence[Completion]) -> pl.DataFrame:
+    return results_of(rows, completions=completions).table
 
 
 def verdict(world: str, **changes: Any) -> dict[str, Any]:  # noqa: ANN401 - parts of a row
@@ -24,7 +35,12 @@ def verdict(world: str, **changes: Any) -> dict[str, Any]:  # noqa: ANN401 - par
 
 
 def row(*verdicts: dict[str, Any]) -> dict[str, Any]:
-    why = {"class": "RobotExecutionError", "kind": "GoToInvalidLocation", "world": 1, "check": None}
+    why = {
+        "class": "RobotExecutionError",
+        "kind": "GoToInvalidLocation",
+        "world": min(1, len(verdicts) - 1),
+        "check": None,
+    }
     return {
         "task": "Visit",
         "prompt": 1,
@@ -60,6 +76,14 @@ def test_each_world_of_a_completion_is_a_row() -> None:
         "passed": False,
         "failure_class": "RobotExecutionError",
         "failure_kind": "GoToInvalidLocation",
+        "failure_world": 1,
+        "failure_check": None,
+        "stale": False,
+        "input_tokens": None,
+        "output_tokens": None,
+        "latency_s": None,
+        "cost": None,
+        "accepted": None,
         "world_number": 1,
         "world": "lost",
         "satisfied": False,
@@ -68,6 +92,7 @@ def test_each_world_of_a_completion_is_a_row() -> None:
         "error_message": 'there is no room "x"',
         "line": 2,
         "failed_checks": None,
+        "category": None,
         "events": 0,
     }
     assert frame["failed_checks"].to_list() == [None, None, 'visits; not greets("amy")']
@@ -75,7 +100,7 @@ def test_each_world_of_a_completion_is_a_row() -> None:
 
 def test_a_passed_row_without_its_completion_has_empty_cells() -> None:
     frame = table([{**row(verdict("in")), "passed": True, "failure": None}], [])
-    assert frame.select("model", "program_sha256", "failure_class", "line").row(0) == (None,) * 4
+    assert frame.select("model", "failure_class", "line", "stale").row(0) == (None, None, None, True)
 
 
 def test_no_rows_are_an_empty_table_with_all_columns(tmp_path: Path) -> None:
@@ -101,8 +126,10 @@ def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
     write(table([row(verdict("in"))], []), tmp_path / "t", "csv")
-    assert (tmp_path / "t").read_bytes().splitlines()[1] == (
-        b"Visit,1,2,,,false,RobotExecutionError,GoToInvalidLocation,0,in,true,finished,,,,,1"
+    (line,) = (tmp_path / "t").read_bytes().splitlines()[1:]
+    assert line.startswith(b"Visit,1,2,,")
+    assert line.endswith(
+        b",false,RobotExecutionError,GoToInvalidLocation,0,,true,,,,,,0,in,true,finished,,,,,,1"
     )
 
 

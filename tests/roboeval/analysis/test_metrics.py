@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from made_results import table_of
 from roboeval.analysis.metrics import (
     Estimate,
     PromptScore,
@@ -14,8 +15,8 @@ from roboeval.analysis.metrics import (
     clustered_interval,
     overall,
     pass_at_k,
-    score_by_prompt,
     t_quantile,
+    task_scores,
 )
 
 COUNTS = st.integers(1, 60).flatmap(
@@ -168,17 +169,29 @@ ROWS = [
     ("A", 0, True),
     ("B", 1, False),
 ]
+TABLE = table_of(
+    {
+        "task": task,
+        "prompt": prompt,
+        "index": index,
+        "passed": passed,
+        "failure": None
+        if passed
+        else {"class": "PythonError", "kind": "KeyError", "world": 0, "check": None},
+    }
+    for index, (task, prompt, passed) in enumerate(ROWS)
+)
 
 
 def test_scores_by_prompt() -> None:
-    b, a = score_by_prompt(ROWS)
+    b, a = task_scores(TABLE)
     assert b == TaskScore("B", (PromptScore("B", 0, 2, 2), PromptScore("B", 1, 3, 1)))
     assert a == TaskScore("A", (PromptScore("A", 0, 2, 1),))
-    assert score_by_prompt([]) == ()
+    assert task_scores(table_of([])) == ()
 
 
 def test_prompts_count_the_same_however_many_completions_they_have() -> None:
-    b, a = score_by_prompt(ROWS)
+    b, a = task_scores(TABLE)
     assert b.pass_at(1) == clustered_interval([1, 1 / 3])
     assert b.pass_at(2).mean == pytest.approx((1 + 2 / 3) / 2)
     assert (b.lowest(1), b.highest(1)) == (1 / 3, 1)
@@ -186,7 +199,7 @@ def test_prompts_count_the_same_however_many_completions_they_have() -> None:
 
 
 def test_a_prompt_with_too_few_completions_is_named() -> None:
-    b, a = score_by_prompt(ROWS)
+    b, a = task_scores(TABLE)
     named = "^B, prompt 0: pass@3 .* 2 completions"
     for score in (b.pass_at, b.lowest, b.highest, lambda k: overall([a, b], k) if k < 3 else b.pass_at(k)):
         with pytest.raises(ValueError, match=named):

@@ -5,17 +5,18 @@ from typing import Any
 
 import pytest
 
+from made_results import table_of
 from roboeval.analysis.resample import (
     LIMITS,
     Chances,
+    CheckedPrompt,
     Trial,
-    by_prompt,
     chances,
     curve_data,
-    ran,
-    render,
     resampled,
+    trials_by_prompt,
 )
+from roboeval.cli.views.groups import resample_view
 from small_run import printed, row
 
 GOOD = Trial(accepted=True, ran=True, passed=True)
@@ -85,12 +86,15 @@ def verdict(status: str, *, satisfied: bool = False, failed: tuple[str, ...] = (
     ],
 )
 def test_what_runs_at_all(verdicts: list[dict[str, Any]], expected: bool) -> None:  # noqa: FBT001 - a table
-    assert ran({**row(0, 0), "verdicts": verdicts}) is expected
+    why = {"class": "TaskCompletionError", "kind": "Location", "world": 0, "check": "greets"}
+    one = {**row(0, 0), "passed": False, "failure": why, "verdicts": verdicts}
+    ((trial,),) = (prompt.trials for prompt in trials_by_prompt(table_of([one])))
+    assert trial.ran is expected
 
 
-PROMPTS = by_prompt(
-    [(("Visit", 1, i), REJECTED) for i in range(4)]
-    + [(("Visit", 0, i), GOOD if i == 0 else REJECTED) for i in range(4)]
+PROMPTS = (
+    CheckedPrompt("Visit", 0, (GOOD, REJECTED, REJECTED, REJECTED)),
+    CheckedPrompt("Visit", 1, (REJECTED,) * 4),
 )
 
 
@@ -122,7 +126,7 @@ def test_data_of_both_figures() -> None:
 
 
 def test_the_table_names_prompts_without_hope() -> None:
-    shown = printed(render(PROMPTS, LIMITS, title="runs/x"))
+    shown = printed(resample_view(PROMPTS, LIMITS, title="runs/x"))
     assert "no completion of 1 prompt " in shown
     assert [line.split()[:2] for line in shown.splitlines() if line.strip()[:1].isdigit()] == [
         ["0", "0.125"],

@@ -6,11 +6,10 @@ from typing import Any
 
 import pytest
 
-from codebotler.badinput import BadInput
 from codebotler.files import to_line
 from command_line import refused, roboeval
 from roboeval.analysis import search as searching
-from roboeval.analysis.search import Found, Question, search
+from roboeval.analysis.search import Found, Question, Search
 
 
 def row(index: int, *traces: list[list[object]], passed: bool = False, task: str = "Visit") -> dict[str, Any]:
@@ -32,7 +31,14 @@ ROWS = [
 
 
 def found(question: Question, rows: list[dict[str, Any]] | None = None) -> list[Found]:
-    return [one for one in search(map(to_line, ROWS if rows is None else rows), question) if one.worlds]
+    return [one for one in search(ROWS if rows is None else rows, question) if one.worlds]
+
+
+def search(rows: list[dict[str, Any]], question: Question, *, workers: int = 1) -> list[Found]:
+    searching = Search(question, workers=workers)
+    for one in rows:
+        searching.see(to_line(one))
+    return [*searching.found()]
 
 
 HALL = 'tr.Exists(goto("hall"))'
@@ -55,10 +61,6 @@ def test_narrowed_to_a_task_or_a_world() -> None:
     assert len(found(Question())) == 4
 
 
-def test_only_failures_bring_their_rows() -> None:
-    assert [one.row is None for one in found(Question(HALL))] == [False, True, False]
-
-
 def test_what_cannot_be_judged_does_not_match() -> None:
     asks = row(0, [["ask", "tea?", [{"no text": "1"}], None]])
     formula = 'tr.Exists(ask("tea", "yes"))'
@@ -70,14 +72,7 @@ def test_other_processes_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(searching, "BATCH", 3)
     monkeypatch.setattr(searching, "SMALL", 2)
     rows = [{**ROWS[n % 4], "index": n} for n in range(50)]
-    lines = list(map(to_line, rows))
-    assert list(search(lines, Question(HALL), workers=2)) == list(search(lines, Question(HALL)))
-
-
-@pytest.mark.parametrize("line", [b"{}\n", b"x\n", b"[]\n", to_line({**ROWS[0], "verdicts": [{}]})])
-def test_a_line_that_is_no_row(line: bytes) -> None:
-    with pytest.raises(BadInput, match="no row"):
-        list(search([line], Question(HALL)))
+    assert search(rows, Question(HALL), workers=2) == search(rows, Question(HALL))
 
 
 # --- the command

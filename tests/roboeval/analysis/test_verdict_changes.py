@@ -12,33 +12,59 @@ import pytest
 
 from codebotler.badinput import BadInput
 from command_line import Ended, refused, roboeval
-from made_up_runs import PROGRAM, SUITE, made_up
+from made_results import results_of
 from roboeval.analysis.verdict_changes import (
-    Judged,
-    Reversals,
+    VerdictChanges,
+    changes_data,
     overtakings,
     place,
-    render,
-    reversals,
-    reversals_data,
     said,
     said_of_order,
     said_of_prompts,
 )
-from roboeval.report import beside
-from small_run import HOSTILE, SHOWN, printed
+from roboeval.cli.views.comparison import changes_view
+from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 STRICT = replace(SUITE, name="strict")
+PROGRAM = 'def task_program():\n    say("hello")\n'
+FAILURES = (
+    ("PythonError", "NameError"),
+    ("PythonError", "ZeroDivisionError"),
+    ("RobotExecutionError", "GoToInvalidLocation"),
+    ("RobotExecutionError", "PickInvalidObject"),
+    ("TaskCompletionError", "SayAtLocation"),
+    ("TaskCompletionError", "InitialTerminal"),
+    ("TaskCompletionError", "EventOrdering"),
+)
 Passes = Mapping[str, tuple[int, ...]]
 
 
-def judged(passes: Passes, *, strictly: bool = False) -> Judged:
-    return Judged.of(made_up("a", passes).rows, STRICT if strictly else SUITE)
+def judged(passes: Passes, *, strictly: bool = False) -> Results:
+    """Ten completions a prompt, of which so many pass; the others fail by all kinds in turn."""
+    rows = [
+        one(task, prompt, index, passed=index < passed)
+        for task, prompts in passes.items()
+        for prompt, passed in enumerate(prompts)
+        for index in range(10)
+    ]
+    return results_of(rows, STRICT if strictly else SUITE, {key_of(row): PROGRAM for row in rows})
 
 
-def changed(first: Passes, second: Passes, *, name: str = "a") -> Reversals:
-    loose, strict = judged(first), judged(second, strictly=True)
-    return reversals(name, loose, strict, dict.fromkeys(loose.keys | strict.keys, PROGRAM))
+def one(task: str, prompt: int, index: int, *, passed: bool) -> RowData:
+    name, kind = FAILURES[(index + 3 * prompt) % len(FAILURES)]
+    check = f"{kind.lower()}()" if name == "TaskCompletionError" else None
+    error = None if check else {"kind": kind, "message": f"{kind} it is"}
+    why = None if passed else {"class": name, "kind": kind, "world": 0, "check": check}
+    verdict = {
+        "satisfied": passed,
+        "error": None if passed else error,
+        "failed_checks": [check] if check else [],
+    }
+    return {**row(prompt, index, task=task), "passed": passed, "failure": why, "verdicts": [verdict]}
+
+
+def changed(first: Passes, second: Passes, *, name: str = "a") -> VerdictChanges:
+    return verdict_changes(name, judged(first), judged(second, strictly=True))
 
 
 def test_counted_by_hand() -> None:
@@ -72,7 +98,7 @@ def test_nothing_changes() -> None:
     found = changed({"Visit": (3,)}, {"Visit": (3,)})
     assert (found.first_only, found.second_only) == ((), ())
     assert re.search(r"\bsmall and strict agree .*\b10\b", said(found))
-    assert "only, and what" not in printed(render([found], most=3))
+    assert "only, and what" not in printed(changes_view([found], most=3))
 
 
 def test_what_one_suite_has_not_judged_is_left_out() -> None:
@@ -84,7 +110,7 @@ def test_what_one_suite_has_not_judged_is_left_out() -> None:
     assert error.value.file == "a"
 
 
-def runs(**scores: tuple[int, int]) -> list[Reversals]:
+def runs(**scores: tuple[int, int]) -> list[VerdictChanges]:
     return [changed({"Visit": (a,)}, {"Visit": (b,)}, name=name) for name, (a, b) in scores.items()]
 
 
@@ -128,57 +154,14 @@ def test_runs_about_different_prompts_are_warned_of() -> None:
 
 def test_what_a_model_wrote_and_is_called_does_no_harm() -> None:
     found = replace(changed({"Visit": (3,)}, {"Visit": (1,)}), name=HOSTILE)
-    assert "".join(SHOWN.split()) in "".join(printed(render([found, found], most=1), 300).split())
-    assert "\x1b[2J" not in printed(render([found], most=1))
+    assert "".join(SHOWN.split()) in "".join(printed(changes_view([found, found], most=1), 300).split())
+    assert "\x1b[2J" not in printed(changes_view([found], most=1))
 
 
 def test_the_largest_groups_are_shown() -> None:
     found = changed({"Visit": (10,)}, {"Visit": (0,)})
-    assert re.search(r"\b6 smaller groups\b.* --groups\b", printed(render([found], most=1)))
-    assert "smaller groups" not in printed(render([found], most=7))
-
-
-def as_dicts(name: str, found: list[Reversals]) -> list[dict[str, Any]]:
-    (table,) = (table for table in beside.sheets(found) if table.name == name)
-    heads = [column.head for column in table.columns]
-    return [dict(zip(heads, row, strict=True)) for row in table.rows]
-
-
-def test_tables_of_the_report() -> None:
-    found = runs(a=(9, 3), b=(5, 5))
-    a, b = as_dicts("beside", found)
-    assert (a["pass@1"], a["pass@1 beside"], a["place"], a["place beside"]) == (0.9, 0.3, 1, 2)
-    assert a["difference"] == pytest.approx(-0.6)
-    assert (b["place"], b["place beside"]) == (2, 1)
-    assert as_dicts("beside-tasks", found)[0] == {
-        "task": "Visit",
-        "model": "a",
-        "both": 3,
-        "here only": 6,
-        "beside only": 0,
-        "neither": 1,
-    }
-    groups = as_dicts("reversals", found)
-    assert sum(group["completions"] for group in groups) == 6
-    assert {group["passes"] for group in groups} == {"small only"}
-
-
-def test_a_report_shows_the_largest_groups_and_says_how_many_it_leaves_out(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(beside, "MOST", 2)
-    found = changed({"Visit": (10, 0)}, {"Visit": (0, 1)})
-    (table,) = (table for table in beside.sheets([found]) if table.name == "reversals")
-    sizes = [group["completions"] for group in as_dicts("reversals", [found])]
-    assert sizes == [2, 2]
-    assert table.notes[0].startswith("a: 6 smaller groups ")
-
-
-def test_a_report_reads_both_evaluations() -> None:
-    run = made_up("a", {"Visit": (9,)}, beside=judged({"Visit": (4,)}, strictly=True))
-    (found,) = beside.reversed_in([run, made_up("b", {"Visit": (9,)})], SUITE)
-    assert found.suites == ("small", "strict")
-    assert sum(len(one.members) for one in found.first_only) == 5
+    assert re.search(r"\b6 smaller groups\b.* --groups\b", printed(changes_view([found], most=1)))
+    assert "smaller groups" not in printed(changes_view([found], most=7))
 
 
 @pytest.fixture(scope="module")
@@ -271,6 +254,6 @@ def test_a_suite_that_has_not_judged_is_named(tmp_path: Path) -> None:
 
 
 def test_data_of_several_runs() -> None:
-    data = reversals_data(runs(a=(9, 3), b=(5, 5)))
+    data = changes_data(runs(a=(9, 3), b=(5, 5)))
     assert [run["places"] for run in data["runs"]] == [[1, 2], [2, 1]]
     assert data["overtakings"][0]["one"] == "b"

@@ -526,7 +526,7 @@ def test_commands_in_sentences_can_be_pasted(tmp_path: Path) -> None:
     judged = pasted(imported.err, tmp_path)
     assert judged.status == 0
     shown = pasted(judged.err, tmp_path)
-    assert shown.out.startswith("MakeTea/0/0  TaskCompletionError")
+    assert shown.out.startswith("MakeTea/0/0  failed check")
 
 
 def test_commands_in_sentences_name_a_command_that_a_shell_would_not_find(tmp_path: Path) -> None:
@@ -649,8 +649,8 @@ def test_a_row_that_is_none_gets_a_sentence(tmp_path: Path) -> None:
     rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
     for line, fault in [
         ('{"task": "SayGoodDay"}', "row of an evaluation"),
-        ("?", "JSON;"),
-        ("[]", "JSON object"),
+        ("?", "JSON is malformed"),
+        ("[]", "Expected `object`"),
     ]:
         rows.write_text(f"{line}\n")
         refusal = refused("show", "run", cwd=tmp_path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,24 +12,20 @@ from typing import Any
 import pytest
 from rich.console import Console, RenderableType
 
-from codebotler.badinput import BadInput
 from codebotler.rtl import Explanation, Formula, explain, parse
 from codebotler.simulator.rules import Rules
 from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.world import Person, Room, World
+from made_results import results_of
+from roboeval.analysis.tasks import prompt_data, task_data
+from roboeval.cli.views.completions import completion_view as view_of_completion
+from roboeval.cli.views.completions import prompt_view
+from roboeval.cli.views.results import task_view
 from roboeval.evaluation.completions import Completion
-from roboeval.evaluation.explanation import (
-    Selection,
-    completion_data,
-    completion_view,
-    prompt_data,
-    prompt_view,
-    task_data,
-    task_view,
-    view,
-    view_data,
-)
+from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.judge import evaluation, judge, judgement
+from roboeval.evaluation.results import Results
+from roboeval.evaluation.rows import RowData
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800"
@@ -89,6 +86,14 @@ def printed(renderable: RenderableType, width: int = 80, *, colour: bool = False
     return "\n".join(line.rstrip() for line in captured.get().splitlines())
 
 
+def completion_view(row: RowData, written: Completion | None, suite: Suite) -> RenderableType:
+    return view_of_completion(completion_data(row, written, suite))
+
+
+def results(rows: Sequence[RowData], written: Sequence[Completion], *, ablated: bool = False) -> Results:
+    return results_of(rows, SUITE, completions=written, ablated=ablated)
+
+
 # --- a prompt
 
 
@@ -98,7 +103,7 @@ ROWS = [row(c, o, FINE) for c, o in zip(THREE, [FINE, FINE, MUTE, LOST], strict=
 
 
 def test_a_prompt_groups_equal_programs_and_gives_reasons() -> None:
-    data = prompt_data(ROWS, THREE, SUITE, "Visit", 0)
+    data = prompt_data(results(ROWS, THREE), "Visit", 0)
     json.dumps(data)
     assert (data["completions"], data["passed"], data["pass@1"]) == (4, 2, 0.5)
     assert [program["indices"] for program in data["programs"]] == [[0, 1], [2], [3]]
@@ -109,19 +114,14 @@ def test_a_prompt_groups_equal_programs_and_gives_reasons() -> None:
 
 
 def test_a_prompt_is_shown_line_by_line() -> None:
-    text = printed(prompt_view(ROWS, THREE, SUITE, "Visit", 0), 160)
+    text = printed(prompt_view(prompt_data(results(ROWS, THREE), "Visit", 0)), 160)
     assert text.startswith(
         "Visit/0  2 of 4 passed (pass@1 0.50)\ninstruction not recorded\n\n  0  x2  passed\n"
     )
-    assert '  2  TaskCompletionError: Location in "amy is in"\n     greets("amy"): ' in text
+    assert '  2  failed check: Location in "amy is in"\n     greets("amy"): ' in text
     assert (
-        '  3  RobotExecutionError: GoToInvalidLocation in "amy is in"\n     line 2: there is no room "moon"'
+        '  3  robot error: GoToInvalidLocation in "amy is in"\n     line 2: there is no room "moon"'
     ) in text
-
-
-def test_a_prompt_without_rows_is_an_error() -> None:
-    with pytest.raises(BadInput, match=r"\bVisit/0\b"):
-        prompt_view([], [], SUITE, "Visit", 0)
 
 
 # --- a completion
@@ -142,7 +142,7 @@ def test_a_completion_is_shown_world_by_world() -> None:
         Event("wave", "amy"),
     )
     text = printed(completion_view(row(written, Outcome(Status.FINISHED, trace)), written, SUITE), 110)
-    assert text.startswith("Visit/0/0  TaskCompletionError: Location\nwritten by m\nVisit her.\n\n")
+    assert text.startswith("Visit/0/0  failed check: Location\nwritten by m\nVisit her.\n\n")
     assert "  1 go_to('office')\n  2 say('hello')\n" in text
     story = """World 1 of 1: amy is in
 not satisfied, finished
@@ -174,7 +174,7 @@ def test_an_error_without_a_message_is_told_by_its_kind_and_line() -> None:
         full = row(completion(), failed(Status.KILLED, "MemoryError", "", line=line))
         text = printed(completion_view(full, completion(), SUITE))
         assert f"\nnot satisfied, killed: MemoryError{where}\n" in text
-        text = printed(prompt_view([full], [completion()], SUITE, "Visit", 0))
+        text = printed(prompt_view(prompt_data(results([full], [completion()]), "Visit", 0)))
         assert text.endswith('MemoryError in "amy is in"' + ("\n     line 2" if line else ""))
 
 
@@ -197,8 +197,8 @@ def test_of_a_prompt_it_is_said_what_is_gone_and_what_was_not_recorded() -> None
     gone, unknown = "no longer stand in this run", "instruction not recorded"
     for written, told, untold in ([], gone, unknown), (THREE[:1], unknown, gone):
         for text in (
-            printed(task_view(ROWS, written, SUITE, "Visit")),
-            printed(prompt_view(ROWS, written, SUITE, "Visit", 0)),
+            printed(task_view(task_data(results(ROWS, written), "Visit"))),
+            printed(prompt_view(prompt_data(results(ROWS, written), "Visit", 0))),
         ):
             assert told in text
             assert untold not in text
@@ -225,7 +225,7 @@ def test_an_ablation_is_explained_by_its_own_requirements() -> None:
     only = row(completion(), MUTE, ablated=True)
     data = completion_data(only, completion(), SUITE, ablated=True)
     assert '"bye"' in data["worlds"][0]["failed_checks"][0]["explanation"]
-    of_prompt = prompt_data([only], [completion()], SUITE, "Visit", 0, ablated=True)
+    of_prompt = prompt_data(results([only], [completion()], ablated=True), "Visit", 0)
     assert '"bye"' in of_prompt["programs"][0]["explanation"]
 
 
@@ -304,8 +304,8 @@ def test_nothing_a_model_wrote_reaches_the_terminal_as_more_than_text(*, colour:
     for one in rows:
         views = [
             completion_view(one, written, SUITE),
-            prompt_view([one], [written], SUITE, "Visit", 0),
-            task_view([one], [written], SUITE, "Visit"),
+            prompt_view(prompt_data(results([one], [written]), "Visit", 0)),
+            task_view(task_data(results([one], [written]), "Visit")),
         ]
         for shown in views:
             text = printed(shown, 400, colour=colour)
@@ -315,30 +315,15 @@ def test_nothing_a_model_wrote_reaches_the_terminal_as_more_than_text(*, colour:
             assert colour or "\x1b" not in text
 
 
-# --- the way in
-
-
-def test_a_selection_opens_its_view() -> None:
-    for selection, begin in [
-        (Selection("Visit"), "Visit\nVisit Amy.\n"),
-        (Selection("Visit", 0), "Visit/0  2 of 4 passed"),
-        (Selection("Visit", 0, 2), "Visit/0/2  TaskCompletionError: Location"),
-    ]:
-        assert printed(view(selection, ROWS, THREE, SUITE)).startswith(begin)
-    with pytest.raises(BadInput, match="Visit/0/9"):
-        view(Selection("Visit", 0, 9), ROWS, THREE, SUITE)
-
-
-def test_a_selection_as_data_is_what_its_view_shows() -> None:
-    assert view_data(Selection("Visit"), ROWS, THREE, SUITE) == task_data(ROWS, THREE, SUITE, "Visit")
-    assert view_data(Selection("Visit", 0), ROWS, THREE, SUITE) == prompt_data(ROWS, THREE, SUITE, "Visit", 0)
-    assert view_data(Selection("Visit", 0, 2), ROWS, THREE, SUITE)["program"] == "mute"
-
-
 @pytest.mark.parametrize("width", [80, 120])
 def test_views_fit_the_width(width: int) -> None:
-    for selection in (Selection("Visit"), Selection("Visit", 0), Selection("Visit", 0, 2)):
-        text = printed(view(selection, ROWS, THREE, SUITE), width)
+    judged = results(ROWS, THREE)
+    for view in (
+        task_view(task_data(judged, "Visit")),
+        prompt_view(prompt_data(judged, "Visit", 0)),
+        completion_view(ROWS[2], THREE[2], SUITE),
+    ):
+        text = printed(view, width)
         assert max(map(len, text.splitlines())) <= width
 
 

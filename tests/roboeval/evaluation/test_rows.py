@@ -12,14 +12,12 @@ import pytest
 
 from codebotler.badinput import BadInput
 from codebotler.files import to_line
-from roboeval.analysis.search import Question, search
-from roboeval.evaluation.completions import Row
+from roboeval.analysis.search import Question, Search
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.evaluation import Evaluation
-from roboeval.evaluation.rows import row_of
+from roboeval.evaluation.results import Results, read_results
+from roboeval.evaluation.rows import JudgedRow
 from roboeval.evaluation.run import Run
 from roboeval.suites.load import Suite
-from roboeval.web.followed import FollowedRun
 from seals import unseal
 
 PLACES = 60
@@ -34,8 +32,12 @@ def completions(run: Run, count: int) -> None:
     run.completions.write_bytes(b"".join(map(to_line, rows)))
 
 
-def judged(run: Run, suite: Suite) -> list[Row]:
+def judged(run: Run, suite: Suite) -> list[JudgedRow]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=False))
+
+
+def read(run: Run, **how: Any) -> Results:  # noqa: ANN401 - as read_results takes it
+    return read_results(run, "paper", **how)
 
 
 @pytest.fixture(scope="module")
@@ -63,30 +65,28 @@ def head(run: Run) -> dict[str, Any]:
 def test_a_finished_evaluation_says_how_many_rows_it_has_and_their_hash(run: Run) -> None:
     content = run.rows("paper").read_bytes()
     assert (head(run)["rows"], head(run)["sha256"]) == (3, hashlib.sha256(content).hexdigest())
-    assert len(list(Evaluation(run, "paper").rows())) == 3
+    assert len(read(run).places) == 3
 
 
 def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
     path = run.rows("paper")
     content = path.read_bytes()
     readers: dict[str, Callable[[], object]] = {
-        "rows": lambda: list(Evaluation(run, "paper").rows()),
-        "find": lambda: list(
-            Evaluation(run, "paper").read_by(lambda lines: search(lines, Question('tr.Exists(say("x"))')))
-        ),
+        "results": lambda: read(run),
+        "find": lambda: read(run, see=Search(Question('tr.Exists(say("x"))')).see),
         "evaluate": lambda: judged(run, paper),
     }
     for number in range(PLACES):
         flipped = bytearray(content)
         flipped[number * (len(content) - 1) // (PLACES - 1)] ^= 1 << number % 8
-        for name, read in readers.items():
+        for name, reading in readers.items():
             path.write_bytes(flipped)
             with pytest.raises(BadInput) as caught:
-                read()
+                reading()
             assert caught.value.file == path, (number, name)
             assert "--redo" in caught.value.sentence
         path.write_bytes(flipped)
-        assert FollowedRun(run, "paper", run.path.resolve()).wait().fault_count > 0, number
+        assert read(run, faults=[]).faults, number
 
 
 def test_rows_that_are_missing_or_too_many_are_noticed(run: Run) -> None:
@@ -94,14 +94,14 @@ def test_rows_that_are_missing_or_too_many_are_noticed(run: Run) -> None:
     for damaged in (lines[:2], [*lines, lines[0]], [*lines, b'{"torn'], [lines[1], lines[0], lines[2]]):
         run.rows("paper").write_bytes(b"".join(damaged))
         with pytest.raises(BadInput, match="--redo"):
-            list(Evaluation(run, "paper").rows())
+            read(run)
 
 
 def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: Run, paper: Suite) -> None:
     sealed = run.head("paper").read_bytes()
     unseal(run.path)
-    assert len(list(Evaluation(run, "paper").rows())) == 3
-    assert FollowedRun(run, "paper", run.path.resolve()).wait().fault_count == 0
+    assert len(read(run).places) == 3
+    assert read(run, faults=[]).faults == ()
     judged(run, paper)
     assert run.head("paper").read_bytes() == sealed
 
@@ -109,10 +109,10 @@ def test_an_evaluation_of_an_earlier_version_is_read_and_gets_its_seal(run: Run,
 def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: Run, paper: Suite) -> None:
     completions(run, 5)
     rows = evaluate_run(run, paper, ablated=False, tasks=None, redo=False)
-    assert [next(rows)["index"] for _ in range(4)] == [0, 1, 2, 3]
+    assert [next(rows).index for _ in range(4)] == [0, 1, 2, 3]
     rows.close()  # type: ignore[attr-defined]  # of a generator
     assert not {"rows", "sha256"} & head(run).keys()
-    assert len(list(Evaluation(run, "paper").rows())) == 4
+    assert len(read(run).places) == 4
     judged(run, paper)
     content = run.rows("paper").read_bytes()
     assert (head(run)["rows"], head(run)["sha256"]) == (5, hashlib.sha256(content).hexdigest())
@@ -134,17 +134,14 @@ def test_who_goes_on_takes_the_seal_away_until_all_is_judged(run: Run, paper: Su
 )
 def test_what_is_unknown_in_a_row_is_refused_with_its_line(run: Run, place: Parts, value: object) -> None:
     rows = [json.loads(line) for line in run.rows("paper").read_bytes().splitlines()]
-    assert rows == [*map(row_of, rows)]
     inner = rows[1]
     for part in place[:-1]:
         inner = inner[part]
     inner[place[-1]] = value
     run.rows("paper").write_bytes(b"".join(map(to_line, rows)))
     unseal(run.path)
-    evaluation = Evaluation(run, "paper")
-    for reading in (evaluation.rows(), evaluation.read_by(lambda lines: search(lines, Question()))):
-        with pytest.raises(BadInput) as caught:
-            list(reading)
-        assert (caught.value.file, caught.value.line) == (run.rows("paper"), 2)
-    (fault,) = FollowedRun(run, "paper", run.path.resolve()).wait().faults
-    assert "line 2" in fault
+    with pytest.raises(BadInput) as caught:
+        read(run)
+    assert (caught.value.file, caught.value.line) == (run.rows("paper"), 2)
+    (fault,) = read(run, faults=[]).faults
+    assert fault.line == 2

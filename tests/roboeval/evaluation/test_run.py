@@ -1,5 +1,6 @@
 """A run survives interruptions, refuses what does not fit, and gives the same bytes each time."""
 
+import hashlib
 import json
 import random
 import re
@@ -17,8 +18,9 @@ from typer.testing import CliRunner
 from codebotler.badinput import BadInput
 from codebotler.files import read_rows, to_line
 from roboeval.cli.app import app
-from roboeval.evaluation.completions import Completion, Row, read_completions, recorded_completions
+from roboeval.evaluation.completions import Completion, read_completions, recorded_completions
 from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.rows import JudgedRow
 from roboeval.evaluation.run import Run, Source, open_source, tasks_to_judge
 from roboeval.evaluation.timelimit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Suite, load_suite
@@ -39,7 +41,7 @@ def a_run(path: Path, programs: list[str], task: str = "SayGoodDay") -> Run:
     return run
 
 
-def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[Row]:
+def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[JudgedRow]:
     return list(evaluate_run(run, suite, ablated=False, tasks=None, redo=redo, workers=2))
 
 
@@ -61,6 +63,7 @@ def test_an_evaluation_has_the_files_and_rows_of_the_design(tmp_path: Path, pape
         "task": "SayGoodDay",
         "prompt": 0,
         "index": 0,
+        "program_sha256": hashlib.sha256(GREETS.encode()).hexdigest(),
         "passed": False,
         "failure": {
             "class": "TaskCompletionError",
@@ -93,7 +96,7 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
         *[f"{GREETS}\n# {n}\n" + "x = [0] * " + str(n * 1000) for n in range(20)],
         ADDRESS + "#",
     ]
-    results, hashes = [], []
+    results = []
     for workers in (1, 4):
         run = a_run(tmp_path / f"run{workers}", programs)
         script = (
@@ -105,11 +108,8 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
             f"workers={workers}): pass\n"
         )
         subprocess.run([sys.executable, "-c", script], check=True)
-        assert run.programs("paper").read_bytes().count(b"\n") == len(programs)
         results.append(run.rows("paper").read_bytes())
-        hashes.append(run.programs("paper").read_bytes())
     assert results[0] == results[1]
-    assert hashes[0] == hashes[1]
     said = [event[1] for event in json.loads(results[0].splitlines()[0])["verdicts"][0]["trace"]]
     assert said[0].startswith("<object object at 0x")
 
@@ -140,7 +140,6 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     assert kills >= 3
     rows = judged(run, paper)
     assert run.rows("paper").read_bytes() == whole.rows("paper").read_bytes()
-    assert run.programs("paper").read_bytes() == whole.programs("paper").read_bytes()
     assert run.head("paper").read_bytes() == whole.head("paper").read_bytes()
     assert len(rows) == sum(1 for _ in read_completions(run.completions))
 
@@ -156,42 +155,16 @@ def test_a_torn_last_row_is_judged_again(tmp_path: Path, paper: Suite, cut: int)
     assert run.rows("paper").read_bytes() == whole
 
 
-@pytest.mark.parametrize("more", ["0" * 64 + "\n", "0" * 30, ""])
-def test_a_hash_that_a_crash_left_without_its_row_is_dropped(tmp_path: Path, paper: Suite, more: str) -> None:
-    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
-    judged(run, paper)
-    rows, hashes = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
-    run.rows("paper").write_bytes(b"".join(rows.splitlines(keepends=True)[:2]))
-    run.programs("paper").write_bytes(hashes[:130] + more.encode())
-    unseal(run.path)
-    judged(run, paper)
-    assert run.rows("paper").read_bytes() == rows
-    assert run.programs("paper").read_bytes() == hashes
-
-
-@pytest.mark.parametrize("left", [0, 64, 65, 100])
-def test_a_row_without_the_hash_of_its_program_is_judged_again(
-    tmp_path: Path, paper: Suite, left: int
-) -> None:
-    run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
-    judged(run, paper)
-    rows, hashes = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
-    run.programs("paper").write_bytes(hashes[:left])
-    assert len(judged(run, paper)) == 3
-    assert run.rows("paper").read_bytes() == rows
-    assert run.programs("paper").read_bytes() == hashes
-
-
 def test_a_program_that_was_changed_is_refused_unless_all_is_redone(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS, GREETS + "#1", GREETS + "#2"])
     judged(run, paper)
     kept = run.completions.read_bytes()
     run.completions.write_bytes(kept.replace(b"#1", b"#one"))
-    before = run.rows("paper").read_bytes(), run.programs("paper").read_bytes()
+    before = run.rows("paper").read_bytes()
     with pytest.raises(BadInput, match=r"SayGoodDay/0/1 .* --redo") as error:
         judged(run, paper)
     assert (error.value.file, error.value.line) == (run.rows("paper"), 2)
-    assert before == (run.rows("paper").read_bytes(), run.programs("paper").read_bytes())
+    assert run.rows("paper").read_bytes() == before
     run.completions.write_bytes(kept)
     assert len(judged(run, paper)) == 3
     run.completions.write_bytes(kept.replace(b"#1", b"#one"))
@@ -227,7 +200,7 @@ def test_completions_that_come_later_are_judged_later(tmp_path: Path, paper: Sui
     judged(run, paper)
     with run.completions.open("ab") as file:
         file.write(to_line({"task": "SayGoodDay", "prompt": 1, "index": 0, "program": GREETS}))
-    assert [row["prompt"] for row in judged(run, paper)] == [0, 1]
+    assert [row.prompt for row in judged(run, paper)] == [0, 1]
 
 
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
@@ -403,7 +376,7 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
     run = a_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
 
     monkeypatch.setattr("roboeval.evaluation.judge.BUDGET", 0.001)
-    assert [row["index"] for row in judged(run, suite)] == [1, 3]
+    assert [row.index for row in judged(run, suite)] == [1, 3]
     assert [
         record.getMessage().split()[0]
         for record in caplog.records
@@ -413,8 +386,8 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
     assert result.exit_code == 1
 
     monkeypatch.undo()
-    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
-    assert [row["index"] for row in judged(run, suite)] == [1, 3, 0, 2]
+    assert [row.index for row in judged(run, suite)] == [1, 3, 0, 2]
+    assert [row.index for row in judged(run, suite)] == [1, 3, 0, 2]
 
 
 def test_other_threads_know_no_limit() -> None:

@@ -1,0 +1,87 @@
+"""Results of rows that are written in a test."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from codebotler.files import to_line
+from roboeval.evaluation.completions import Completion, Key
+from roboeval.evaluation.results import Results, TableBuilder, deciding
+from roboeval.evaluation.rows import JudgedRow, RowData, judged_row, key_of
+from roboeval.evaluation.run import Run
+from roboeval.suites.load import Suite
+
+VERDICT = {
+    "world": "w",
+    "satisfied": True,
+    "status": "finished",
+    "error": None,
+    "line": None,
+    "failed_checks": [],
+    "trace": [],
+}
+
+
+def judged_rows(rows: Iterable[RowData], programs: Mapping[Key, str] = {}) -> list[JudgedRow]:
+    """Rows as they are read; what a test leaves out is filled in."""
+    return [judged_row(to_line(_whole(row, programs.get(key_of(row), "")))) for row in rows]
+
+
+def _whole(row: RowData, program: str) -> dict[str, Any]:
+    failure = row.get("failure")
+    least = 1 if failure is None else failure["world"] + 1
+    verdicts = [{**VERDICT, **verdict} for verdict in row.get("verdicts", ())]
+    verdicts += [{**VERDICT, "satisfied": failure is None}] * (least - len(verdicts))
+    made = Completion(task="T", prompt=0, index=0, program=program).program_sha256
+    return {"program_sha256": made, **row, "failure": failure, "verdicts": verdicts}
+
+
+def table_of(rows: Iterable[RowData]) -> pl.DataFrame:
+    """The table of some rows."""
+    builder = TableBuilder()
+    for row in judged_rows(rows):
+        builder.add(row)
+    return builder.table()
+
+
+def results_of(
+    rows: Iterable[RowData],
+    suite: Suite | None = None,
+    programs: Mapping[Key, str] = {},
+    *,
+    completions: Iterable[Completion] = (),
+    ablated: bool = False,
+    head: Mapping[str, Any] = {},
+) -> Results:
+    """What was judged, as if it had been read from a run.
+
+    Args:
+        rows: of the evaluation.
+        suite: by which they were judged.
+        programs: what was judged; a completion without one is gone.
+        completions: the same with all there is to say of them.
+        ablated: whether common sense only was required.
+        head: what KEY.json says.
+    """
+    written = {one.key: one for one in completions}
+    for (task, prompt, index), program in programs.items():
+        written[task, prompt, index] = Completion(task=task, prompt=prompt, index=index, program=program)
+    judged = judged_rows(rows, {key: one.program for key, one in written.items()})
+    builder = TableBuilder(written)
+    for row in judged:
+        builder.add(row)
+    return Results(
+        run=Run(Path("nowhere")),
+        key=f"paper{'-ablation' * ablated}",
+        suite=suite,
+        head=head,
+        about={},
+        completions=written,
+        table=builder.table(),
+        failed={row.key: deciding(row) for row in judged if not row.passed},
+        places={row.key: (0, 0) for row in judged},
+    )
