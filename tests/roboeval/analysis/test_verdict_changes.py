@@ -21,8 +21,11 @@ from roboeval.analysis.verdict_changes import (
     said,
     said_of_order,
     said_of_prompts,
+    verdict_changes,
 )
 from roboeval.cli.views.comparison import changes_view
+from roboeval.evaluation.results import Results
+from roboeval.evaluation.rows import RowData, key_of
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 STRICT = replace(SUITE, name="strict")
