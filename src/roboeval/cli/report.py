@@ -20,7 +20,10 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.results import Results
     from roboeval.report.reading import JudgedRun
 
 
@@ -101,7 +104,14 @@ def judged_run(opened: Opened, suite: str, *, beside: str | None, engine: OpenEn
         ablated = open_current(run.path, suite, ablated=True).results
     return JudgedRun.of(
         results,
-        table=None if engine is None else checked(results, engine=engine),
+        table=unchecked(results) if engine is None else checked(results, engine=engine),
         ablated=ablated,
         beside=None if beside is None else open_current(run.path, beside, ablated=False).results,
     )
+
+
+def unchecked(results: Results) -> pl.DataFrame:
+    """The table of a run without what a check said of its programs."""
+    import polars as pl
+
+    return results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))

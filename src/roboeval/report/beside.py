@@ -7,18 +7,16 @@ from typing import Any
 
 from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.verdict_changes import (
-    Judged,
-    Reversals,
+    VerdictChanges,
     place,
-    reversals,
     said,
     said_of_order,
     said_of_prompts,
+    verdict_changes,
 )
-from roboeval.evaluation.completions import Key, name_of
+from roboeval.evaluation.completions import name_of
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
-from roboeval.suites.load import Suite
 
 SCORES = (
     "pass@1 by the checks of this report and by those beside it, prompt by prompt, with the interval of the "
@@ -31,32 +29,26 @@ GROUPS = (
 )
 
 
-def reversed_in(runs: Sequence[JudgedRun], suite: Suite) -> list[Reversals]:
+def reversed_in(runs: Sequence[JudgedRun]) -> list[VerdictChanges]:
     """What the other suite changes for each run that it has judged.
 
     Args:
         runs: named apart.
-        suite: of the report.
     """
-    found = []
-    for run in runs:
-        if run.beside is not None:
-            programs: dict[Key, str] = {key: written.program for key, written in run.written.items()}
-            found.append(reversals(run.name, Judged.of(run.rows, suite), run.beside, programs))
-    return found
+    return [verdict_changes(run.name, run.results, run.beside) for run in runs if run.beside is not None]
 
 
-def sentences(found: Sequence[Reversals]) -> tuple[str, ...]:
+def sentences(found: Sequence[VerdictChanges]) -> tuple[str, ...]:
     """The changes in sentences."""
     return (*map(said, found), *said_of_order(found), *said_of_prompts(found))
 
 
-def sheets(found: Sequence[Reversals]) -> tuple[Sheet, ...]:
+def sheets(found: Sequence[VerdictChanges]) -> tuple[Sheet, ...]:
     """The changes as tables: of scores, of tasks, and of groups of completions."""
     return _scores(found), _tasks(found), _groups(found)
 
 
-def _scores(found: Sequence[Reversals]) -> Sheet:
+def _scores(found: Sequence[VerdictChanges]) -> Sheet:
     columns = (
         Column("model"),
         Column("pass@1", "share"),
@@ -77,7 +69,7 @@ def _scores(found: Sequence[Reversals]) -> Sheet:
     return sheet("beside", "Beside other checks", columns, rows, about=SCORES)
 
 
-def _tasks(found: Sequence[Reversals]) -> Sheet:
+def _tasks(found: Sequence[VerdictChanges]) -> Sheet:
     counts = ("both", "here only", "beside only", "neither")
     columns = (Column("task"), Column("model"), *(Column(head, "count") for head in counts))
     rows: list[list[Cell]] = [
@@ -88,7 +80,7 @@ def _tasks(found: Sequence[Reversals]) -> Sheet:
     return sheet("beside-tasks", "Beside other checks, by task", columns, rows, about=TASKS)
 
 
-def _groups(found: Sequence[Reversals]) -> Sheet:
+def _groups(found: Sequence[VerdictChanges]) -> Sheet:
     heads = ("task", "class", "kind", "check", "why", "such as")
     columns = (Column("model"), Column("passes"), Column("completions", "count"), *map(Column, heads))
     every = {one.name: [*_rows(one)] for one in found}
@@ -105,12 +97,12 @@ def _groups(found: Sequence[Reversals]) -> Sheet:
 MOST = 100  # groups of each run
 
 
-def _rows(one: Reversals) -> Iterator[list[Cell]]:
+def _rows(one: VerdictChanges) -> Iterator[list[Cell]]:
     """A row for each group, the largest first."""
     yield from sorted(_both_ways(one), key=lambda row: -row[2])
 
 
-def _both_ways(one: Reversals) -> Iterator[list[Any]]:
+def _both_ways(one: VerdictChanges) -> Iterator[list[Any]]:
     sides: Iterable[tuple[str, Sequence[Cluster]]] = (
         (f"{one.suites[0]} only", one.first_only),
         (f"{one.suites[1]} only", one.second_only),

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
-from roboeval.evaluation.failures import CATEGORIES, CLASSES, PYTHON, PYTHON_KINDS, ROBOT, ROBOT_KINDS, TASK
+from roboeval.analysis.summary import failures
+from roboeval.evaluation.failures import CLASSES
 from roboeval.report import paper
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Column, Sheet, sheet
 
-KINDS: Mapping[str, Sequence[str]] = {PYTHON: PYTHON_KINDS, ROBOT: ROBOT_KINDS, TASK: CATEGORIES}
 PASSED = "passed"
 ABOUT = (
     "A completion fails for one reason: the error, or else the first failed check, of the first world that "
@@ -39,20 +39,17 @@ class Causes:
 
 def causes_of(run: JudgedRun) -> Causes:
     """Count how the completions of a run ended."""
-    counts = Counter((why["class"], why["kind"]) for row in run.rows if (why := row["failure"]) is not None)
-    total = len(run.rows)
-    by_class = Counter[str]()
-    for (name, _), count in counts.items():
-        by_class[name] += count
-    names = [*CLASSES, *sorted(by_class.keys() - set(CLASSES))]
+    found = failures(run.table)
+    passed = 1 - sum(one.count for one in found) / run.completions.height
+    kinds = {
+        one.name: {kind.name: kind.count for kind in sorted(one.kinds, key=attrgetter("name")) if kind.count}
+        for one in found
+    }
     return Causes(
         run.name,
-        {PASSED: 1 - by_class.total() / total, **{name: by_class[name] / total for name in names}},
-        {
-            name: {kind: n / by_class[name] for (of, kind), n in sorted(counts.items()) if of == name}
-            for name in names
-        },
-        counts,
+        {PASSED: passed, **{one.name: one.share for one in found}},
+        {one.name: {kind: n / one.count for kind, n in kinds[one.name].items()} for one in found},
+        {(name, kind): n for name, counts in kinds.items() for kind, n in counts.items()},
     )
 
 
@@ -83,7 +80,7 @@ def all_causes(runs: Sequence[JudgedRun], *, published: bool) -> list[Causes]:
 def kinds_in_order(causes: Sequence[Causes], failure_class: str) -> list[str]:
     """The kinds of a class that some model fails by, known ones first."""
     there = {kind for one in causes for kind in one.kinds.get(failure_class, {})}
-    known = [kind for kind in KINDS.get(failure_class, ()) if kind in there]
+    known = [kind for kind in CLASSES[failure_class].kinds if kind in there]
     return [*known, *sorted(there - set(known))]
 
 

@@ -102,7 +102,7 @@ def headline(runs: Sequence[JudgedRun], suite: Suite) -> tuple[str, list[str]]:
         suite: by which they were judged.
     """
     title = runs[0].name if len(runs) == 1 else f"{len(runs)} models"
-    count = how_many(sum(len(run.rows) for run in runs))
+    count = how_many(sum(run.completions.height for run in runs))
     by_hand = [run.name for run in runs if (run.model or "").startswith("recorded:")]
     lead = [f"{count}, judged by the suite \u201c{suite.name}\u201d: {suite.about}."]
     if by_hand:
@@ -121,10 +121,10 @@ def sections(runs: Sequence[JudgedRun], suite: Suite, wishes: Wishes) -> list[Se
     found = [
         _results(runs, suite),
         _differences(runs),
-        _beside(runs, suite),
+        _beside(runs),
         _thresholds(runs),
         _causes(runs, published=wishes.published),
-        _failures(runs, suite),
+        _failures(runs),
         _strengths(runs, suite),
         _phrasing(runs, suite),
         _retries(runs),
@@ -215,14 +215,14 @@ def _differences(runs: Sequence[JudgedRun]) -> Section:
     return Section("differences", "Which is better", parts)
 
 
-def _beside(runs: Sequence[JudgedRun], suite: Suite) -> Section:
-    found = beside.reversed_in(runs, suite)
+def _beside(runs: Sequence[JudgedRun]) -> Section:
+    found = beside.reversed_in(runs)
     parts = _parts(Prose(beside.sentences(found)), *beside.sheets(found)) if found else ()
     return Section("beside", "What other checks change", parts)
 
 
-def _failures(runs: Sequence[JudgedRun], suite: Suite) -> Section:
-    found = failures.failures(runs, suite)
+def _failures(runs: Sequence[JudgedRun]) -> Section:
+    found = failures.failures(runs)
     if not found.shown:
         return Section("failures", "What went wrong")
     parts = _parts(

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import polars as pl
+
 from codebotler.badinput import BadInput
-from roboeval.analysis.resample import LIMITS, Prompt, chances
-from roboeval.evaluation.completions import Key
-from roboeval.evaluation.tables import key_of
+from roboeval.analysis.resample import LIMITS, CheckedPrompt, chances
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
 
@@ -82,28 +81,18 @@ class Spent:
 
 def spent(run: JudgedRun) -> Spent:
     """What the completions of a run took, as far as it says so of each."""
-    counted = list(_counted(run).values())
-    whole = len(counted) == len(run.rows) and any(a or b for a, b in counted)
-    told = (run.written.get(key_of(row)) for row in run.rows)
-    timed = [written.seconds for written in told if written is not None and written.seconds is not None]
+    took = run.completions
+    tokens = took.select("input_tokens", "output_tokens")
+    is_counted = not any(tokens.null_count().row(0)) and any(tokens.sum().row(0))
+    timed = took["latency_s"]
+    is_timed = not timed.null_count() and bool(timed.sum())
     return Spent(
-        completions=len(run.rows),
-        passed=sum(row["passed"] for row in run.rows),
-        input_tokens=sum(a for a, _ in counted) if whole else None,
-        output_tokens=sum(b for _, b in counted) if whole else None,
-        seconds=math.fsum(timed) if len(timed) == len(run.rows) and any(timed) else None,
+        completions=took.height,
+        passed=int(took["passed"].sum()),
+        input_tokens=int(tokens["input_tokens"].sum()) if is_counted else None,
+        output_tokens=int(tokens["output_tokens"].sum()) if is_counted else None,
+        seconds=math.fsum(timed) if is_timed else None,
     )
-
-
-def _counted(run: JudgedRun) -> dict[Key, tuple[int, int]]:
-    """The tokens of input and of output of the judged completions, where somebody counted them."""
-    keys = map(key_of, run.rows)
-    told = ((key, written) for key in keys if (written := run.written.get(key)) is not None)
-    return {
-        key: (written.input_tokens, written.output_tokens)
-        for key, written in told
-        if written.input_tokens is not None and written.output_tokens is not None
-    }
 
 
 def price_of(run: JudgedRun, prices: Iterable[Price]) -> Price | None:
@@ -155,7 +144,7 @@ def _per(total: float | None, count: float) -> float | None:
     return None if total is None or not count else total / count
 
 
-def requests(prompt: Prompt, retries: int) -> float:
+def requests(prompt: CheckedPrompt, retries: int) -> float:
     """How many requests a program of a prompt takes on average: until one is accepted, or none is left.
 
     Args:
@@ -189,7 +178,7 @@ def budget_sheet(runs: Sequence[JudgedRun], prices: Sequence[Price]) -> Sheet | 
 
 
 def _budget_cells(
-    prompts: Sequence[Prompt],
+    prompts: Sequence[CheckedPrompt],
     limit: int,
     tokens: Mapping[tuple[str, int], tuple[float, float]],
     price: Price | None,
@@ -209,10 +198,5 @@ def _budget_cells(
 
 def _of_a_request(run: JudgedRun) -> Mapping[tuple[str, int], tuple[float, float]]:
     """The mean numbers of tokens of input and of output, by prompt."""
-    tokens: defaultdict[tuple[str, int], list[tuple[int, int]]] = defaultdict(list)
-    for (task, prompt, _), both in _counted(run).items():
-        tokens[task, prompt].append(both)
-    return {
-        key: (sum(a for a, _ in those) / len(those), sum(b for _, b in those) / len(those))
-        for key, those in tokens.items()
-    }
+    means = run.completions.group_by("task", "prompt").agg(pl.col("input_tokens", "output_tokens").mean())
+    return {(task, prompt): (there, back) for task, prompt, there, back in means.iter_rows()}

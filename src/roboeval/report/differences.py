@@ -59,7 +59,7 @@ def difference_sheet(runs: Sequence[JudgedRun]) -> tuple[Sheet, list[str]] | Non
 
 
 def _unlike(first: JudgedRun, second: JudgedRun) -> list[str]:
-    found = unlike(told_of(first.about, first.head), told_of(second.about, second.head))
+    found = unlike(*(told_of(run.results.about, run.results.head) for run in (first, second)))
     return [f"{first.name} and {second.name}: {'; '.join(found)}."] if found else []
 
 

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 
 from roboeval.analysis.cluster import Cluster, clusters, groups
-from roboeval.evaluation.completions import Key, how_many, name_of
-from roboeval.evaluation.tables import key_of
+from roboeval.evaluation.completions import how_many, name_of
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Column, Sheet, sheet
-from roboeval.suites.load import Suite
 
 MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups that are shown of a run, and of all runs
 ABOUT = (
@@ -43,21 +40,18 @@ class Failures:
     notes: tuple[str, ...]
 
 
-def failures(runs: Sequence[JudgedRun], suite: Suite) -> Failures:
+def failures(runs: Sequence[JudgedRun]) -> Failures:
     """Put the failures of each run together.
 
     Args:
-        runs: judged by the suite.
-        suite: whose worlds explain failed checks.
+        runs: at least one.
     """
     most = max(FEWEST, min(MOST, ALTOGETHER // len(runs)))
     shown: list[Shown] = []
     notes: list[str] = []
     for run in runs:
-        programs: dict[Key, str] = {key: written.program for key, written in run.written.items()}
-        together = groups(run.failed, programs)
-        passed = (key_of(row) for row in run.rows if row["passed"])
-        told = clusters(islice(together, most), passed, programs, suite)
+        together = groups(run.results.failed.values(), run.results.programs)
+        told = clusters(together[:most], run.results)
         shown += [Shown(run.name, cluster) for cluster in told]
         notes += _left_out(run, [len(rows) for rows in together[most:]])
     return Failures(tuple(shown), tuple(notes))

@@ -59,7 +59,7 @@ def bars(runs: Sequence[JudgedRun], suite: Suite, look: Look) -> Figure:
             axes.set_title("(a) all requirements", loc="left")
     for line, there in enumerate(_in_lines(ablated, lines)):
         axes = figure.add_subplot(grid[line, 1])
-        scores = {run.name: run.ablated or () for run in runs}
+        scores = {run.name: run.ablated_scores for run in runs}
         _bars_on(axes, scores, there, max(map(len, _in_lines(ablated, lines))), look)
         if line == 0:
             axes.set_title("(b) common sense only", loc="left")
@@ -79,7 +79,7 @@ def _in_lines(tasks: Sequence[str], lines: int) -> list[Sequence[str]]:
 
 
 def _ablated_tasks(runs: Sequence[JudgedRun], suite: Suite) -> list[str]:
-    there = {score.task for run in runs for score in run.ablated or ()}
+    there = {score.task for run in runs for score in run.ablated_scores}
     return [task for task in suite.tasks if task in there]
 
 
@@ -133,7 +133,7 @@ def _heat_of_tasks(runs: Sequence[JudgedRun], suite: Suite, look: Look) -> Figur
     """The same for more models than there are colours: one row a model."""
     tasks, ablated = tasks_of(runs, suite), _ablated_tasks(runs, suite)
     plain = [_means(run.scores, tasks) for run in runs]
-    alone = [_means(run.ablated or (), ablated) for run in runs]
+    alone = [_means(run.ablated_scores, ablated) for run in runs]
     figure = new_figure(WIDE, 1.3 + 0.16 * len(runs))
     widths = [len(tasks), len(ablated)] if ablated else [len(tasks)]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)

@@ -18,13 +18,13 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
         [
             run.name,
             run.folder,
-            len(run.rows),
-            _settings(run.about.get("settings")),
-            _text(run.about.get("template")),
-            _text(run.about.get("codebotler")),
-            _text(run.head.get("codebotler")),
-            _text(run.head.get("python")),
-            _text(run.head.get("digest")),
+            run.completions.height,
+            _settings(run.results.about.get("settings")),
+            _text(run.results.about.get("template")),
+            _text(run.results.about.get("codebotler")),
+            _text(run.results.head.get("codebotler")),
+            _text(run.results.head.get("python")),
+            _text(run.results.head.get("digest")),
         ]
         for run in runs
     ]
@@ -54,7 +54,7 @@ def _text(value: object) -> str:
 
 def about_suite(suite: Suite, runs: Sequence[JudgedRun]) -> tuple[str, ...]:
     """By what was judged, in sentences."""
-    head = runs[0].head
+    head = runs[0].results.head
     rules = json.dumps(head.get("rules"), ensure_ascii=False)
     return (
         f'Judged by the suite "{suite.name}", version {head.get("version")}, content {head.get("digest")}.',

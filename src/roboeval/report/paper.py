@@ -70,7 +70,7 @@ def model_of(run: JudgedRun) -> str | None:
 
     Without a recorded model, the name of the folder counts.
     """
-    if run.head.get("suite") != SUITE or run.is_mixed:
+    if run.results.head.get("suite") != SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
     known = [*NAMES.items(), *(() if colon else SHORT.items())]
@@ -90,7 +90,7 @@ def is_of_authors_prompts(run: JudgedRun, suite: Suite) -> bool:
     They come from elsewhere, so that run.json names no settings, and none names an instruction of the suite.
     """
     ours = {prompt for task in suite.tasks.values() for prompt in task.prompts}
-    return "settings" not in run.about and not any(w.instruction in ours for w in run.written.values())
+    return "settings" not in run.results.about and not ours & {*run.instructions.values()}
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboeval.analysis.resample import LIMITS, Prompt, chances, resampled
+from roboeval.analysis.resample import LIMITS, CheckedPrompt, chances, resampled
 from roboeval.report.reading import JudgedRun
 from roboeval.report.scores import curve
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
@@ -19,12 +19,12 @@ ABOUT = (
 STEPS = range(LIMITS[-1] + 1)
 
 
-def checked(runs: Sequence[JudgedRun]) -> list[tuple[str, tuple[Prompt, ...]]]:
+def checked(runs: Sequence[JudgedRun]) -> list[tuple[str, tuple[CheckedPrompt, ...]]]:
     """The runs whose programs were checked, by name."""
     return [(run.name, run.trials) for run in runs if run.trials]
 
 
-def curves(prompts: Sequence[Prompt]) -> dict[int, list[tuple[float, float]]]:
+def curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
     """For each limit, the share of prompts by threshold of pass@1."""
     return {
         limit: curve([min(one.passed, 1.0) for one in resampled(prompts, limit).by_prompt])
@@ -32,7 +32,7 @@ def curves(prompts: Sequence[Prompt]) -> dict[int, list[tuple[float, float]]]:
     }
 
 
-def accepted(prompts: Sequence[Prompt]) -> list[float]:
+def accepted(prompts: Sequence[CheckedPrompt]) -> list[float]:
     """The share of programs that the check accepts after 0, 1, ... 100 retries."""
     return [sum(chances(p.trials, n).accepted for p in prompts) / len(prompts) for n in STEPS]
 

@@ -60,7 +60,7 @@ def _overall_row(run: JudgedRun) -> list[str | int | float]:
     ends = [by_formula(prompts), by_formula(tasks), by_bootstrap(tasks)]
     mean = ends[0].mean
     flat = [end for estimate in ends for end in (estimate.low, estimate.high)]
-    return [run.name, len(run.rows), len(prompts), len(tasks), mean, *flat]
+    return [run.name, run.completions.height, len(prompts), len(tasks), mean, *flat]
 
 
 def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
@@ -73,10 +73,11 @@ def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
+    counts = [(run.name, run.completions.height, run.results.scope.total) for run in runs]
     return [
-        f"{run.name}: only {len(run.rows):,} of {run.total:,} completions are judged, and only these count."
-        for run in runs
-        if len(run.rows) < run.total
+        f"{name}: only {count:,} of {total:,} completions are judged, and only these count."
+        for name, count, total in counts
+        if count < total
     ]
 
 
@@ -101,7 +102,7 @@ def task_sheet(runs: Sequence[JudgedRun], suite: Suite) -> Sheet:
         for what, ablated in (("all", False), ("common sense only", True))
         for task in tasks_of(runs, suite)
         for run in runs
-        for score in (run.ablated or () if ablated else run.scores)
+        for score in (run.ablated_scores if ablated else run.scores)
         if score.task == task
     ]
     return sheet("tasks", "pass@1 by task", columns, rows, about=BY_TASK, notes=_without_ablation(runs))

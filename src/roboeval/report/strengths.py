@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
+
+import polars as pl
 
 from codebotler.simulator.robot import resolve_room
 from roboeval.analysis.statistics import by_formula
+from roboeval.analysis.summary import failures
 from roboeval.evaluation.failures import PYTHON, ROBOT, TASK
-from roboeval.evaluation.tables import RowData
+from roboeval.evaluation.rows import RowData
 from roboeval.report.reading import JudgedRun
 from roboeval.report.sheets import Cell, Column, Sheet, sheet
 from roboeval.suites.load import Suite
@@ -52,9 +54,8 @@ def _ability_row(ability: str, run: JudgedRun, suite: Suite) -> list[Cell] | Non
     if not values:
         return None
     at = by_formula(values)
-    rows = [row for row in run.rows if row["task"] in tasks]
-    counts = Counter(row["failure"]["class"] for row in rows if row["failure"])
-    shares = [counts[name] / len(rows) for name in (PYTHON, ROBOT, TASK)]
+    causes = {one.name: one.share for one in failures(run.table.filter(pl.col("task").is_in(tasks)))}
+    shares = [causes[name] for name in (PYTHON, ROBOT, TASK)]
     return [ability, run.name, len(values), at.mean, at.low, at.high, *shares]
 
 
@@ -64,8 +65,8 @@ def coming_back_sheet(runs: Sequence[JudgedRun], suite: Suite) -> Sheet | None:
     rows: list[list[Cell]] = []
     for run in runs:
         for what, is_back in ((WITH_REPORT, True), ("others", False)):
-            those = [row for row in run.rows if (row["task"] in back) == is_back]
-            if those:
+            those = run.completions.filter(pl.col("task").is_in(back) == is_back)
+            if those.height:
                 rows.append([run.name, what, *_coming_back(those, run, suite)])
     columns = (
         Column("model"),
@@ -82,14 +83,14 @@ def coming_back_sheet(runs: Sequence[JudgedRun], suite: Suite) -> Sheet | None:
     return found if back and rows else None
 
 
-def _coming_back(rows: Sequence[RowData], run: JudgedRun, suite: Suite) -> list[Cell]:
-    tasks = {row["task"] for row in rows}
+def _coming_back(completions: pl.DataFrame, run: JudgedRun, suite: Suite) -> list[Cell]:
+    tasks = {*completions["task"]}
     values = [value for task, values in run.by_task.items() if task in tasks for value in values]
-    failed = [row for row in rows if not row["passed"]]
+    failed = [row for row in run.results.failed.values() if row["task"] in tasks]
     away = sum(never_returned(row, suite) for row in failed)
     lost = sum(row["failure"]["kind"] == LOST for row in failed)
     shares = [count / len(failed) if failed else None for count in (away, lost)]
-    return [len(rows), sum(values) / len(values), len(failed), away, shares[0], lost, shares[1]]
+    return [completions.height, sum(values) / len(values), len(failed), away, shares[0], lost, shares[1]]
 
 
 def coming_back_said(table: Sheet) -> list[str]:
