@@ -1,16 +1,16 @@
-"""Commands that have a model write programs: generate, and run, which judges and reports as well."""
+"""The commands generate, and run, which evaluates and reports as well."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from codebotler.cli import STOPPED
+from codebotler.english import counted
 from codebotler.options import (
     BaseUrlOption,
     MaxTokensOption,
@@ -35,7 +35,8 @@ from roboeval.cli.output import metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.generate import Progress
+    from codebotler.models.base import Settings
+    from roboeval.evaluation.generate import Pace, Progress
 
 OutOption = Annotated[
     Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
@@ -68,22 +69,12 @@ def generate(
 
     The same command goes on after any interruption.
     """
-    path = generated(
-        model,
-        out,
-        num_completions,
-        temperature,
-        top_p,
-        max_tokens,
-        seed,
-        suite,
-        tasks,
-        concurrency,
-        requests_per_minute,
-        token_budget,
-        timeout,
-        base_url,
-    )
+    from codebotler.models.base import Settings
+    from roboeval.evaluation.generate import Pace
+
+    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    pace = Pace(concurrency, requests_per_minute, token_budget)
+    path = complete(model, out, suite, tasks, num_completions, settings, pace)
     note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
 
 
@@ -113,78 +104,49 @@ def run(
 
     The tables are printed, and the same command goes on after any interruption.
     """
-    path = generated(
-        model,
-        out,
-        num_completions,
-        temperature,
-        top_p,
-        max_tokens,
-        seed,
-        suite,
-        tasks,
-        concurrency,
-        requests_per_minute,
-        token_budget,
-        timeout,
-        base_url,
-    )
+    from codebotler.models.base import Settings
+    from roboeval.evaluation.generate import Pace
+
+    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    pace = Pace(concurrency, requests_per_minute, token_budget)
+    path = complete(model, out, suite, tasks, num_completions, settings, pace)
     evaluate(
-        str(path),
-        suite=suite,
-        tasks=tasks,
-        workers=workers,
-        require_isolation=require_isolation,
-        json=json,
+        str(path), suite=suite, tasks=tasks, workers=workers, require_isolation=require_isolation, json=json
     )
-    if with_report:
-        reported(path, suite, workers)
-
-
-def reported(path: Path, suite: str, workers: int | None) -> None:
-    """Write the report of a run into it; ends with a sentence if that is interrupted."""
-    out = path / "report"
+    if not with_report:
+        return
+    folder = path / "report"
     try:
-        report([path], out, suite=suite, workers=workers)
+        report([path], folder, suite=suite, workers=workers)
     except KeyboardInterrupt:
-        again = command("report", path, "--out", out, suite=suite)
+        again = command("report", path, "--out", folder, suite=suite)
         note(f"roboeval: stopped; verdicts are in {path}; `{again}` writes the report")
         raise SystemExit(STOPPED) from None
 
 
-def generated(
+def complete(
     name: str,
     out: Path | None,
-    num_completions: int,
-    temperature: float,
-    top_p: float,
-    max_tokens: int,
-    seed: int | None,
-    suite: str,
+    suite_name: str,
     tasks: str | None,
-    concurrency: int,
-    requests_per_minute: float | None,
-    token_budget: int | None,
-    timeout: float,
-    base_url: str | None,
+    num_completions: int,
+    settings: Settings,
+    pace: Pace,
 ) -> Path:
-    """Make or complete a run, and say where it is; ends with status 1 if completions are missing."""
-    from codebotler.models.base import Settings
+    """Make or complete a run, and return its folder; exits with status 1 if completions are missing."""
     from codebotler.models.open import open_model
-    from roboeval.evaluation.generate import Pace, generate_run
-    from roboeval.evaluation.order import Order
+    from roboeval.evaluation.generate import generate_run
+    from roboeval.evaluation.requests import GenerationPlan
     from roboeval.evaluation.run import Run, tasks_to_judge
 
-    known = load(suite)
-    order = Order(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
-    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
-    pace = Pace(concurrency, requests_per_minute, token_budget)
+    suite = load(suite_name)
+    plan = GenerationPlan(suite, tasks_to_judge(suite, tasks, ablated=False)[0], num_completions)
     model = open_model(name, settings)
     run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", model.name).strip("-.")))
     meter = Meter()
     try:
         with meter:
-            progress = generate_run(run, order, model, settings, pace, begun=meter.begin, told=meter.tell)
+            progress = generate_run(run, plan, model, settings, pace, on_progress=meter.show)
     except KeyboardInterrupt:
         note(f"roboeval: {meter.after_a_stop()}")
         raise SystemExit(STOPPED) from None
@@ -194,54 +156,35 @@ def generated(
     return run.path
 
 
-class Meter:
-    """Tells how far a run has come: how fast, with how many tokens, and how long the rest takes."""
+class Meter(ExitStack):
+    """Shows how far a run has come: how fast, with how many tokens, and how long the rest takes."""
 
-    def __init__(self) -> None:
-        self._bar = ExitStack()
-        self._draw: Callable[[int, str], None] | None = None
-        self._progress: Progress | None = None
+    progress: Progress | None = None
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
-
-    def begin(self, progress: Progress) -> None:
-        """Say what there is already, and start the bar."""
-        from roboeval.evaluation.completions import how_many
-
-        self._progress = progress
-        if progress.found:
-            note(f"{progress.found:,} of {how_many(progress.total)} are there already")
-        if progress.twice:
-            note(f"{requests(progress.twice)} under way when this was interrupted, which may be paid twice")
-        self._draw = self._bar.enter_context(metered("generating", progress.total, progress.found))
-
-    def tell(self, progress: Progress) -> None:
-        """Show how far it has come."""
-        if self._draw is not None:
-            self._draw(progress.done, state(progress))
+    def show(self, progress: Progress) -> None:
+        """Draw the bar, or start it and note what there is already."""
+        if self.progress is None:
+            self.progress = progress
+            if progress.found:
+                note(f"{progress.found:,} of {counted(progress.total, 'completion')} are there already")
+            if progress.interrupted:
+                note(f"{under_way(progress.interrupted)} when this was interrupted, which may be paid twice")
+            self._draw = self.enter_context(metered("generating", progress.total, progress.found))
+        else:
+            tokens = progress.usage.total()
+            rate = f"{progress.rate:.1f} a second"
+            self._draw(progress.done, f"{rate}, {tokens:,} tokens" if tokens else rate)
 
     def after_a_stop(self) -> str:
         """What Ctrl-C left behind, and how to go on."""
-        from roboeval.evaluation.completions import how_many
-
-        if self._progress is None:
+        if self.progress is None:
             return "stopped before the first request; give the same command again"
-        kept = f"{self._progress.done:,} of {how_many(self._progress.total)} are kept"
-        lost = self._progress.under_way
-        paid = f"; {requests(lost)} under way, which may be paid twice" if lost else ""
+        kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are kept"
+        open_requests = self.progress.under_way
+        paid = f"; {under_way(open_requests)}, which may be paid twice" if open_requests else ""
         return f"stopped; {kept}{paid}; the same command goes on where it was"
 
 
-def requests(count: int) -> str:
-    """Such as `1 request was` or `8 requests were`."""
-    return "1 request was" if count == 1 else f"{count:,} requests were"
-
-
-def state(progress: Progress) -> str:
-    """How fast a run grows, and with how many tokens so far."""
-    tokens = f"{progress.used.total:,} tokens" if progress.used.total else ""
-    return ", ".join(filter(None, (f"{progress.rate:.1f} a second", tokens)))
+def under_way(requests: int) -> str:
+    """Such as `1 request was under way`."""
+    return f"{counted(requests, 'request')} {'was' if requests == 1 else 'were'} under way"

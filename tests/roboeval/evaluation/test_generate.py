@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,7 @@ from codebotler.files import Appender, read_rows, to_line
 from codebotler.models.base import ModelError, Settings
 from roboeval.evaluation.completions import read_completions
 from roboeval.evaluation.generate import Pace, Progress, generate_run
-from roboeval.evaluation.inflight import InFlight
-from roboeval.evaluation.order import Order
+from roboeval.evaluation.requests import GenerationPlan, RequestLog
 from roboeval.evaluation.run import Run
 from roboeval.suites.load import Suite
 from scripted_model import Scripted
@@ -38,10 +38,10 @@ def generated(
     count: int = 3,
     settings: Settings | None = None,
     pace: Pace | None = None,
-    told: Any = lambda _: None,  # noqa: ANN401 - passed on
+    on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
-    order = Order(suite, SMALL, count)
-    return generate_run(run, order, model, settings or Settings(), pace or Pace(), told=told)
+    plan = GenerationPlan(suite, SMALL, count)
+    return generate_run(run, plan, model, settings or Settings(), pace or Pace(), on_progress=on_progress)
 
 
 def rows(run: Run) -> list[dict[str, Any]]:
@@ -67,7 +67,7 @@ def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite
     progress = generated(
         run, paper, model, settings=Settings(temperature=0.7, seed=5, base_url="http://a/v1")
     )
-    assert (progress.done, progress.total, progress.missing, progress.twice) == (30, 30, None, 0)
+    assert (progress.done, progress.total, progress.missing, progress.interrupted) == (30, 30, None, 0)
     assert model.closed
     assert keys(run) == expected(3)
     row = next(row for row in rows(run) if (row["task"], row["prompt"], row["index"]) == ("LunchTime", 4, 2))
@@ -83,14 +83,14 @@ def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite
         "latency_s": 0.0,
         "finish_reason": "stop",
     }
-    told = about(run)
-    assert told["model"] == "scripted:one"
-    assert told["settings"] == {"temperature": 0.7, "top_p": 0.95, "max_tokens": 512, "seed": 5}
-    assert told["base_url"] == "http://a/v1"
-    assert re.fullmatch("[0-9a-f]{64}", told["template"])
-    assert told["usage"] == {"input_tokens": 3000, "output_tokens": 300}
-    assert told["started"] <= told["ended"]
-    assert told["possibly_paid_twice"] == 0
+    metadata = about(run)
+    assert metadata["model"] == "scripted:one"
+    assert metadata["settings"] == {"temperature": 0.7, "top_p": 0.95, "max_tokens": 512, "seed": 5}
+    assert metadata["base_url"] == "http://a/v1"
+    assert re.fullmatch("[0-9a-f]{64}", metadata["template"])
+    assert metadata["usage"] == {"input_tokens": 3000, "output_tokens": 300}
+    assert metadata["started"] <= metadata["ended"]
+    assert metadata["possibly_paid_twice"] == 0
     assert sorted(path.name for path in run.path.iterdir()) == [".lock", "completions.jsonl", "run.json"]
 
 
@@ -127,16 +127,16 @@ def test_as_many_at_the_same_time_as_allowed(tmp_path: Path, paper: Suite) -> No
     assert model.most == 3
 
 
-def test_each_completion_is_in_the_file_when_it_is_told_of(tmp_path: Path, paper: Suite) -> None:
+def test_each_completion_is_in_the_file_when_it_counts(tmp_path: Path, paper: Suite) -> None:
     run = Run(tmp_path / "run")
-    told: list[int] = []
+    done: list[int] = []
 
-    def tell(progress: Progress) -> None:
-        told.append(progress.done)
+    def count(progress: Progress) -> None:
+        done.append(progress.done)
         assert len(rows(run)) >= progress.done
 
-    generated(run, paper, Scripted(seconds=0.001), told=tell)
-    assert told == list(range(1, 31))
+    generated(run, paper, Scripted(seconds=0.001), on_progress=count)
+    assert done == list(range(31))
 
 
 def test_a_completion_counts_only_once_it_is_on_the_disk(
@@ -152,11 +152,11 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
         if file.path == run.completions:
             on_disk[0] = lines
 
-    def tell(progress: Progress) -> None:
+    def check(progress: Progress) -> None:
         assert on_disk[0] >= progress.done
 
     monkeypatch.setattr(Appender, "sync", noted)
-    assert generated(run, paper, Scripted(seconds=0.001), told=tell).missing is None
+    assert generated(run, paper, Scripted(seconds=0.001), on_progress=check).missing is None
 
 
 # --- what goes on and what does not
@@ -207,7 +207,7 @@ def test_completions_from_elsewhere_are_left_alone(tmp_path: Path, paper: Suite)
         generated(run, paper, Scripted())
     assert error.value.file == run.about
     run.about.write_text('{"model": null}')
-    with pytest.raises(BadInput, match="from elsewhere"):
+    with pytest.raises(BadInput, match="imported"):
         generated(run, paper, Scripted())
 
 
@@ -288,7 +288,7 @@ def test_a_budget_stops_cleanly_and_a_second_one_goes_on(tmp_path: Path, paper: 
     assert len(rows(run)) == 10
     assert not run.in_flight.exists()
     progress = generated(run, paper, Scripted(), pace=Pace(concurrency=1, token_budget=1000))
-    assert (progress.found, progress.done, progress.twice) == (10, 20, 0)
+    assert (progress.found, progress.done, progress.interrupted) == (10, 20, 0)
     generated(run, paper, Scripted())
     assert keys(run) == expected(3)
     assert about(run)["usage"] == {"input_tokens": 3000, "output_tokens": 300}
@@ -316,7 +316,7 @@ def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, pape
     chance = random.Random(3)
     run = Run(tmp_path / "run")
     model = Scripted(fails=lambda _: CUT if chance.random() < 0.1 else None)
-    progress = generate_run(run, Order(paper), model, Settings(), Pace(concurrency=100))
+    progress = generate_run(run, GenerationPlan(paper), model, Settings(), Pace(concurrency=100))
     assert (progress.done, progress.missing) == (4000, None)
     prompts = [(task.name, number) for task in paper.tasks.values() for number in range(len(task.prompts))]
     assert keys(run) == sorted((*prompt, index) for prompt in prompts for index in range(50))
@@ -329,14 +329,14 @@ import pathlib, sys
 sys.path.insert(0, {tests!r})
 from codebotler.models.base import Settings
 from roboeval.evaluation.generate import Pace, generate_run
-from roboeval.evaluation.order import Order
+from roboeval.evaluation.requests import GenerationPlan
 from roboeval.evaluation.run import Run
 from roboeval.suites.load import load_suite
 from scripted_model import Scripted
 print("on", flush=True)
 {before}
 generate_run(
-    Run(pathlib.Path({run!r})), Order(load_suite(), {tasks!r}, {count}),
+    Run(pathlib.Path({run!r})), GenerationPlan(load_suite(), {tasks!r}, {count}),
     Scripted(seconds={seconds}, log=pathlib.Path({log!r})), Settings(), Pace(concurrency=5),
 )
 """
@@ -399,7 +399,7 @@ def test_kill_minus_nine_loses_only_what_was_under_way(tmp_path: Path, paper: Su
         under_way = asked_of(log, process.pid, paper) - done
         assert len(under_way) <= 5
         # A request is noted before the model hears of it, so that at most those being sent are counted too.
-        assert len(under_way) <= InFlight(run.in_flight).read(done, 0) <= 5
+        assert len(under_way) <= RequestLog(run.in_flight, done, 0).interrupted <= 5
         lost.update(under_way)
     assert kills == 5
     generated(run, paper, Scripted(), count=60)
@@ -421,7 +421,7 @@ def test_control_c_keeps_what_came_and_counts_what_was_under_way(tmp_path: Path,
     under_way = asked_of(log, process.pid, paper) - done
     assert 0 < len(under_way) <= 5
     progress = generated(run, paper, Scripted(), count=60)
-    assert progress.twice == len(under_way)
+    assert progress.interrupted == len(under_way)
     assert about(run)["possibly_paid_twice"] == len(under_way)
     assert Counter(keys(run)) == Counter(expected(60))
     assert not run.in_flight.exists()
@@ -442,10 +442,10 @@ def test_an_interruption_counts_what_waits_for_the_disk(
         sync(file)
 
     monkeypatch.setattr(Appender, "sync", interrupted)
-    order = Order(paper, SMALL, 100)  # so many that it cannot be over by then
+    plan = GenerationPlan(paper, SMALL, 100)  # so many that it cannot be over by then
     with pytest.raises(KeyboardInterrupt):
-        generate_run(run, order, Scripted(seconds=0.01), Settings(), Pace(), begun=seen.append)
-    (progress,) = seen
+        generate_run(run, plan, Scripted(seconds=0.01), Settings(), Pace(), on_progress=seen.append)
+    progress = seen[0]
     assert progress.done == len(rows(run)) > 10
     assert progress.under_way > 0
 
@@ -465,7 +465,7 @@ def test_a_full_disk_leaves_whole_rows_and_asks_no_further(tmp_path: Path, paper
     under_way = asked_of(log, process.pid, paper) - done
     assert len(under_way) <= 5
     progress = generated(run, paper, Scripted(), count=20)
-    assert len(under_way) <= progress.twice <= 5
+    assert len(under_way) <= progress.interrupted <= 5
     assert Counter(keys(run)) == Counter(expected(20))
 
 

@@ -1,0 +1,214 @@
+"""What a run requests of a model: which completions, with which settings, and which are under way."""
+
+from __future__ import annotations
+
+import contextlib
+import platform
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, Self
+
+from codebotler import __version__
+from codebotler.badinput import BadInput
+from codebotler.files import Appender, read_rows, to_line, write_whole
+from codebotler.models.base import Settings
+from codebotler.prompts import template_hash
+from roboeval.evaluation.completions import Completion, Key, name_of, read_completions
+from roboeval.evaluation.run import Run, load_head
+from roboeval.suites.load import Suite
+
+WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies
+LONGEST_VALUE = 24  # characters of a setting that an error quotes
+
+
+@dataclass(frozen=True)
+class GenerationPlan:
+    """Which completions a run should have: so many for each prompt of some tasks, by default all."""
+
+    suite: Suite
+    tasks: frozenset[str] | None = None
+    num_completions: int = 50
+
+    def keys(self) -> list[Key]:
+        """The completions: the first of each prompt, then the second, so that a part covers all tasks."""
+        prompts = [
+            (task.name, prompt)
+            for task in self.suite.tasks.values()
+            if self.tasks is None or task.name in self.tasks
+            for prompt in range(len(task.prompts))
+        ]
+        return [(*prompt, index) for index in range(self.num_completions) for prompt in prompts]
+
+    def instruction(self, key: Key) -> str:
+        """The instruction that a completion is for."""
+        return self.suite.tasks[key[0]].prompts[key[1]]
+
+    def completed(self, run: Run) -> Iterator[Completion]:
+        """The completions that a run has already.
+
+        Raises:
+            BadInput: one is for another instruction than the suite has now.
+        """
+        if not run.completions.stat().st_size:
+            return
+        for completion in read_completions(run.completions, self.suite):
+            if completion.instruction != self.instruction(completion.key):
+                raise BadInput(
+                    f"{name_of(completion.key)} was generated from another instruction than the suite has "
+                    "now; name another folder",
+                    file=run.completions,
+                )
+            yield completion
+
+
+def no_usage() -> Counter[str]:
+    """The token counts of no completions."""
+    return Counter(input_tokens=0, output_tokens=0)
+
+
+def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> None:
+    """Add the token counts of a row of completions.jsonl, null where the model does not count."""
+    for name in total:
+        total[name] += (usage or {}).get(name) or 0
+
+
+# --- run.json
+
+
+def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: Settings) -> dict[str, Any]:
+    """The content of run.json, which a run that goes on has already.
+
+    Raises:
+        BadInput: the run holds completions that were generated with another model or other settings.
+    """
+    fixed = {
+        "model": model,
+        "settings": {name: value for name, value in asdict(settings).items() if name not in WITHOUT_EFFECT},
+        "template": template_hash(),
+        "suite": plan.suite.name,
+    }
+    metadata = fixed | {
+        "num_completions": plan.num_completions,
+        "tasks": None if plan.tasks is None else sorted(plan.tasks),
+        "base_url": settings.base_url,
+        "codebotler": __version__,
+        "python": platform.python_version(),
+        "started": timestamp(),
+        "ended": None,
+        "usage": no_usage(),
+        "possibly_paid_twice": 0,
+    }
+    if run.about.exists():
+        earlier = load_head(run.about)
+        if not isinstance(earlier.get("settings"), dict):
+            raise BadInput("holds imported completions; name another folder", file=run.path)
+        _expect_same(earlier, fixed, run.about)
+        kept = ("started", "ended", "possibly_paid_twice")
+        metadata |= {name: earlier.get(name, metadata[name]) for name in kept}
+    elif run.completions.exists() and run.completions.stat().st_size:
+        raise BadInput(
+            "is missing, so that the settings of the completions are unknown; name another folder",
+            file=run.about,
+        )
+    return metadata
+
+
+def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> None:
+    before, now = ({**values, **values["settings"], "settings": None} for values in (earlier, fixed))
+    for name, value in now.items():
+        if before.get(name) != value:
+            what = "prompt template" if name == "template" else name.replace("_", "-")
+            raise BadInput(
+                f"the completions were generated with another {what} "
+                f"({_brief(before.get(name))}, now {_brief(value)}); name another folder to start over",
+                file=file,
+            )
+
+
+def _brief(value: object) -> str:
+    text = "none" if value is None else str(value)
+    return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE // 2] + "..."
+
+
+def timestamp() -> str:
+    """The time now, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+# --- requests under way
+
+
+class RequestLog:
+    """The file that notes each request before it is sent, and each that fails.
+
+    A request that is noted, and has neither failed nor left a completion, was under way when the run was
+    interrupted, and may be paid twice. The first line counts those of earlier interruptions, so that an
+    interruption at any moment has none counted twice.
+
+    Args:
+        path: the file, which exists only while the run is written, and after an interruption.
+        done: the completions that the run has.
+        lost: how many requests were under way at the interruptions that run.json knows of.
+
+    Raises:
+        BadInput: a line of the file notes no request.
+    """
+
+    def __init__(self, path: Path, done: set[Key], lost: int) -> None:
+        self.path = path
+        earlier, noted = self._read()
+        self.interrupted = len(noted - done)
+        """How many requests were under way at the last interruption."""
+        self.lost = max(lost, earlier + self.interrupted)
+        """How many were at any interruption."""
+        self.under_way: set[Key] = set()
+
+    def __enter__(self) -> Self:
+        """Start the file anew, now that run.json knows of `lost`."""
+        write_whole(self.path, to_line({"lost": self.lost}))
+        self._file = Appender(self.path)
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        with contextlib.suppress(OSError):  # a full disk has been reported already
+            self._file.close()
+        if kind is None and not self.under_way:
+            self.path.unlink()
+
+    def sent(self, key: Key) -> None:
+        """Note a request that is about to be sent.
+
+        Raises:
+            OSError: the disk is full; nothing may be sent then.
+        """
+        self._file.append(to_line({"sent": key}))
+        self.under_way.add(key)
+
+    def failed(self, key: Key) -> None:
+        """Note that a request ended without a reply."""
+        if key in self.under_way:
+            self.kept(key)
+            self._file.append(to_line({"failed": key}))
+
+    def kept(self, key: Key) -> None:
+        """Note nothing: the completion, which is in its file now, says that the request has ended."""
+        self.under_way.remove(key)
+
+    def _read(self) -> tuple[int, set[Key]]:
+        """How many requests were lost before the file was started, and which ones it leaves open."""
+        lost = 0
+        noted: set[Key] = set()
+        for number, row in read_rows(self.path, growing=True) if self.path.exists() else ():
+            match row:
+                case {"lost": int(lost)}:
+                    pass
+                case {"sent": [str(task), int(prompt), int(index)]}:
+                    noted.add((task, prompt, index))
+                case {"failed": [str(task), int(prompt), int(index)]}:
+                    noted.discard((task, prompt, index))
+                case _:
+                    raise BadInput("this line notes no request; delete the file", file=self.path, line=number)
+        return lost, noted
