@@ -10,7 +10,7 @@ import polars as pl
 
 from codebotler.files import to_line
 from roboeval.evaluation.completions import Completion, Key
-from roboeval.evaluation.results import Results, TableBuilder, deciding
+from roboeval.evaluation.results import FailedRows, Results, TableBuilder
 from roboeval.evaluation.rows import JudgedRow, RowData, judged_row, key_of
 from roboeval.evaluation.run import Run
 from roboeval.suites.load import Suite
@@ -72,8 +72,11 @@ def results_of(
         written[task, prompt, index] = Completion(task=task, prompt=prompt, index=index, program=program)
     judged = judged_rows(rows, {key: one.program for key, one in written.items()})
     builder = TableBuilder(written)
+    failed = FailedRows()
     for row in judged:
         builder.add(row)
+        if not row.passed:
+            failed.add(row)
     return Results(
         run=Run(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",
@@ -82,6 +85,6 @@ def results_of(
         about={},
         completions=written,
         table=builder.table(),
-        failed={row.key: deciding(row) for row in judged if not row.passed},
+        failed=failed,
         places={row.key: (0, 0) for row in judged},
     )

@@ -274,13 +274,13 @@ def read_results(
     total = sum(tasks is None or task in tasks for task, _, _ in completions)
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key))
     places: dict[Key, tuple[int, int]] = {}
-    failed: dict[Key, RowData] = {}
+    failed = FailedRows()
     lines = iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults)
     for line in watch(lines, total):
         builder.add(line.row)
         places[line.row.key] = line.at, line.size
         if not line.row.passed:
-            failed[line.row.key] = deciding(line.row)
+            failed.add(line.row)
     return Results(
         run=run,
         key=key,
@@ -305,28 +305,37 @@ def _head(path: Path, faults: list[BadInput] | None) -> Mapping[str, Any]:
         return {}
 
 
-def deciding(row: JudgedRow) -> RowData:
-    """A row that keeps only the verdict that decided, of the others the worlds' names; none if it passed."""
-    world = None if row.failure is None else row.failure.world
-    verdicts = [
-        _plain(verdict) if number == world else {"world": verdict.world}
-        for number, verdict in enumerate(row.verdicts)
-    ]
-    rest: dict[str, Any] = {name: getattr(row, name) for name in ROW_NAMES}
-    failure = None if row.failure is None else msgspec.to_builtins(row.failure)
-    return {**rest, "failure": failure, "verdicts": [] if world is None else verdicts}
+class FailedRows(Mapping[Key, RowData]):
+    """The rows of completions that failed; of the verdicts only the deciding one is whole.
 
+    Most are never looked at, so that each is kept as it was read until somebody asks for it.
+    """
 
-ROW_NAMES = ("task", "prompt", "index", "program_sha256", "passed")
+    def __init__(self) -> None:
+        self._kept: dict[Key, tuple[JudgedRow, bytes]] = {}
 
+    def add(self, row: JudgedRow) -> None:
+        """Keep a row that failed."""
+        assert row.failure is not None, "it failed"
+        trace = b"[%b]" % b",".join(map(bytes, row.verdicts[row.failure.world].trace))
+        bare = tuple(msgspec.structs.replace(verdict, trace=()) for verdict in row.verdicts)
+        self._kept[row.key] = msgspec.structs.replace(row, verdicts=bare), trace
 
-def _plain(verdict: WorldVerdict) -> dict[str, Any]:
-    plain = {name: getattr(verdict, name) for name in ("world", "satisfied", "line")}
-    plain["status"] = verdict.status.value
-    plain["error"] = None if verdict.error is None else msgspec.to_builtins(verdict.error)
-    plain["failed_checks"] = list(verdict.failed_checks)
-    plain["trace"] = [json.loads(bytes(event)) for event in verdict.trace]
-    return plain if verdict.cut is msgspec.UNSET else {**plain, "cut": msgspec.to_builtins(verdict.cut)}
+    def __getitem__(self, key: Key) -> RowData:
+        row, trace = self._kept[key]
+        plain: dict[str, Any] = msgspec.to_builtins(row)
+        world = plain["failure"]["world"]
+        verdicts = [{"world": verdict["world"]} for verdict in plain["verdicts"]]
+        deciding = plain["verdicts"][world]
+        checks = list(deciding["failed_checks"])
+        verdicts[world] = {**deciding, "failed_checks": checks, "trace": json.loads(trace)}
+        return {**plain, "verdicts": verdicts}
+
+    def __iter__(self) -> Iterator[Key]:
+        return iter(self._kept)
+
+    def __len__(self) -> int:
+        return len(self._kept)
 
 
 def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:

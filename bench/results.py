@@ -1,0 +1,77 @@
+"""How long does it take to read a judged run of 100,000 completions as one table?
+
+The run is made up: verdicts on the programs that ship with the package, repeated under other indices. It prints the
+processor time of `load_results` beside that of parsing the same files with `json` and no more, and of one page of
+numbers.
+"""
+
+import json
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from codebotler.files import to_line, to_text
+from roboeval import evaluate, load_results, load_suite, recorded_completions
+from roboeval.analysis.metrics import overall, task_scores
+from roboeval.analysis.summary import failures
+from roboeval.evaluation.judge import head
+from roboeval.evaluation.rows import Seal
+from roboeval.evaluation.run import Run
+
+ROWS = int(os.environ.get("ROWS", "100000"))
+
+
+def timed(what: str, function: Callable[[], object]) -> float:
+    """Call a function, and print and return the processor time that it takes, in seconds."""
+    start = time.process_time()
+    function()
+    spent = time.process_time() - start
+    print(f"{what:40} {spent:6.2f} s of processors")
+    return spent
+
+
+def made_up(folder: Path) -> Run:
+    """A judged run with so many rows."""
+    run, suite = Run(folder), load_suite()
+    completions = list(recorded_completions("recorded:hasty", suite))
+    rows = list(evaluate(completions, suite, workers=2))
+    times = -(-ROWS // len(rows))
+    run.rows("paper").parent.mkdir()
+    with run.completions.open("wb") as file, run.rows("paper").open("wb") as judged:
+        for number in range(times):
+            for completion, row in zip(completions, rows, strict=True):
+                index = row["index"] + 100 * number
+                file.write(to_line({**completion.row, "index": index}))
+                judged.write(to_line({**row, "index": index}))
+    seal = Seal()
+    with run.rows("paper").open("rb") as judged:
+        for line in judged:
+            seal.add(line)
+    run.head("paper").write_bytes(to_text({**head(suite), **seal.data()}))
+    return run
+
+
+def main() -> None:
+    """Read, count and compare."""
+    with tempfile.TemporaryDirectory() as folder:
+        run = made_up(Path(folder))
+        paths = (run.completions, run.rows("paper"))
+
+        def parse() -> None:
+            for path in paths:
+                with path.open("rb") as file:
+                    for line in file:
+                        json.loads(line)
+
+        plain = timed("parsing the files with json", parse)
+        table = load_results(run.path)
+        print(f"{table.height:,} rows about {sum(1 for _ in run.rows('paper').open('rb')):,} completions")
+        spent = timed("load_results", lambda: load_results(run.path))
+        timed("pass@1 and failures", lambda: (overall(task_scores(table), 1), failures(table)))
+        print(f"load_results takes {spent / plain:.1f} times as long as parsing")
+
+
+if __name__ == "__main__":
+    main()
