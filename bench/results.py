@@ -1,8 +1,8 @@
 """How long does it take to read a judged run of 100,000 completions as one table?
 
-The run is made up: verdicts on the programs that ship with the package, repeated under other indices. It prints the
-processor time of `load_results` beside that of parsing the same files with `json` and no more, and of one page of
-numbers.
+The run is made up: verdicts on the programs that ship with the package, repeated under other indices. It prints
+the processor time of `load_results` beside that of parsing the same files with `json` and no more, and of one
+page of numbers.
 """
 
 import json

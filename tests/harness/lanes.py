@@ -27,7 +27,7 @@ class SharedLane(Lane):
     """A lane that waits for its next user when it is closed, unless it was stopped in the middle of a run."""
 
     def __init__(self) -> None:
-        self.is_running = self.is_leaving = False
+        self.is_running = self.is_leaving = self.was_stopped = False
         super().__init__()
         start = self._preparer.start
         self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
@@ -52,11 +52,12 @@ class SharedLane(Lane):
         """End what is running, if anything is, and with it the lane."""
         self.is_leaving = True
         if self.is_running:
+            self.was_stopped = True  # also where the run ends by itself just now
             super().stop()
 
     def close(self) -> None:
         """Wait for the next user; one that was stopped, or whose last run has failed, ends."""
-        if self.is_running:
+        if self.is_running or self.was_stopped:
             super().close()
         elif self not in IDLE:
             IDLE.append(self)
