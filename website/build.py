@@ -28,7 +28,13 @@ WIDTH = 82  # letters in a line of `--help` here
 MODULES = {
     "codebotler": (
         *("codebotler", "codebotler.simulator", "codebotler.program", "codebotler.world", "codebotler.trace"),
-        *("codebotler.tracefile", "codebotler.skills", "codebotler.rtl", "codebotler.mission"),
+        *(
+            "codebotler.tracefile",
+            "codebotler.skills",
+            "codebotler.rtl",
+            "codebotler.rtl.reasoning",
+            "codebotler.mission",
+        ),
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
         *("codebotler.robots.ros", "codebotler.robots.ros1", "codebotler.robots.virtual"),
         *("codebotler.robots.worker", "codebotler.models.base", "codebotler.models.open"),

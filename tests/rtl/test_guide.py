@@ -3,10 +3,13 @@
 import doctest
 from pathlib import Path
 
-GUIDE = Path(__file__).parents[2] / "docs" / "rtl.md"
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
 
 
-def test_the_examples_of_the_guide() -> None:
-    results = doctest.testfile(str(GUIDE), module_relative=False, encoding="utf-8")
+@pytest.mark.parametrize("page", ["rtl.md", "reasoning.md"])
+def test_the_examples_of_the_guide(page: str) -> None:
+    results = doctest.testfile(str(DOCS / page), module_relative=False, encoding="utf-8")
     assert results.attempted > 20
     assert results.failed == 0

@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 
 from codebotler.rtl.pattern import compile_regex
-from roboeval.linting.sample_strings import inner_parts, parsed, spelled
+from codebotler.rtl.reasoning.regex_samples import inner_trees, parse_tree, spelled
 
 SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)
 """Lengths of the texts that are tried, in characters."""
@@ -107,7 +107,7 @@ def attacks(pattern: str) -> Iterator[Attack]:
     Args:
         pattern: the regex.
     """
-    tree = parsed(pattern)
+    tree = parse_tree(pattern)
     repeats = [*_repeats(list(tree), ("",))]
     units = dict.fromkeys(unit for _, several in repeats for unit in several)
     if not units:
@@ -131,7 +131,7 @@ def _repeats(items: Sequence[Any], before: Sequence[str]) -> Iterator[tuple[Sequ
             several = [unit for unit in spelled(inner)[:3] if unit]
             behind = _until_next_repeat(items[at + 1 :])
             yield before, [*several, *(unit + more for unit in several[:1] for more in behind)]
-        for part in inner_parts(str(op), value):
+        for part in inner_trees(str(op), value):
             yield from _repeats(list(part), before)
         following = [text for text in spelled([(op, value)]) if text][:2] or [""]
         before = [*dict.fromkeys(one + other for one in before for other in following)][:2]
@@ -149,7 +149,7 @@ def _denied(items: Sequence[Any]) -> Iterator[str]:
     for op, value in items:
         if str(op) == "ASSERT_NOT":
             yield from spelled(value[-1], " ")[-1:]
-        for part in inner_parts(str(op), value):
+        for part in inner_trees(str(op), value):
             yield from _denied(part)
 
 

@@ -1,7 +1,7 @@
 """Finds faults in tasks: requirements that can never decide anything, and checks that nothing uses or trips.
 
 Whether a requirement is `unsatisfiable` or `implied` is decided by RTL alone, for all sequences of
-representative events (see `roboeval.linting.satisfiability`), first with visits that name one room of the
+events (see `codebotler.rtl.reasoning`), first with visits that name one room of the
 world each, then with any. Only a text unlike all samples, or an option that is no text, could refute such a
 finding.
 """
@@ -19,16 +19,18 @@ from codebotler.badinput import YamlFile
 from codebotler.cachedproperty import cached_property
 from codebotler.english import listed
 from codebotler.models.recorded import closest_to
-from codebotler.rtl import Claim, Element, Formula, Number, Regex, Text, Without, Words
+from codebotler.rtl import Claim, Element, Formula, Not, Number, Regex, Text, Without, Words
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.reasoning.automaton import Undecided
+from codebotler.rtl.reasoning.regex_samples import samples
+from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
+from codebotler.rtl.reasoning.satisfiability import Reasoner
 from codebotler.simulator.robot import resolve_room, whole_words
 from codebotler.world import World
 from roboeval.evaluation.failures import failure
-from roboeval.linting.alphabet import elements
 from roboeval.linting.backtracking import slow_text
 from roboeval.linting.findings import Finding, Kind
 from roboeval.linting.names import absent_names
-from roboeval.linting.sample_strings import can_match, representative_texts, samples
-from roboeval.linting.satisfiability import Reasoner, Undecided
 from roboeval.linting.trials import Verdicts, recorded_replies, unasked
 from roboeval.suites.load import Check, Requirement, Scenario, Task
 
@@ -280,8 +282,8 @@ def _require_the_same(one: Scenario, other: Scenario) -> bool:
         return True
     reasoner = Reasoner([*first, *second])
     try:
-        return reasoner.clash([*first]) is None and all(
-            reasoner.trace([*held], denied) is None
+        return reasoner.conflict([*first]) is None and all(
+            reasoner.trace([*held, Not(denied)]) is None
             for held, others in ((first, second), (second, first))
             for denied in others
             if denied not in held
@@ -363,12 +365,12 @@ class _Place:
 
     def clash(
         self, formulas: Sequence[Formula], denied: Formula | None = None
-    ) -> tuple[tuple[Formula, ...], str] | None:
+    ) -> tuple[list[Formula], str] | None:
         """Formulas that clash, or imply the denied one, and the condition on which they do."""
-        clash = self.plain_moves.clash(formulas, denied)
+        clash = self.plain_moves.conflict(formulas, denied)
         if clash is None:
             return None
-        always = self.any_moves.clash(formulas, denied)
+        always = self.any_moves.conflict(formulas, denied)
         return (clash, _PLAIN) if always is None else (always, "")
 
     @cached_property
@@ -379,7 +381,7 @@ class _Place:
     def plain_moves(self) -> Reasoner:
         moves = {request: resolve_room(self.rooms, request) or request for request in self.requests}
         formulas = (r.formula for r in self.scenario.require)
-        return Reasoner(formulas, self.requests, moves, self.scenario.world.robot)
+        return Reasoner(formulas, moves, self.scenario.world.robot)
 
     @cached_property
     def requests(self) -> list[str]:
@@ -409,7 +411,7 @@ class _Place:
     def leads_somewhere(self, text: Text) -> bool:
         if any(map(text.matches, self.requests)):
             return True
-        others = representative_texts((text, *map(Regex, self.rooms)))
+        others = distinct_strings((text, *map(Regex, self.rooms)))
         return any(text.matches(one) and resolve_room(self.rooms, one) for one in others)
 
     def absent(self, requirement: Requirement) -> Iterator[Finding]:

@@ -7,11 +7,13 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
-from codebotler.rtl import Element
+from codebotler.rtl import Element, Regex
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.reasoning.regex_samples import Tree, inner_trees, parse_tree, samples
+from codebotler.rtl.reasoning.sample_strings import patterns
+from codebotler.simulator.robot import found_in
 from codebotler.syntaxtree import parse_expression
 from codebotler.world import Room
-from roboeval.linting.alphabet import elements
-from roboeval.linting.sample_strings import alternatives, is_among, patterns, spelled_out
 from roboeval.suites.load import Requirement, Scenario, Task
 
 ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
@@ -83,3 +85,78 @@ def _arguments(requirement: Requirement) -> list[str]:
     call = parse_expression(requirement.text.strip().removeprefix("not "))
     values = call.args if isinstance(call, ast.Call) else []
     return [str(value.value) for value in values if isinstance(value, ast.Constant)]
+
+
+def alternatives(pattern: str) -> list[str]:
+    """A regex once for each of the words that it leaves the choice of, at its top or in a group.
+
+    Args:
+        pattern: the regex; alone in the answer where it leaves no choice, or refers back to a group.
+    """
+    if re.search(r"\\\d|\(\?P=|\(\?\(", pattern):
+        return [pattern]
+    branches = _branches(pattern)
+    return [one for branch in branches for one in _without_choice(branch)]
+
+
+def _branches(pattern: str) -> list[str]:
+    """What stands between the bars outside of groups and sets."""
+    pieces = re.findall(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|.", pattern, re.DOTALL)
+    branches, depth = [""], 0
+    for piece in pieces:
+        depth += (piece == "(") - (piece == ")")
+        if piece == "|" and depth == 0:
+            branches.append("")
+        else:
+            branches[-1] += piece
+    return branches if all(branches) else [pattern]
+
+
+_CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
+
+
+def _without_choice(pattern: str) -> list[str]:
+    one_less = (
+        pattern[: group.start()] + word + pattern[group.end() :]
+        for group in _CHOICE.finditer(pattern)
+        for word in group[1].split("|")
+    )
+    return [*one_less] or [pattern]
+
+
+def spelled_out(pattern: str) -> Iterator[str]:
+    """The plain texts in a regex, such as names, as they stand there.
+
+    Args:
+        pattern: the regex.
+    """
+    yield from _literals(parse_tree(pattern))
+
+
+def _literals(items: Tree) -> Iterator[str]:
+    text = ""
+    for op, value in items:
+        if str(op) == "LITERAL":
+            text += chr(value)
+            continue
+        yield text
+        text = ""
+        for inner in inner_trees(str(op), value):
+            yield from _literals(inner)
+    yield text
+
+
+def is_among(pattern: str, labels: Iterable[str]) -> bool:
+    """Whether something may be meant by a regex; true also of one that means anything, or nothing.
+
+    Args:
+        pattern: the regex.
+        labels: what things are called.
+    """
+    wanted = Regex(pattern)
+    texts = samples(pattern)
+    return (
+        not texts
+        or wanted.matches("")
+        or any(wanted.matches(label) or any(found_in(label, text) for text in texts) for label in labels)
+    )

@@ -6,24 +6,15 @@ import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
-from typing import get_args
 
 import pytest
-from hypothesis import given, reject, settings
-from hypothesis import strategies as st
 
 from codebotler.models.recorded import read_replies
-from codebotler.rtl import Formula, Regex, Without, Words, holds, parse
-from codebotler.rtl.formula import CutName
-from codebotler.trace import Trace
 from roboeval.evaluation.completions import Completion
 from roboeval.evaluation.judge import evaluate
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
-from roboeval.linting.sample_strings import can_match, representative_texts, samples
-from roboeval.linting.satisfiability import Automaton, Reasoner, Undecided
 from roboeval.linting.trials import tried, unasked
 from roboeval.suites.catalogue import new_task
 from roboeval.suites.load import Suite, load_suite
@@ -584,165 +575,3 @@ def test_of_requirements_that_one_line_makes_a_few_stand_for_all(tmp_path: Path)
     (tmp_path / "tasks" / "Hello.yaml").write_text(DRAWN)
     findings = [one for one in lint(load_suite(str(tmp_path)).task("Hello"), []) if one.kind != "untripped"]
     assert names(findings) == ["implied: speaks"]
-
-
-# --- the paper's suite
-
-
-# --- deciding
-
-
-CUTS = ("", *(f".{name}({element})" for name in get_args(CutName) for element in ('goto("b")', 'say("x")')))
-TESTS = (
-    'Exists(say("x"))',
-    'Count(say("x"), 2)',
-    'AtLeast(say("x"), 2)',
-    'ActAtFirst("a", say("x"))',
-    'ActAtSome("a", say("x"))',
-    'ActAtSome("a", goto("a"))',
-    'Exists(ask("x", "y"))',
-)
-
-
-@pytest.mark.parametrize("cut", CUTS)
-@pytest.mark.parametrize("test", TESTS)
-def test_automata_judge_all_short_traces_as_formulas_do(test: str, cut: str) -> None:
-    formula = parse(f"tr{cut}.{test}")
-    reasoner = Reasoner([formula], ["a", "b", "xax", "a b"])
-    automaton, letters = reasoner._reading(formula)
-    events = {letter: event for event, letter in zip(reasoner.events, letters, strict=True)}
-    length = 5 if len(events) < 5 else 4
-    for word in product(events, repeat=length):
-        state = 0
-        for letter in word:
-            state = automaton.rows[state][letter]
-        assert automaton.accepts[state] == holds(formula, tuple(events[letter] for letter in word))
-        assert automaton.complement.accepts[state] != automaton.accepts[state]
-    assert automaton.accepts[0] == holds(formula, ())
-
-
-@settings(max_examples=150, deadline=None)
-@given(data=st.data())
-def test_found_traces_and_clashes_are_right(data: st.DataObject) -> None:
-    formulas = data.draw(st.lists(FORMULAS, min_size=1, max_size=3, unique=True))
-    denied = data.draw(FORMULAS)
-    reasoner = Reasoner([*formulas, denied])
-    try:
-        found = reasoner.trace(formulas, denied)
-        clash = reasoner.clash(formulas, denied)
-    except Undecided:
-        reject()
-    if found is not None:
-        assert all(holds(one, found) for one in formulas)
-        assert not holds(denied, found)
-    assert (clash is None) == (found is not None)
-    tried: Trace = tuple(data.draw(st.lists(st.sampled_from(reasoner.events), max_size=6)))
-    if clash is not None and all(holds(one, tried) for one in clash):
-        assert holds(denied, tried)
-
-
-def single_tests() -> st.SearchStrategy[str]:
-    elements = st.sampled_from(
-        ['goto("a")', 'goto(without("a"))', 'say("x|y")', 'say(words("x", without("y")))', 'ask("x", "y")']
-    )
-    cut = st.builds(
-        "{}({})".format, st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]), elements
-    )
-    cuts = st.lists(cut, max_size=2).map(lambda parts: ".".join(["tr", *parts]))
-    counts = st.builds(
-        "{}({}, {})".format, st.sampled_from(["Count", "AtLeast"]), elements, st.integers(0, 3)
-    )
-    acts = st.builds('{}("a", {})'.format, st.sampled_from(["ActAtFirst", "ActAtSome"]), elements)
-    return st.builds("{}.{}".format, cuts, st.one_of(elements.map("Exists({})".format), counts, acts))
-
-
-def formulas() -> st.SearchStrategy[Formula]:
-    larger = st.builds(
-        "({}) {} not ({})".format, single_tests(), st.sampled_from(["and", "or"]), single_tests()
-    )
-    return (single_tests() | larger | single_tests().map("not ({})".format)).map(parse)
-
-
-FORMULAS = formulas()
-
-
-def test_options_may_match_what_no_single_one_can() -> None:
-    both = parse(
-        'tr.Exists(ask("a", "^yes$")) and tr.Exists(ask("a", "^no$")) and tr.Count(ask("a", ".*"), 1)'
-    )
-    assert Reasoner([both]).clash([both]) is None
-    none = parse(
-        'tr.Exists(ask("^yes$", ".*")) and tr.Exists(ask("^no$", ".*")) and tr.Count(ask(".*", ".*"), 1)'
-    )
-    assert Reasoner([none]).clash([none]) == (none,)
-
-
-def test_a_clash_holds_no_more_than_it_must() -> None:
-    goes, stays, speaks = map(parse, (GOES, STAYS, SPEAKS))
-    reasoner = Reasoner([goes, stays, speaks])
-    assert reasoner.clash([speaks, goes, stays]) == (goes, stays)
-    assert reasoner.clash([speaks, goes]) is None
-    assert reasoner.clash([speaks, goes], goes) == (goes,)
-
-
-def test_automata_are_small() -> None:
-    formula = parse('tr.Exists(say("a")) and tr.Exists(say("a")) and tr.AtLeast(say("a"), 1)')
-    automaton, _ = Reasoner([formula])._reading(formula)
-    assert isinstance(automaton, Automaton)
-    assert len(automaton.rows) == 2
-    assert automaton.distances == (1, 0)
-
-
-def test_large_automata_are_given_up() -> None:
-    formula = parse('tr.Count(say("a"), 5000)')
-    with pytest.raises(Undecided):
-        Reasoner([formula]).trace([formula])
-
-
-# --- texts
-
-
-@pytest.mark.parametrize(
-    "pattern",
-    [
-        "a|b",
-        r"\bno\b",
-        r"^4\b| 4",
-        "a{2,3}",
-        "[^a-z]",
-        r"\d+:\S",
-        "(?=.*6)(?=.*pm)",
-        r"(a|b)\1",
-        "[[a]b",
-        "a{500}",
-        "(?i:x)",
-        "a(?!b)",
-        r"\Bx",
-    ],
-)
-def test_samples_match(pattern: str) -> None:
-    found = samples(pattern)
-    assert found
-    for text in found:
-        assert Regex(pattern).matches(text)
-        assert text == text.strip()
-
-
-def test_representative_texts_match_in_all_combinations() -> None:
-    texts = (Regex("cat"), Regex("dog|cow"), Without("cat"), Words((Regex("cat"), Regex("dog|cow"))))
-    found = {tuple(text.matches(one) for text in texts[:3]) for one in representative_texts(texts)}
-    assert found == {
-        (False, False, True),
-        (True, False, False),
-        (True, False, True),
-        (False, True, True),
-        (True, True, False),
-        (True, True, True),
-    }
-
-
-def test_a_text_must_not_start_with_a_word() -> None:
-    starts = (Regex("not"), Regex(r"^(?!not\b)"))
-    found = {tuple(text.matches(one) for text in starts) for one in representative_texts(starts)}
-    assert found == {(False, True), (True, False), (True, True)}
-    assert not can_match(Words((Regex("^x"), Regex(r"^(?!x)"))))

@@ -1,0 +1,73 @@
+"""The alphabet of formulas: an event for each way in which their elements can match one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, Element, Formula, Not, Or, Regex, Text
+from codebotler.rtl.reasoning.sample_strings import distinct_strings
+from codebotler.trace import Event, Option
+
+
+def elements(formula: Formula) -> Iterator[Element]:
+    """All elements of a formula in the order of its text; for a stay, the moves that bound it."""
+    match formula:
+        case And(parts) | Or(parts):
+            for part in parts:
+                yield from elements(part)
+        case Not(part):
+            yield from elements(part)
+        case _:
+            yield from (cut.element for cut in formula.cuts)
+            if isinstance(formula, ActAtFirst | ActAtSome):
+                yield from (formula.stay.arrival, formula.stay.departure)
+            yield formula.element
+
+
+def alphabet(wanted: Iterable[Element], rooms: Sequence[str] | None = None) -> list[Event]:
+    """Events that match elements in all combinations for which strings were found.
+
+    Args:
+        wanted: what the events are to tell apart.
+        rooms: where they may happen; anywhere by default. If no element names a place, all happen in none.
+    """
+    kinds: dict[str, list[Element]] = {}
+    for element in dict.fromkeys(wanted):
+        kinds.setdefault(element.kind, []).append(element)
+    places = _places([element for alike in kinds.values() for element in alike], rooms)
+    return [
+        Event(kind, text, choice, answer, place=place)
+        for kind, alike in kinds.items()
+        for text in distinct_strings(_distinct(element.text for element in alike))
+        for choice in _choices(alike)
+        for answer in _answers(alike)
+        for place in (places if kind != "goto" else [""])
+    ]
+
+
+def _distinct(texts: Iterable[Text | None]) -> tuple[Text, ...]:
+    return tuple(dict.fromkeys(text for text in texts if text is not None))
+
+
+def _places(wanted: Sequence[Element], rooms: Sequence[str] | None) -> Sequence[str]:
+    """Rooms that match the elements' places in all combinations."""
+    regexes = _distinct(Regex(e.is_place.pattern) for e in wanted if e.is_place is not None)
+    if not regexes:
+        return [""]
+    return distinct_strings(regexes) if rooms is None else rooms
+
+
+def _answers(wanted: Sequence[Element]) -> list[str | None]:
+    answers = _distinct(element.answer for element in wanted)
+    return [None, *(distinct_strings(answers, outer=True) if answers else ())]
+
+
+def _choices(wanted: Sequence[Element]) -> Iterable[tuple[Option, ...]]:
+    """Options that match in all combinations; one option may match what another cannot match as well."""
+    texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
+    found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
+    for string in distinct_strings(texts, outer=True):
+        matched = frozenset(text for text in texts if text.matches(string))
+        for already, choice in tuple(found.items()):
+            found.setdefault(already | matched, (*choice, Option(string)))
+    return found.values()

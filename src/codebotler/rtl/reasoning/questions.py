@@ -1,0 +1,69 @@
+"""Questions about formulas: can they hold, does one follow from others, do two mean the same?
+
+A question raises `Undecided` if its answer would take too long to find.
+"""
+
+from __future__ import annotations
+
+from codebotler.rtl.formula import Formula, Not
+from codebotler.rtl.reasoning.satisfiability import Reasoner
+from codebotler.trace import Trace
+
+
+def is_satisfiable(*formulas: Formula) -> bool:
+    """Whether some trace satisfies all formulas.
+
+    Args:
+        formulas: what must hold at the same time.
+    """
+    return Reasoner(formulas).trace(formulas) is not None
+
+
+def satisfying_trace(*formulas: Formula) -> Trace | None:
+    """A shortest trace that satisfies all formulas, or None if they contradict each other.
+
+    Args:
+        formulas: what must hold at the same time.
+    """
+    return Reasoner(formulas).trace(formulas, shortest=True)
+
+
+def conflict(*formulas: Formula) -> list[Formula] | None:
+    """Formulas that contradict each other, none of which can be left out, or None if all can hold.
+
+    Args:
+        formulas: what is to hold at the same time.
+    """
+    return Reasoner(formulas).conflict(formulas)
+
+
+def is_implied(formula: Formula, *premises: Formula) -> bool:
+    """Whether a formula holds on every trace on which the premises hold.
+
+    Args:
+        formula: what may follow.
+        premises: from what; without any, the formula must always hold.
+    """
+    return Reasoner([formula, *premises]).trace([*premises, Not(formula)]) is None
+
+
+def are_equivalent(one: Formula, other: Formula) -> bool:
+    """Whether two formulas hold on the same traces.
+
+    Args:
+        one: a formula.
+        other: a formula.
+    """
+    return is_implied(one, other) and is_implied(other, one)
+
+
+def distinguishing_trace(one: Formula, other: Formula) -> Trace | None:
+    """A shortest trace on which only one of two formulas holds, or None if they are equivalent.
+
+    Args:
+        one: a formula.
+        other: a formula.
+    """
+    reasoner = Reasoner([one, other])
+    found = (reasoner.trace([a, Not(b)], shortest=True) for a, b in ((one, other), (other, one)))
+    return min((trace for trace in found if trace is not None), key=len, default=None)

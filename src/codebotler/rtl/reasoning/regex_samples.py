@@ -1,0 +1,117 @@
+"""Sample strings of one regex, spelled out from the tree into which Python parses it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from itertools import chain, zip_longest
+from random import Random
+from typing import Any
+
+from codebotler.rtl.formula import Regex
+from codebotler.unwarned import unwarned
+
+Tree = Any
+"""A regex as Python parses it, or a part: pairs of an operation and its arguments, of private classes."""
+
+_FLAGS = re.IGNORECASE | re.DOTALL
+_MOST_SAMPLES = 4
+_MOST_SPELLED = 16
+_LONGEST = 10_000
+
+
+def parse_tree(pattern: str) -> Tree:
+    """The tree of a regex, as Python parses it."""
+    with unwarned():
+        return import_module("re._parser").parse(pattern, _FLAGS)
+
+
+def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Python's parser made them
+    """The trees within one node of a tree."""
+    match op:
+        case "BRANCH":
+            return list(arguments[1])
+        case "SUBPATTERN" | "ASSERT" | "ASSERT_NOT":
+            return [arguments[-1]]
+        case "ATOMIC_GROUP":
+            return [arguments]
+        case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
+            return [arguments[2]]
+    return []
+
+
+@cache
+def samples(pattern: str) -> tuple[str, ...]:
+    """Up to four strings in which a regex is found, without outer spaces if possible; may be empty."""
+    words = _spelled_in_all_ways(parse_tree(pattern))
+    forms = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in words]
+    tries = (map(str.strip, forms), forms, _guesses(pattern))
+    found = (dict.fromkeys(filter(Regex(pattern).matches, several)) for several in tries)
+    return tuple(next(filter(None, found), {}))[:_MOST_SAMPLES]
+
+
+def counter_samples(pattern: str) -> list[str]:
+    """Strings in the negative lookaheads of a regex, which keep it from being found."""
+    denied = (arguments[-1] for op, arguments in parse_tree(pattern) if str(op) == "ASSERT_NOT")
+    words = (word.strip() for tree in denied for word in _spelled_in_all_ways(tree)[:_MOST_SPELLED])
+    return [*dict.fromkeys(filter(None, words))]
+
+
+def _guesses(pattern: str) -> Iterator[str]:
+    """Short strings of the regex's own characters, drawn at random."""
+    random, letters = Random(pattern), f"{pattern}x1 "  # noqa: S311 - no secret
+    return ("".join(random.choices(letters, k=random.randint(0, 8))).strip() for _ in range(3_000))
+
+
+def _spelled_in_all_ways(tree: Tree) -> list[str]:
+    """Spelled close together, apart, and with what lookaheads demand behind all else."""
+    behind = sorted(tree, key=lambda node: str(node[0]) == "ASSERT")
+    ways = zip_longest(spelled(tree), spelled(tree, " "), spelled(behind, " "))
+    return [*dict.fromkeys(text for text in chain.from_iterable(ways) if text is not None)]
+
+
+def spelled(tree: Tree, gap: str = "") -> list[str]:
+    """Some strings for which a tree stands.
+
+    Args:
+        tree: the tree of a regex, or a part of it.
+        gap: what to put where any character may stand.
+    """
+    texts = [""]
+    for op, arguments in tree:
+        parts = _spelled_node(op, arguments, gap)
+        texts = [*dict.fromkeys(text + part for part in parts for text in texts)][:_MOST_SPELLED]
+    return texts
+
+
+def _spelled_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
+    inner = [spelled(tree, gap) for tree in inner_trees(str(op), arguments)]
+    match str(op):
+        case "LITERAL":
+            return [chr(arguments)]
+        case "NOT_LITERAL" | "ANY" | "IN":
+            return _characters(op, arguments, gap)
+        case "BRANCH" | "SUBPATTERN" | "ATOMIC_GROUP":
+            most = _MOST_SPELLED if len(inner) == 1 else _MOST_SAMPLES
+            return [text for texts in inner for text in texts[:most]]
+        case "ASSERT":
+            return [text + gap for text in inner[0]]
+        case "MAX_REPEAT" | "MIN_REPEAT" | "POSSESSIVE_REPEAT":
+            least = arguments[0]
+            repeated = [text * max(least, 1) for text in inner[0] if len(text) * least <= _LONGEST]
+            none = [] if least else [""]
+            return [*repeated, *none] if gap else [*none, *repeated]
+    return [""]
+
+
+def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
+    """Some characters that a set holds, what it names first; one where it holds nearly all."""
+    parser = import_module("re._parser")
+    one = import_module("re._compiler").compile(parser.SubPattern(parser.State(), [(op, arguments)]), _FLAGS)
+    members = arguments if str(op) == "IN" else []
+    codes = [codes for kind, codes in members if str(kind) in {"LITERAL", "RANGE"}]
+    ends = [chr(end) for each in codes for end in (each if isinstance(each, tuple) else (each,))]
+    found = [char for char in dict.fromkeys([*gap, *ends, *"ab1 _-.'z"]) if one.match(char)]
+    return found[: _MOST_SAMPLES if members else 1]

@@ -1,0 +1,123 @@
+"""Sample strings that tell texts of formulas apart: what a program could say, ask or visit.
+
+They are put together from samples of the texts' regexes, and each is tried. Where no string is found there
+may still be one.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
+from itertools import chain, combinations, islice, permutations, product
+
+from codebotler.rtl.claims import Claim, Number, Time
+from codebotler.rtl.formula import Regex, Text, Without, Words
+from codebotler.rtl.reasoning.regex_samples import counter_samples, samples
+
+_MOST_SUBSETS = 400
+_MOST_ALIKE = 2
+
+
+@cache
+def distinct_strings(texts: tuple[Text, ...], *, outer: bool = False) -> tuple[str, ...]:
+    """One string, a short one, for each combination of texts that match together in some candidate.
+
+    Args:
+        texts: what the strings are to tell apart.
+        outer: whether they may begin or end with spaces, as options may and texts of events may not.
+    """
+    found: dict[tuple[bool, ...], str] = {}
+    for candidate in _candidates(texts, outer=outer):
+        found.setdefault(tuple([text.matches(candidate) for text in texts]), candidate)
+    return tuple(found.values())
+
+
+@cache
+def can_match(text: Text, *, outer: bool = False) -> bool:
+    """Whether a string was found that matches a text.
+
+    Args:
+        text: the text.
+        outer: whether the string may begin or end with spaces.
+    """
+    return any(map(text.matches, _candidates((text,), outer=outer)))
+
+
+def patterns(text: Text) -> Iterator[str]:
+    """The regexes in a text of RTL."""
+    match text:
+        case Words(parts):
+            yield from chain.from_iterable(map(patterns, parts))
+        case Regex(pattern) | Without(pattern) | Claim(pattern):
+            yield pattern
+        case Number(_, thing, others):
+            yield from (thing, *others)
+        case Time():
+            return
+
+
+@cache
+def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
+    regexes = dict.fromkeys(chain.from_iterable(map(patterns, texts)))
+    groups = [[*group] for one in regexes for group in (samples(one), counter_samples(one)) if group]
+    words = [*dict.fromkeys([*chain.from_iterable(groups), *chain.from_iterable(map(_claims, texts))])]
+    whole = [word for word in words if word]
+    every = chain(
+        ["", "x"],
+        words,
+        (f"x{word}x" for word in whole),
+        (form for word in whole for form in (f"x {word}", f"{word} x")),
+        _pairs(_told_apart(whole, texts)),
+        _subsets([group[0] for group in groups]),
+        *(_joined(text.parts) for text in texts if isinstance(text, Words)),
+        (form for word in words for form in (f" {word}", f"{word} ", f" {word} ")),
+    )
+    return tuple(dict.fromkeys(text for text in every if outer or text == text.strip()))
+
+
+def _claims(text: Text) -> Iterator[str]:
+    """Texts that claim what a text of RTL is about, rightly or wrongly."""
+    match text:
+        case Words(parts):
+            yield from chain.from_iterable(map(_claims, parts))
+        case Number(number, thing, _):
+            yield from (f"{given} {one}" for one in samples(thing) for given in (number, number + 1))
+        case Time(start, end):
+            yield from (start, end, "03:07", f"{start} or 03:07")
+        case Claim(pattern):
+            yield from (f"there is {no}{one}" for one in samples(pattern) for no in ("", "no "))
+        case Regex() | Without():
+            return
+
+
+def _told_apart(words: Iterable[str], texts: Sequence[Text]) -> list[str]:
+    """Of words that the texts, their parts and their regexes all match alike, only the first two."""
+    parts = chain.from_iterable(text.parts if isinstance(text, Words) else (text,) for text in texts)
+    wanted = [*dict.fromkeys([*parts, *(Regex(pattern) for text in texts for pattern in patterns(text))])]
+    alike: defaultdict[tuple[bool, ...], list[str]] = defaultdict(list)
+    for word in words:
+        alike[tuple([text.matches(word) for text in wanted])].append(word)
+    return [word for several in alike.values() for word in several[:_MOST_ALIKE]]
+
+
+def _pairs(words: Sequence[str]) -> Iterator[str]:
+    return map(" ".join, product([*words, *(f"x{word}x" for word in words)], repeat=2))
+
+
+def _subsets(words: Sequence[str]) -> Iterator[str]:
+    """Three words or more, the most first, in their order and in the opposite one."""
+    subsets = chain.from_iterable(combinations(words, size) for size in range(len(words), 2, -1))
+    return (" ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1]))
+
+
+def _joined(parts: Sequence[Text]) -> Iterator[str]:
+    """A sample of each part, in several orders."""
+    groups = [
+        [word for pattern in patterns(part) for word in samples(pattern)] or [""]
+        for part in parts
+        if not isinstance(part, Without)
+    ]
+    for order in islice(permutations(groups), 24):
+        for choice in islice(product(*order), 64):
+            yield from (joint.join(filter(None, choice)) for joint in (" ", "", "x"))

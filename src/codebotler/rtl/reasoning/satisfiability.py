@@ -1,0 +1,168 @@
+"""A search for traces on which formulas hold.
+
+Each formula becomes an automaton, and the product of the automata is searched to its end. So "there is none"
+is a proof for all sequences, of any length, of events of the alphabet. The alphabet is sampled, and that is
+the one gap: a text unlike every sample. Options that are not text are left out.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, compress, count
+from operator import getitem
+from typing import TypeAlias
+
+from codebotler.rtl.formula import Element, Formula, Not
+from codebotler.rtl.reasoning.alphabet import alphabet, elements
+from codebotler.rtl.reasoning.automaton import Automaton, Undecided
+from codebotler.rtl.semantics import holds, matches
+from codebotler.trace import Event, Trace
+
+MOST_VISITED = 20_000
+"""States of a product that are visited before a search gives up."""
+
+Reading: TypeAlias = tuple[Automaton, list[int]]
+"""An automaton, and which of its letters each event of the alphabet is."""
+
+
+class Reasoner:
+    """What formulas allow a robot to do, anywhere or in the rooms of one world.
+
+    Args:
+        formulas: all that questions will be about; their regexes make the alphabet.
+        moves: where each request to move leads; by default any text may lead anywhere.
+        start: the room in which the robot starts, where moves are given.
+    """
+
+    def __init__(
+        self, formulas: Iterable[Formula], moves: Mapping[str, str] | None = None, start: str = ""
+    ) -> None:
+        wanted = [*dict.fromkeys(chain.from_iterable(map(elements, formulas)))]
+        rooms = None if moves is None else [*dict.fromkeys([start, *moves.values()])]
+        self.events = alphabet(wanted, rooms)
+        self._readings: dict[Formula, Reading] = {}
+        self._driving: Reading | None = None
+        if moves is not None and rooms is not None:
+            self.events = [event for event in self.events if event.kind != "goto"]
+            self.events += [Event("goto", move) for move in moves]
+            if any(element.place is not None for element in wanted):
+                self._driving = _driving(self.events, rooms, moves)
+        self._matched = {element: self._matching(element) for element in wanted}
+
+    def conflict(self, formulas: Sequence[Formula], denied: Formula | None = None) -> list[Formula] | None:
+        """Formulas that cannot all hold, or not while another fails; none of them can be left out.
+
+        It starts with no formula and adds one that the last trace breaks, so that proofs stay small.
+
+        Args:
+            formulas: those that may be in it.
+            denied: what must fail; then they imply it.
+
+        Returns:
+            the conflicting formulas, in their order; None if there is no conflict.
+
+        Raises:
+            Undecided: the search would take too long.
+        """
+        given = [] if denied is None else [Not(denied)]
+        wanted = {element for one in given for element in elements(one)}
+        nearest = sorted(formulas, key=lambda one: -len(wanted.intersection(elements(one))))
+        chosen: list[Formula] = []
+        while (trace := self.trace([*chosen, *given])) is not None:
+            broken = next((one for one in nearest if not holds(one, trace)), None)
+            if broken is None:
+                return None
+            chosen.append(broken)
+        for one in tuple(chosen):
+            fewer = [other for other in chosen if other != one]
+            if self.trace([*fewer, *given]) is None:
+                chosen = fewer
+        return [one for one in formulas if one in chosen]
+
+    def trace(self, formulas: Iterable[Formula], *, shortest: bool = False) -> Trace | None:
+        """A trace of events of the alphabet on which formulas hold; None if there is none.
+
+        Args:
+            formulas: what must hold.
+            shortest: whether to find one of the shortest, which takes longer.
+
+        Raises:
+            Undecided: the search would take too long.
+        """
+        readings = [self._reading(one) for one in formulas]
+        if self._driving is not None:
+            readings.append(self._driving)
+        letters: dict[States, Event] = {}  # of events that no automaton tells apart, the first
+        for event, *of_event in zip(self.events, *(numbers for _, numbers in readings), strict=True):
+            letters.setdefault(tuple(of_event), event)
+        return _search([automaton for automaton, _ in readings], letters, shortest=shortest)
+
+    def _reading(self, formula: Formula) -> Reading:
+        if formula not in self._readings:
+            seen = [*dict.fromkeys(elements(formula))]
+            letters = [
+                frozenset(compress(seen, row))
+                for row in zip(*map(self._matched.__getitem__, seen), strict=True)
+            ]
+            number = {letter: index for index, letter in enumerate(dict.fromkeys(letters))}
+            self._readings[formula] = Automaton.of(formula, [*number]), [number[letter] for letter in letters]
+        return self._readings[formula]
+
+    def _matching(self, element: Element) -> list[bool]:
+        return [matches(element, (event,), 0) for event in self.events]
+
+
+def _driving(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
+    """What accepts the traces in which each event happens where the robot is."""
+    lost = len(rooms)
+    kinds = [(event.text if event.kind == "goto" else "", event.place) for event in events]
+    number = {kind: index for index, kind in enumerate(dict.fromkeys(kinds))}
+    rows = [
+        tuple(rooms.index(moves[move]) if move else here if room == place else lost for move, place in number)
+        for here, room in enumerate(rooms)
+    ]
+    automaton = Automaton((*rows, (lost,) * len(number)), (*(True for _ in rooms), False))
+    return automaton, [number[kind] for kind in kinds]
+
+
+States: TypeAlias = tuple[int, ...]
+"""One state of each automaton of a product."""
+
+
+def _search(
+    automata: Sequence[Automaton], letters: Mapping[States, Event], *, shortest: bool
+) -> Trace | None:
+    """A trace that all automata accept: greedily, where acceptance is near, or the shortest, by A*."""
+    tables = [automaton.rows for automaton in automata]
+    distances = [automaton.distances for automaton in automata]
+    start = (0,) * len(automata)
+    came: dict[States, tuple[int, States, Event | None]] = {start: (0, start, None)}
+    if None in map(getitem, distances, start):
+        return None
+    heap, order = [(0, 0, start)], count(1)
+    while heap:
+        _, _, state = heapq.heappop(heap)
+        if not any(map(getitem, distances, state)):
+            return tuple(reversed([*_back(state, came)]))
+        steps = came[state][0] + 1
+        here = [*map(getitem, tables, state)]
+        for letter, event in letters.items():
+            after = (*map(getitem, here, letter),)
+            if after in came and (not shortest or came[after][0] <= steps):
+                continue
+            came[after] = steps, state, event
+            far = [*map(getitem, distances, after)]
+            if None not in far:
+                left = [each or 0 for each in far]
+                heapq.heappush(heap, (steps + max(left) if shortest else sum(left), next(order), after))
+        if len(came) > MOST_VISITED:
+            raise Undecided
+    return None
+
+
+def _back(state: States, came: Mapping[States, tuple[int, States, Event | None]]) -> Iterator[Event]:
+    _, before, event = came[state]
+    while event is not None:
+        yield event
+        _, before, event = came[before]
