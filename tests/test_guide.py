@@ -8,7 +8,7 @@ import pytest
 from pydantic import BaseModel
 
 from codebotler.checker import check
-from codebotler.models.recorded import RecordingFile, ReplyFile
+from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
 from codebotler.simulator.sandbox.stdlib import LISTED
 from codebotler.trace import Status
@@ -29,6 +29,7 @@ from roboeval.suites.schema import (
     SuiteFile,
     TaskFile,
 )
+from roboeval.suites.solutions import EquivalentMutantFile, SolutionsFile
 
 DOCS = Path(__file__).parent.parent / "docs"
 GUIDE = (DOCS / "index.md").read_text()
@@ -102,6 +103,8 @@ def test_categories_abilities_and_findings_are_listed(head: str, known: tuple[st
         (TASKS, "key of a world", (ScenarioFile,)),
         (TASKS, "key of a room", (RoomFile,)),
         (TASKS, "key of a person", (PersonFile,)),
+        (TASKS, "key of a file of solutions", (SolutionsFile,)),
+        (TASKS, "key of a program", (Solution,)),
         (DRAWN, "key", (DrawnWorldsFile,)),
         (DRAWN, "key of a person", (DrawnPersonFile,)),
         (DRAWN, "key of a thing", (DrawnThingFile,)),
@@ -120,6 +123,7 @@ def test_the_keys_of_files_are_listed(page: str, head: str, forms: tuple[type[Ba
         (TASKS, "key of a task", "`checks`", CheckFile),
         (TASKS, "key of a task", "`accepted`", AcceptedFile),
         (TASKS, "key of a person", "`answers`", OptionFile),
+        (TASKS, "key of a file of solutions", "`equivalent_mutants`", EquivalentMutantFile),
         (DRAWN, "key", "`corners`", CornerFile),
     ],
 )
@@ -127,9 +131,3 @@ def test_the_keys_within_a_key_are_told(page: str, head: str, row: str, form: ty
     (meaning,) = (told for first, told in table(page, head) if first.strip() == row)
     told = re.findall(r"`\{?(\w+)(?:: [^`]*)?`", meaning)
     assert keys(form) <= set(told)
-
-
-def test_the_keys_of_recorded_programs_are_told() -> None:
-    _, _, rest = (DOCS / TASKS).read_text().partition("\nIn `recorded/ANY NAME/TASK.yaml`")
-    told = re.findall(r"`(\w+)`", rest.partition("\n\n")[0])
-    assert set(told) - {"null"} == keys(RecordingFile, ReplyFile)

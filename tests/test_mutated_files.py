@@ -5,16 +5,15 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import pytest
 
 from codebotler.badinput import BadInput, YamlFile
-from codebotler.models.recorded import FOLDER, RecordingFile
 from codebotler.tracefile import OutcomeFile
 from codebotler.world import WorldFile
 from roboeval.suites.load import SUITES, read_task
 from roboeval.suites.schema import SuiteFile
+from roboeval.suites.solutions import SolutionsFile
 
 WORLD = """\
 about: second floor, after lunch
@@ -69,9 +68,8 @@ def world(file: YamlFile) -> object:
     return file.validate(WorldFile).world(file)
 
 
-def recordings(file: YamlFile) -> object:
-    items = file.data if isinstance(file.data, list) else []
-    return [file.validate(RecordingFile, item, at=(index,)) for index, item in enumerate(items)]
+def solutions(file: YamlFile) -> object:
+    return file.validate(SolutionsFile)
 
 
 def outcome(file: YamlFile) -> object:
@@ -86,8 +84,8 @@ Read = Callable[[YamlFile], object]
 TASKS: list[tuple[str, Read]] = [
     (path.read_text(), partial(read_task, path=path)) for path in sorted(SUITES.glob("paper/tasks/*.yaml"))
 ]
-RECORDED: list[tuple[str, Read]] = [
-    (path.read_text(), recordings) for path in sorted(Path(FOLDER).glob("*/SayGoodDay.yaml"))
+SOLUTIONS: list[tuple[str, Read]] = [
+    (path.read_text(), solutions) for path in sorted(SUITES.glob("*/solutions/SayGoodDay.yaml"))
 ]
 
 
@@ -121,7 +119,7 @@ def damaged(text: str, chance: random.Random, kind: int) -> str:
         pytest.param([(SUITE, suite)], id="suites"),
         pytest.param([(OUTCOME, outcome)], id="outcomes"),
         pytest.param(TASKS, id="tasks"),
-        pytest.param(RECORDED, id="recordings"),
+        pytest.param(SOLUTIONS, id="solutions"),
     ],
 )
 def test_a_damaged_file_is_read_or_refused_in_a_sentence_with_a_line(files: list[tuple[str, Read]]) -> None:

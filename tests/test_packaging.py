@@ -87,9 +87,9 @@ def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
     }
     for known in (  # one of each kind that is no Python of ours
         "roboeval/suites/paper/tasks/LunchTime.yaml",
-        "roboeval/suites/plus/still-right/GetDrink.yaml",
-        "roboeval/mutation/right/LunchTime/01-hours.py",
-        "codebotler/models/recorded/careful/LunchTime.yaml",
+        "roboeval/suites/paper/solutions/LunchTime.yaml",
+        "roboeval/suites/plus/solutions/GetDrink.yaml",
+        "codebotler/models/recorded/StaplerReport.yaml",
         "codebotler/robots/ros1_worker.py",
         "codebotler/py.typed",
     ):

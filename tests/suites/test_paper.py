@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.models.recorded import Reply, recorded_model
+from codebotler.models.recorded import Solution, recorded_model
 from roboeval.evaluation.completions import Completion, recorded_completions
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.judge import evaluate
@@ -97,8 +97,8 @@ def test_every_prompt_has_recorded_programs(paper: Suite, model: str) -> None:
 
 
 @pytest.fixture(scope="session")
-def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Reply, dict[str, Any]]]]:
-    def judged(model: str) -> Iterator[tuple[Completion, Reply, dict[str, Any]]]:
+def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Solution, dict[str, Any]]]]:
+    def judged(model: str) -> Iterator[tuple[Completion, Solution, dict[str, Any]]]:
         completions = list(recorded_completions(f"recorded:{model}", paper))
         replies = recorded_model(f"recorded:{model}")
         for completion, row in zip(completions, evaluate(completions, paper, workers=2), strict=True):
@@ -108,7 +108,7 @@ def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Reply, dict[str, 
     return {model: list(judged(model)) for model in MODELS}
 
 
-Verdicts = dict[str, list[tuple[Completion, Reply, dict[str, Any]]]]
+Verdicts = dict[str, list[tuple[Completion, Solution, dict[str, Any]]]]
 
 
 @each_model

@@ -11,14 +11,15 @@ from typing import Any
 import pytest
 import yaml
 
+from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
 from codebotler.world import World
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judge
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import Verdicts, recorded_programs, recorded_replies, tried
-from roboeval.mutation.variants import variants
+from roboeval.linting.trials import Verdicts, tried
 from roboeval.suites.load import Suite, Task, load_suite
+from roboeval.suites.solutions import solutions
 
 HERE = Path(__file__).parent
 KNOWN: list[dict[str, Any]] = yaml.safe_load((HERE / "known.yaml").read_text())
@@ -50,16 +51,9 @@ def passes(several: Verdicts) -> bool:
 
 
 @cache
-def verdicts_on_recorded(name: str) -> Sequence[Verdicts]:
-    """How the programs that are recorded for a task do."""
+def verdicts_on_solutions(name: str) -> Sequence[Verdicts]:
+    """How the reference solutions of a task do."""
     return tried(plus().tasks[name], plus(), workers=2)
-
-
-@cache
-def verdicts_on_variants(name: str) -> Sequence[Verdicts]:
-    """How the programs do that were written from the instruction alone."""
-    task = plus().tasks[name]
-    return verdicts([variant.program for variant in variants(task)], task)
 
 
 def test_the_suite_of_the_paper_is_what_it_was() -> None:
@@ -81,7 +75,7 @@ def test_what_other_checks_misjudge_is_judged_right(name: str) -> None:
     assert wrong == []
 
 
-# Where the recorded programs are judged otherwise than by the paper, and who is right.
+# Where solutions are judged otherwise than by the paper, and who is right.
 OTHERWISE = {
     "puts it down under another name than it was picked up": True,
     "puts down the bin under another name than it was picked up": True,
@@ -108,33 +102,27 @@ OTHERWISE = {
 }
 
 
+def is_right(solution: Solution) -> bool:
+    return OTHERWISE.get(solution.about, solution.right or solution.fails is None)
+
+
 @each_task
-def test_recorded_programs_are_judged_as_they_are_meant(name: str) -> None:
+def test_solutions_are_judged_as_they_are_meant(name: str) -> None:
     task = plus().tasks[name]
     wrong = [
         (
-            reply.about,
-            [(v.world, v.outcome.error, [r.text for r in v.failed]) for v in several if not v.satisfied][:2],
+            one.about,
+            [(v.world, v.outcome.error, v.failed) for v in several if not v.satisfied][:2],
         )
-        for reply, several in zip(recorded_replies(task), verdicts_on_recorded(name), strict=True)
-        if passes(several) != OTHERWISE.get(reply.about, reply.fails is None)
-        or OTHERWISE.get(reply.about) == (reply.fails is None)
+        for one, several in zip(solutions(task), verdicts_on_solutions(name), strict=True)
+        if passes(several) != is_right(one) or OTHERWISE.get(one.about) == (one.fails is None)
     ]
     assert wrong == []
 
 
 @each_task
 def test_the_linter_finds_nothing(name: str) -> None:
-    assert lint(plus().tasks[name], verdicts_on_recorded(name)) == []
-
-
-@each_task
-def test_programs_written_from_the_instruction_alone_pass(name: str) -> None:
-    right = variants(plus().tasks[name])
-    assert len(right) >= 10
-    judged = verdicts_on_variants(name)
-    failed = [variant.name for variant, one in zip(right, judged, strict=True) if not passes(one)]
-    assert failed == []
+    assert lint(plus().tasks[name], verdicts_on_solutions(name)) == []
 
 
 HARMLESS = """
@@ -160,12 +148,10 @@ AROUND = [
 @each_task
 def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: str) -> None:
     task = plus().tasks[name]
-    several = [*zip(recorded_programs(task), verdicts_on_recorded(name), strict=True)][::9]
-    right = [variant.program for variant in variants(task)]
-    several += [*zip(right, verdicts_on_variants(name), strict=True)][: len(AROUND)]
+    several = [*zip(solutions(task), verdicts_on_solutions(name), strict=True)][::4]
     changed = [
-        f"{HARMLESS}{program}\n_task = task_program\ndef task_program():\n    {around}\n"
-        for around, (program, _) in zip(cycle(AROUND), several, strict=False)
+        f"{HARMLESS}{solution.program}\n_task = task_program\ndef task_program():\n    {around}\n"
+        for around, (solution, _) in zip(cycle(AROUND), several, strict=False)
     ]
     otherwise = [
         (program, v.world, [r.text for r in v.failed])
@@ -179,8 +165,7 @@ def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: 
 @each_task
 def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
     task = plus().tasks[name]
-    meant = [r.program for r in recorded_replies(task) if OTHERWISE.get(r.about, r.fails is None)][::8]
-    right = [*meant, *(variant.program for variant in variants(task)[::4])]
+    right = [one.program for one in solutions(task) if is_right(one)][::5]
     random = Random(name)
     worlds = [
         replace(s.world, rooms=tuple(random.sample(s.world.rooms, len(s.world.rooms))))
@@ -193,7 +178,7 @@ def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> 
 def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
     task = plus_of_another_seed().tasks[name]
     assert {s.world for s in task.scenarios} != {s.world for s in plus().tasks[name].scenarios}
-    chosen = recorded_replies(task)[::9]
-    judged = verdicts([reply.program for reply in chosen], task)
-    for reply, several in zip(chosen, judged, strict=True):
-        assert passes(several) == OTHERWISE.get(reply.about, reply.fails is None), reply.about
+    chosen = solutions(task)[::9]
+    judged = verdicts([one.program for one in chosen], task)
+    for one, several in zip(chosen, judged, strict=True):
+        assert passes(several) == is_right(one), one.about

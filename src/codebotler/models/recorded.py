@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -26,19 +27,42 @@ LONG = re.compile(r"[^\W\d_]{4,}")  # shorter words are in every instruction
 REAL_MODEL = "name a real model to have a program written for it, such as --model openai-chat:gpt-5.1"
 
 
-@dataclass(frozen=True)
-class Reply:
-    """One program that somebody wrote for an instruction.
+class Solution(BaseModel):
+    """A program that a person wrote for an instruction, right or wrong on purpose.
 
     Args:
-        about: what it does, or what is wrong with it, in a few words.
+        about: what is special about it, or what is wrong with it, in a few words.
         program: its source.
-        fails: the kind of its failure; None if it does what was asked.
+        fails: the kind of its failure; None if it passes.
+        right: whether it does what was asked although it fails: the checks are too strict for it.
     """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     about: str
     program: str
     fails: str | None = None
+    right: bool = False
+
+
+class Recording(BaseModel):
+    """What the recorded models reply to an instruction."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    instruction: str
+    careful: Annotated[tuple[Solution, ...], Field(min_length=1)]
+    hasty: Annotated[tuple[Solution, ...], Field(min_length=1)]
+
+    def by(self, model: str) -> tuple[Solution, ...]:
+        """The replies of one of the models."""
+        return self.careful if model == "careful" else self.hasty
+
+
+class RecordedFile(BaseModel):
+    """What a file of solutions holds for the recorded models; the rest of it is for the benchmark."""
+
+    recorded: tuple[Recording, ...]
 
 
 @dataclass(frozen=True)
@@ -51,9 +75,9 @@ class RecordedModel:
     """
 
     name: str
-    replies: Mapping[str, tuple[Reply, ...]]
+    replies: Mapping[str, tuple[Solution, ...]]
 
-    def reply(self, instruction: str, index: int) -> Reply:
+    def reply(self, instruction: str, index: int) -> Solution:
         """The reply that stands for completion number `index`, counted from 0; they come round again.
 
         Raises:
@@ -127,9 +151,8 @@ def _short(text: str) -> str:
     return textwrap.shorten(text, SHOWN, placeholder=" ...")
 
 
-@cache
 def recorded_model(name: str) -> RecordedModel:
-    """Read a recorded model that ships with the package.
+    """A recorded model by its name.
 
     Args:
         name: `recorded` (the careful one), `recorded:careful` or `recorded:hasty`.
@@ -141,54 +164,21 @@ def recorded_model(name: str) -> RecordedModel:
     if short not in NAMES:
         known = ", ".join(f"recorded:{known}" for known in NAMES)
         raise BadInput(f'there is no recorded model "{name}"; there are {known}')
-    replies: dict[str, tuple[Reply, ...]] = {}
-    for path in sorted((FOLDER / short).glob("*.yaml")):
-        replies.update(read_replies(path))
-    return RecordedModel(short, replies)
+    return RecordedModel(short, {one.instruction: one.by(short) for one in _recordings()})
 
 
-def read_replies(path: Path) -> Mapping[str, tuple[Reply, ...]]:
-    """Read a file of recorded replies.
-
-    Raises:
-        BadInput: it is missing or wrong.
-    """
-    return {
-        recording.instruction: tuple(Reply(r.about, r.program, r.fails) for r in recording.replies)
-        for recording in _recordings(YamlFile.read(path))
-    }
+@cache
+def _recordings() -> tuple[Recording, ...]:
+    files = sorted(
+        (file for folder in _folders() for file in folder.glob("*.yaml")), key=lambda file: file.name
+    )
+    forms = (YamlFile.read(file).validate(RecordedFile) for file in files)
+    return tuple(recording for form in forms for recording in form.recorded)
 
 
-def lines_of_instructions(path: Path) -> Mapping[str, int | None]:
-    """Where in a file of recorded replies each instruction stands.
-
-    Raises:
-        BadInput: it is missing or wrong.
-    """
-    file = YamlFile.read(path)
-    return {one.instruction: file.line((index,)) for index, one in enumerate(_recordings(file))}
-
-
-def _recordings(file: YamlFile) -> list[RecordingFile]:
-    if not isinstance(file.data, list):
-        raise file.wrong("this is no list of instructions with their replies; start each with a dash")
-    return [file.validate(RecordingFile, item, at=(index,)) for index, item in enumerate(file.data)]
-
-
-class _Form(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class ReplyFile(_Form):
-    """A reply as the file writes it."""
-
-    about: str
-    fails: str | None = None
-    program: str
-
-
-class RecordingFile(_Form):
-    """An instruction and its replies as the file writes them."""
-
-    instruction: str
-    replies: Annotated[list[ReplyFile], Field(min_length=1)]
+def _folders() -> Iterator[Path]:
+    """Where solutions lie: here, and among the benchmark's tasks, none of whose code is imported."""
+    yield FOLDER
+    benchmark = find_spec("roboeval")
+    for place in (benchmark and benchmark.submodule_search_locations) or ():
+        yield Path(place, "suites", "paper", "solutions")

@@ -91,8 +91,8 @@ def job_of(
     """What is to be done for a task."""
     from roboeval.mutation.mutants import originals
     from roboeval.mutation.scores import Job
-    from roboeval.mutation.stillright import reasons
     from roboeval.mutation.worlds import worlds_of
+    from roboeval.suites.solutions import equivalent_mutants
 
     return Job(
         task=task.name,
@@ -100,7 +100,7 @@ def job_of(
         programs=originals(task, further),
         scenarios=worlds_of(suite, task, worlds, seed),
         rules=suite.rules,
-        still_right=reasons(task),
+        still_right=equivalent_mutants(task),
         most=most,
         seed=seed,
     )

@@ -13,7 +13,6 @@ Kind = Literal[
     "undecided",
     "unused",
     "misjudged",
-    "unasked",
     "unsaid",
     "untripped",
     "dead-regex",
@@ -32,7 +31,7 @@ class Finding:
         kind: what sort of mistake.
         subject: what has it, in words that stay the same while the mistake does.
         message: one sentence.
-        path: the task file, or the one of recorded programs that has it.
+        path: the task file.
         line: where in it, counted from 1.
         accepted: why it is there on purpose, as the task file says; None where it is open.
     """

@@ -13,12 +13,10 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations
-from textwrap import shorten
 
 from codebotler.badinput import YamlFile
 from codebotler.cachedproperty import cached_property
 from codebotler.english import listed
-from codebotler.models.recorded import closest_to
 from codebotler.rtl import Claim, Element, Formula, Not, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.automaton import Undecided
@@ -31,8 +29,9 @@ from roboeval.evaluation.failures import failure
 from roboeval.linting.backtracking import slow_text
 from roboeval.linting.findings import Finding, Kind
 from roboeval.linting.names import absent_names
-from roboeval.linting.trials import Verdicts, recorded_replies, unasked
+from roboeval.linting.trials import Verdicts
 from roboeval.suites.load import Check, Requirement, Scenario, Task
+from roboeval.suites.solutions import solutions
 
 
 def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
@@ -43,7 +42,7 @@ def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
         verdicts: on programs that are meant to be right or wrong.
     """
     places = [_Place(task, where, number, scenario) for where, number, scenario in _scenarios(task)]
-    found = [*_unused(task), *_unsaid(task), *_unasked(task), *_slow(task)]
+    found = [*_unused(task), *_unsaid(task), *_slow(task)]
     found += [*_misjudged(task, verdicts), *_untripped(task, verdicts)]
     if task.drawn:
         found += _of_drawn(places)
@@ -199,36 +198,21 @@ def _unsaid(task: Task) -> Iterator[Finding]:
             yield Finding("unsaid", fact.fact, f"prompt {prompt} {wrong}", task.path, line)
 
 
-def _unasked(task: Task) -> Iterator[Finding]:
-    """Programs that were recorded for an instruction that is spelt otherwise than all prompts."""
-    for instruction, path, line in unasked(task):
-        closest, *_ = closest_to(instruction, task.prompts)
-        message = (
-            f'programs are recorded for "{instruction}", which no prompt of the task is, so that they are '
-            f'left out; the closest is "{closest}"'
-        )
-        yield Finding("unasked", shorten(instruction, _SUBJECT, placeholder=" ..."), message, path, line)
-
-
-_SUBJECT = 60
-"""How much of an instruction names a finding, in characters."""
-
-
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Recorded programs that end otherwise than whoever recorded them says."""
-    if task.borrows:  # programs that were recorded for other requirements
+    """Solutions that end otherwise than their file says."""
+    if task.borrows:  # programs that were written for other requirements
         return
-    for reply, judged in zip(recorded_replies(task), verdicts, strict=False):  # an ablation's come afterwards
+    for solution, judged in zip(solutions(task), verdicts, strict=False):  # an ablation's come afterwards
         failed = failure(judged)
-        if (None if failed is None else failed.kind) == reply.fails:
+        if (None if failed is None else failed.kind) == solution.fails:
             continue
-        said = "pass" if reply.fails is None else f"fail by {reply.fails}"
+        said = "pass" if solution.fails is None else f"fail by {solution.fails}"
         where = "" if failed is None else f' by {failed.kind} in the world "{judged[failed.world].world}"'
         message = (
-            f'the recorded program "{reply.about}" is said to {said}, but it '
+            f'the solution "{solution.about}" is said to {said}, but it '
             f"{'passes' if failed is None else 'fails'}{where}; mend it, what it is said to do, or a check"
         )
-        yield Finding("misjudged", reply.about, message, task.path, 1)
+        yield Finding("misjudged", solution.about, message, task.path, 1)
 
 
 def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
@@ -249,7 +233,7 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     for side, requirement in sides.items():
         if side not in tripped:
             meant = ' where it is required without "not"' if f"not {side}" in sides else ""
-            message = f'{no_program} "{side}"{meant}; record one that does'
+            message = f'{no_program} "{side}"{meant}; add one that does'
             yield Finding("untripped", side, message, task.path, lines[requirement.check])
 
 

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 from itertools import chain, zip_longest
 
 from codebotler.cachedproperty import cached_property
-from roboeval.linting.trials import recorded_replies
 from roboeval.mutation.operator import Operator, Setting
 from roboeval.mutation.operators import OPERATORS
 from roboeval.mutation.rewriting import Source, changed, read
-from roboeval.mutation.variants import variants
 from roboeval.suites.load import Task
+from roboeval.suites.solutions import solutions
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class Original:
     """A program that mutants are made of.
 
     Args:
-        name: where it comes from, such as `right/03-backwards` or `recorded/2`.
+        name: what is special about it, or where it comes from.
         program: its source.
         claimed: whether whoever wrote it says that it is right.
     """
@@ -65,7 +64,7 @@ class Mutant:
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """The programs for a task that may be right: recorded ones, those written by hand, and further ones.
+    """The programs for a task that may be right: its right solutions, and further ones.
 
     Of programs with the same tree only the first is among them.
 
@@ -74,13 +73,12 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
         further: programs that a user names.
 
     Raises:
-        BadInput: a file of programs is wrong.
+        BadInput: a file of solutions is wrong.
     """
-    replies = (reply for reply in recorded_replies(task) if reply.fails is None)
-    recorded = (Original(f"recorded/{n}", reply.program) for n, reply in enumerate(replies))
-    written = (Original(f"right/{variant.name}", variant.program) for variant in variants(task))
+    right = (one for one in solutions(task) if one.fails is None or one.right)
+    written = (Original(one.about, one.program) for one in right)
     distinct: dict[str, Original] = {}
-    for original in chain(recorded, written, further):
+    for original in chain(written, further):
         distinct.setdefault(original.text, original)
     return tuple(distinct.values())
 

@@ -62,7 +62,7 @@ def survivors_view(score: Score) -> RenderableType:
 def _survivor(task: str, number: int, trial: Trial) -> RenderableType:
     mutant = trial.mutant
     head = Text.assemble(
-        (f"{task} {number}", "bold"), f"  {mutant.operator}, of {visible(mutant.original.name)}"
+        (f"{task} {number}", "bold"), f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
     )
     lines = Text()
     for line in mutant.diff.splitlines():

@@ -148,7 +148,7 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
 def new_task(folder: Path, name: str) -> Path:
     """Start a task in a suite's folder, and the suite if there is none; the files say what to fill in.
 
-    Programs for the linter come with it, unless some are recorded for a task of this name already.
+    Solutions come with it, unless there are some for a task of this name already.
 
     Args:
         folder: of the suite.
@@ -171,8 +171,8 @@ def new_task(folder: Path, name: str) -> Path:
     try:
         if not (folder / "suite.yaml").exists():
             write_whole(folder / "suite.yaml", SUITE.replace("NAME", _suite_name(folder)).encode())
-        if not [*folder.glob(f"recorded/*/{name}.yaml")]:
-            write_whole(folder / "recorded" / "mine" / f"{name}.yaml", PROGRAMS.encode())
+        if not (solutions := folder / "solutions" / f"{name}.yaml").exists():
+            write_whole(solutions, SOLUTIONS.encode())
         write_whole(path, TEMPLATE.replace("NAME", name).encode())
     except OSError as error:
         raise BadInput(f"cannot be written ({error.strerror})", file=error.filename) from None
@@ -275,27 +275,24 @@ worlds:
       - not announces_tea
 """
 
-PROGRAMS = """\
-# Right and wrong programs for the linter: `roboeval tasks --lint` says which requirement no wrong one trips.
-- instruction: >-         # exactly the text of a prompt
-    Go to the kitchen. If somebody is there, say "tea is ready".
-  replies:
-    - about: looks first
-      fails: null         # a right one
-      program: |
-        def task_program():
-            go_to("kitchen")
-            if is_in_room("person"):
-                say("tea is ready")
-    - about: says it whether or not somebody is there
-      fails: SayAtLocation
-      program: |
-        def task_program():
-            go_to("kitchen")
-            say("tea is ready")
-    - about: only says it where it starts
-      fails: SayAtLocation
-      program: |
-        def task_program():
-            say("tea is ready")
+SOLUTIONS = """\
+# Right and wrong programs: `roboeval tasks --lint` says which requirement no wrong one trips.
+programs:
+  - about: looks first
+    program: |
+      def task_program():
+          go_to("kitchen")
+          if is_in_room("person"):
+              say("tea is ready")
+  - about: says it whether or not somebody is there
+    fails: SayAtLocation
+    program: |
+      def task_program():
+          go_to("kitchen")
+          say("tea is ready")
+  - about: only says it where it starts
+    fails: SayAtLocation
+    program: |
+      def task_program():
+          say("tea is ready")
 """

@@ -10,7 +10,7 @@ from codebotler.badinput import BadInput
 from codebotler.models import base
 from codebotler.models.base import Settings
 from codebotler.models.open import expect_server, open_model
-from codebotler.models.recorded import NAMES, _words, read_replies, recorded_model
+from codebotler.models.recorded import NAMES, _words, recorded_model
 from codebotler.prompts import prompt_for
 from codebotler.simulator.engine import run
 from codebotler.trace import Status
@@ -72,27 +72,6 @@ def test_careful_model_is_right_more_often_than_the_hasty_one() -> None:
         return sum(marks) / len(marks)
 
     assert 1 > share("careful") > share("hasty") > 0
-
-
-def test_file_of_replies_is_read_and_its_faults_are_told_with_their_line(tmp_path: Path) -> None:
-    good = "- instruction: Wave.\n  replies:\n    - about: a\n      program: |\n        say('b')\n"
-    (reply,) = read_replies(write(tmp_path / "a.yaml", good))["Wave."]
-    assert (reply.about, reply.program, reply.fails) == ("a", "say('b')\n", None)
-    path = write(tmp_path / "b.yaml", good + "    - about: b\n")
-    with pytest.raises(BadInput) as caught:
-        read_replies(path)
-    assert (caught.value.file, caught.value.line) == (path, 6)
-    assert '"program"' in caught.value.sentence
-
-
-def test_file_that_is_no_list_is_no_file_without_replies(tmp_path: Path) -> None:
-    with pytest.raises(BadInput):
-        read_replies(write(tmp_path / "a.yaml", "instruction: Wave.\nreplies: []\n"))
-
-
-def test_instruction_without_replies_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(BadInput):
-        read_replies(write(tmp_path / "a.yaml", "- instruction: Wave.\n  replies: []\n"))
 
 
 def reply_to(instruction: str, number: int = 0, model: str = "recorded") -> base.Reply:

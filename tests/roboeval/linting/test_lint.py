@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.models.recorded import read_replies
 from roboeval.evaluation.completions import Completion
 from roboeval.evaluation.judge import evaluate
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
-from roboeval.linting.trials import tried, unasked
+from roboeval.linting.trials import tried
 from roboeval.suites.catalogue import new_task
-from roboeval.suites.load import Suite, load_suite
+from roboeval.suites.load import load_suite
+from roboeval.suites.solutions import solutions
 
 Lint = Callable[..., list[Finding]]
 
@@ -29,9 +29,8 @@ WORLD = """
     people: {{kitchen: [{{name: ann, answers: ["yes"]}}]}}
     require: {require}
 """
-RECORDED = """
-- instruction: Say hello in the kitchen.
-  replies:
+SOLUTIONS = """
+programs:
     - {about: does nothing, fails: SayAtLocation, program: "def task_program(): pass"}
     - {about: is right, program: "def task_program():\\n  go_to('kitchen'); say('hello')"}
 """
@@ -49,15 +48,15 @@ def linted(tmp_path: Path) -> Lint:
         checks: dict[str, str],
         *worlds: Sequence[str],
         accepted: dict[str, str] | None = None,
-        recorded: str = RECORDED,
+        solutions: str = SOLUTIONS,
         untripped: bool = False,
         replaced: tuple[str, str] = ("", ""),
     ) -> list[Finding]:
         suite = tmp_path / f"suite{len([*tmp_path.iterdir()])}"
         (suite / "tasks").mkdir(parents=True)
-        (suite / "recorded" / "careful").mkdir(parents=True)
+        (suite / "solutions").mkdir()
         (suite / "suite.yaml").write_text("name: mine\nversion: 1\n")
-        (suite / "recorded" / "careful" / "Hello.yaml").write_text(recorded)
+        (suite / "solutions" / "Hello.yaml").write_text(solutions)
         lines = ["name: Hello", "summary: Greet.", "prompts: [Say hello in the kitchen.]", "checks:"]
         lines += [f"  {name}: {head_of(rtl)}" for name, rtl in checks.items()]
         lines.append("worlds:")
@@ -167,8 +166,8 @@ def test_a_check_that_no_wrong_program_trips(linted: Lint) -> None:
     (finding,) = linted(checks, ["speaks", "not swears"], untripped=True)
     assert finding.name == "untripped: not swears"
     assert finding.line == 6
-    swears = RECORDED.replace("pass", "say('darn')")
-    assert linted(checks, ["speaks", "not swears"], recorded=swears, untripped=True) == []
+    swears = SOLUTIONS.replace("pass", "say('darn')")
+    assert linted(checks, ["speaks", "not swears"], solutions=swears, untripped=True) == []
 
 
 def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
@@ -177,24 +176,24 @@ def test_it_is_said_how_many_programs_trip_nothing(linted: Lint) -> None:
     assert '"not swears"' in finding.message
     assert not re.search(r"\d", finding.message)
     two = (
-        RECORDED
+        SOLUTIONS
         + "    - {about: goes, fails: SayAtLocation, program: 'def task_program(): go_to(\"kitchen\")'}\n"
     )
-    (finding,) = linted(checks, ["speaks", "not swears"], recorded=two, untripped=True)
+    (finding,) = linted(checks, ["speaks", "not swears"], solutions=two, untripped=True)
     assert "2 wrong programs" in finding.message
 
 
 def test_the_form_that_nothing_trips_is_said_of_a_check_that_is_required_both_ways(linted: Lint) -> None:
-    speaks = RECORDED.replace("pass", "say('hello')")
-    found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], recorded=speaks, untripped=True)
+    speaks = SOLUTIONS.replace("pass", "say('hello')")
+    found = linted({"speaks": SPEAKS}, ["speaks"], ["not speaks"], solutions=speaks, untripped=True)
     (message,) = (one.message for one in found if one.kind == "untripped")
     for name in ("2 wrong programs", '"speaks"', '"not"'):
         assert name in message
 
 
 def test_a_task_without_wrong_programs(linted: Lint) -> None:
-    for recorded in ("[]", RECORDED.replace("pass", "say('hello')")):
-        findings = linted({"speaks": SPEAKS}, ["speaks"], recorded=recorded, untripped=True)
+    for file in ("programs: []", SOLUTIONS.replace("pass", "say('hello')")):
+        findings = linted({"speaks": SPEAKS}, ["speaks"], solutions=file, untripped=True)
         assert [one.name for one in findings if one.kind != "misjudged"] == ["untripped: Hello"]
 
 
@@ -424,15 +423,15 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     assert render([*findings, accepted], accepted=True) == f"{line}\n{told}"
     assert render([accepted], accepted=True) == told
     assert render([], accepted=True) == render([]) == "nothing was found"
-    monkeypatch.chdir(tmp_path / "suite0" / "recorded")
+    monkeypatch.chdir(tmp_path / "suite0" / "solutions")
     assert render(findings).startswith(f"{path}:6: ")
 
 
-# --- recorded programs that end otherwise than they are said to
+# --- solutions that end otherwise than their file says
 
 
 @pytest.mark.parametrize(
-    ("reply", "named"),
+    ("solution", "named"),
     [
         ("{about: is lazy, program: 'def task_program(): 0'}", ["pass, ", "by SayAtLocation", "world"]),
         (
@@ -445,35 +444,13 @@ def test_rendering(linted: Lint, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
         ),
     ],
 )
-def test_a_recorded_program_that_ends_otherwise_than_it_is_said_to(
-    linted: Lint, reply: str, named: list[str]
+def test_a_solution_that_ends_otherwise_than_its_file_says(
+    linted: Lint, solution: str, named: list[str]
 ) -> None:
-    recorded = RECORDED + f"    - {reply}\n".replace("`", '"')
-    found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded, untripped=True)
+    solutions = SOLUTIONS + f"    - {solution}\n".replace("`", '"')
+    found = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], solutions=solutions, untripped=True)
     (finding,) = (one for one in found if one.kind == "misjudged")
     assert all(name in finding.message for name in named), finding
-
-
-# --- recorded programs for what nobody asks
-
-
-def test_programs_for_an_instruction_that_is_no_prompt(linted: Lint) -> None:
-    recorded = RECORDED + RECORDED.replace("Say hello", "Say helo").replace("pass", "0")
-    (finding,) = linted({"speaks": SPEAKS, "goes": GOES}, ["speaks", "goes"], recorded=recorded)
-    assert finding.name == "unasked: Say helo in the kitchen."
-    for name in ('"Say helo in the kitchen."', '"Say hello in the kitchen."'):
-        assert name in finding.message
-    assert (finding.path.parent.name, finding.path.name) == ("careful", "Hello.yaml")
-    assert finding.line == 7
-
-
-def test_a_task_that_borrows_need_not_ask_for_all_that_is_recorded(tmp_path: Path, paper: Suite) -> None:
-    recorded = tmp_path / "recorded" / "careful" / "LunchTime.yaml"
-    recorded.parent.mkdir(parents=True)
-    recorded.write_text(RECORDED)
-    task = replace(paper.task("LunchTime"), path=tmp_path / "tasks" / "LunchTime.yaml")
-    assert [*unasked(task)] == [("Say hello in the kitchen.", recorded, 2)]
-    assert [*unasked(replace(task, borrows=True))] == []
 
 
 # --- a new task
@@ -484,21 +461,20 @@ def test_a_new_task_has_no_finding_and_judges_its_programs_as_they_say(tmp_path:
     suite = load_suite(str(tmp_path))
     task = suite.task("MakeTea")
     assert lint(task, tried(task, suite)) == []
-    replies = read_replies(tmp_path / "recorded" / "mine" / "MakeTea.yaml")[task.prompts[0]]
     rows = [
-        Completion(task="MakeTea", prompt=0, index=i, program=reply.program)
-        for i, reply in enumerate(replies)
+        Completion(task="MakeTea", prompt=0, index=i, program=one.program)
+        for i, one in enumerate(solutions(task))
     ]
     kinds = [(row["failure"] or {"kind": None})["kind"] for row in evaluate(rows, suite, workers=1)]
-    assert kinds == [reply.fails for reply in replies] == [None, "SayAtLocation", "SayAtLocation"]
+    assert kinds == [one.fails for one in solutions(task)] == [None, "SayAtLocation", "SayAtLocation"]
 
 
-def test_a_new_task_leaves_programs_that_are_recorded_for_it(tmp_path: Path) -> None:
-    recorded = tmp_path / "recorded" / "careful" / "MakeTea.yaml"
-    recorded.parent.mkdir(parents=True)
-    recorded.write_text("[]\n")
+def test_a_new_task_leaves_the_solutions_that_there_are(tmp_path: Path) -> None:
+    path = tmp_path / "solutions" / "MakeTea.yaml"
+    path.parent.mkdir()
+    path.write_text("programs: []\n")
     new_task(tmp_path, "MakeTea")
-    assert [*tmp_path.glob("recorded/*/*")] == [recorded]
+    assert path.read_text() == "programs: []\n"
 
 
 FACTS = "prompts: [Say hello in the kitchen.]\nfacts: [{fact: where, words: [%s], commonsense: %s}]\n"

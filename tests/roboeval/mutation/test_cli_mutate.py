@@ -49,7 +49,7 @@ def test_two_tasks_from_end_to_end(tmp_path: Path) -> None:
         assert (score["worlds"], score["originals"]) == (int(worlds), int(originals))
         assert float(rate) == round(int(killed) / int(mutants), 3)
         survivors = [(row["operator"], row["diff"]) for row in rows if row["fate"] == "survived"]
-        listed = yaml.safe_load((found / "survivors" / f"{task}.yaml").read_text())["mutants"]
+        listed = yaml.safe_load((found / "survivors" / f"{task}.yaml").read_text())["equivalent_mutants"]
         assert [(entry["operator"], entry["diff"]) for entry in listed] == survivors
         assert len(re.findall(rf"^{task} \d+  ", ended.out, re.MULTILINE)) == int(survived)
         for _, diff in survivors:
@@ -62,15 +62,17 @@ def small(tmp_path: Path) -> Path:
     """The folder of a suite with one task, two right programs, and two that are not right."""
     (tmp_path / "small").mkdir()
     own = Path(a_suite(tmp_path / "small"))
-    (own / "recorded").mkdir()
-    (own / "right" / "T").mkdir(parents=True)
-    for name, body in {
-        "01-goes": "go_to('kitchen')",
-        "02-broken": "go_to('kitchen'",
-        "03-idle": "pass",
-        "04-greets": "go_to('kitchen'); say('hello')",
-    }.items():
-        (own / "right" / "T" / f"{name}.py").write_text(f"# {name}.\ndef task_program(): {body}\n")
+    bodies = {
+        "goes": "go_to('kitchen')",
+        "broken": "go_to('kitchen'",
+        "idle": "pass",
+        "greets": "go_to('kitchen'); say('hello')",
+    }
+    programs = [
+        {"about": about, "program": f"def task_program(): {body}\n"} for about, body in bodies.items()
+    ]
+    (own / "solutions").mkdir()
+    (own / "solutions" / "T.yaml").write_text(yaml.safe_dump({"programs": programs}))
     return own
 
 
@@ -128,8 +130,8 @@ def test_a_right_program_that_the_suite_finds_wrong(small: Path) -> None:
     ended = mutate("--suite", small, "--brief", cwd=small)
     assert ended.status == 0, ended
     assert re.findall(r"^not right, .*: (T, .*)$", ended.err, re.MULTILINE) == [
-        "T, right/02-broken (one: SyntaxError)",
-        "T, right/03-idle (one: goes)",
+        "T, broken (one: SyntaxError)",
+        "T, idle (one: goes)",
     ]
     assert re.search(r"^warning: T: .*\b\d mutants", ended.err, re.MULTILINE)
 
@@ -143,8 +145,8 @@ def test_a_mutant_on_the_list_is_not_shown_again(small: Path) -> None:
     words = ("--suite", small, "--out", small / "found")
     assert mutate(*words, cwd=small).status == 0
     survivors = (small / "found" / "survivors" / "T.yaml").read_text()
-    (small / "still-right").mkdir()
-    (small / "still-right" / "T.yaml").write_text(survivors.replace("because: ''", "because: It may."))
+    with (small / "solutions" / "T.yaml").open("a") as solutions:
+        solutions.write(survivors.replace("because: ''", "because: It may."))
     ended = mutate(*words, cwd=small)
     (score,) = json.loads((small / "found" / "scores.json").read_text())["tasks"]
     assert (score["survived"], score["score"]) == (0, 1.0)

@@ -13,10 +13,11 @@ from codebotler.badinput import BadInput
 from codebotler.simulator.engine import Lanes
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.scores import Score, Trial, explained
-from roboeval.mutation.stillright import list_of, reasons, to_yaml
+from roboeval.mutation.stillright import to_yaml
 from roboeval.mutation.survival import Baseline, End, Fate, baselines, ends
 from roboeval.mutation.worlds import worlds_of
 from roboeval.suites.load import Scenario, Suite, Task, load_suite
+from roboeval.suites.solutions import equivalent_mutants
 from small_suite import a_suite
 
 TASK = """\
@@ -136,36 +137,31 @@ GREETS = mutant("go_to('kitchen'); say('hi'); if is_in_room('ann'): say('bye')",
 
 
 def a_list(task: Task, text: str) -> None:
-    list_of(task).parent.mkdir()
-    list_of(task).write_text(text)
+    path = task.path.parents[1] / "solutions" / "T.yaml"
+    path.parent.mkdir()
+    path.write_text(text)
 
 
 def test_a_survivor_on_the_list_is_still_right(task: Task) -> None:
     a_list(task, FILLED)
     trials = [Trial(GREETS, End(Fate.SURVIVED)), Trial(mutant("say('x')"), End(Fate.SURVIVED))]
-    first, second = explained(trials, reasons(task))
+    first, second = explained(trials, equivalent_mutants(task))
     assert first.end == End(Fate.STILL_RIGHT, why="It does no harm.")
     assert second.end.fate is Fate.SURVIVED
 
 
 def test_a_mutant_on_the_list_that_is_killed_stays_killed(task: Task) -> None:
     a_list(task, FILLED)
-    (trial,) = explained([Trial(GREETS, End(Fate.KILLED, "w", "says"))], reasons(task))
+    (trial,) = explained([Trial(GREETS, End(Fate.KILLED, "w", "says"))], equivalent_mutants(task))
     assert trial.end.fate is Fate.KILLED
 
 
 def test_a_mutant_is_known_by_its_operator_and_its_diff(task: Task) -> None:
     a_list(task, FILLED.replace("-1,4", "-9,4"))
     other = Mutant("negate-a-condition", GREETS.original, GREETS.program)
-    ends = [
-        trial.end.fate
-        for trial in explained([Trial(m, End(Fate.SURVIVED)) for m in (GREETS, other)], reasons(task))
-    ]
-    assert ends == [Fate.STILL_RIGHT, Fate.SURVIVED]
-
-
-def test_a_suite_without_a_list_has_none(task: Task) -> None:
-    assert reasons(task) == {}
+    trials = [Trial(one, End(Fate.SURVIVED)) for one in (GREETS, other)]
+    found = explained(trials, equivalent_mutants(task))
+    assert [trial.end.fate for trial in found] == [Fate.STILL_RIGHT, Fate.SURVIVED]
 
 
 FILLED = to_yaml([GREETS]).replace("because: ''", "because: It does no harm.")
@@ -175,17 +171,15 @@ FILLED = to_yaml([GREETS]).replace("because: ''", "because: It does no harm.")
     ("text", "line", "named"),
     [
         (to_yaml([GREETS]), 11, '"because" is empty'),
-        (FILLED + FILLED.removeprefix("mutants:\n"), 12, "already"),
-        ("mutants: []\n", 1, '"mutants"'),
-        ("mutants: [{operator: x, diff: y, because: z, why: w}]", 1, '"why"'),
+        ("equivalent_mutants: [{operator: x, diff: y, because: z, why: w}]", 1, '"why"'),
     ],
-    ids=["without a reason", "twice", "empty", "unknown key"],
+    ids=["without a reason", "unknown key"],
 )
 def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> None:
     a_list(task, text)
     with pytest.raises(BadInput, match=named) as error:
-        reasons(task)
-    assert (error.value.file, error.value.line) == (list_of(task), line)
+        equivalent_mutants(task)
+    assert (error.value.file, error.value.line) == (task.path.parents[1] / "solutions" / "T.yaml", line)
 
 
 # --- worlds

@@ -65,7 +65,7 @@ def test_a_suite_is_found_by_its_name_without_running_its_package(install: Insta
 def test_it_may_lie_in_a_folder_of_the_package(install: Install) -> None:
     folder = install(place="garden_suite.suites.roses")
     (folder / "suites").mkdir()
-    for one in ("suite.yaml", "tasks", "recorded"):
+    for one in ("suite.yaml", "tasks", "solutions"):
         (folder / "suites" / "roses").mkdir(exist_ok=True)
         (folder / one).rename(folder / "suites" / "roses" / one)
     assert list(load_suite("garden").tasks) == ["WaterPlants"]
