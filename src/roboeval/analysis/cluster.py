@@ -73,12 +73,7 @@ def groups(failed: Iterable[RowData], programs: Mapping[Key, str]) -> list[list[
 
 
 def clusters(groups: Iterable[Sequence[RowData]], results: Results) -> Iterator[Cluster]:
-    """Say of each group why it fails and what would have helped.
-
-    Args:
-        groups: of rows, as `groups` puts them together.
-        results: in which they are, among whose programs that pass fixes are looked for.
-    """
+    """Say of each group why it fails and what would have helped."""
     programs = results.programs
     right: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
     for key in sorted(results.passed):

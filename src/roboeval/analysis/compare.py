@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from math import fsum
 from typing import Any
 
 from codebotler.badinput import BadInput
@@ -101,8 +102,8 @@ def compared(first: PromptScores, second: PromptScores) -> Comparison:
     tasks = [[b - a for a, b in pairs] for pairs in by_task.values()]
     prompts = [[b - a] for a, b in pairs]
     return Comparison(
-        first=sum(a for a, _ in pairs) / len(pairs),
-        second=sum(b for _, b in pairs) / len(pairs),
+        first=fsum(a for a, _ in pairs) / len(pairs),
+        second=fsum(b for _, b in pairs) / len(pairs),
         prompts=len(pairs),
         left_out=len({*first, *second}) - len(keys),
         over_prompts=by_formula(prompts, within=DIFFERENCE),
@@ -119,7 +120,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
     total = sum(map(len, by_task.values()))
     for task, pairs in by_task.items():
         n = len(pairs)
-        first, second = sum(a for a, _ in pairs) / n, sum(b for _, b in pairs) / n
+        first, second = fsum(a for a, _ in pairs) / n, fsum(b for _, b in pairs) / n
         yield TaskDifference(task, first, second, (second - first) * n / total, n)
 
 
@@ -146,12 +147,7 @@ def told_of(about: Mapping[str, Any], head: Mapping[str, Any]) -> dict[str, Any]
 
 
 def unlike(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
-    """What two runs differ in that may explain a difference beside the model.
-
-    Args:
-        first: what is `told_of` the one.
-        second: the same of the other.
-    """
+    """What two runs differ in that may explain a difference beside the model."""
     told = []
     for name, words in WORDS.items():
         a, b = first.get(name), second.get(name)
@@ -180,11 +176,6 @@ def _said(value: object) -> str:
 
 def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, again: Mapping[str, str]) -> None:
     """Refuse runs that were judged by suites of different content.
-
-    Args:
-        heads: what KEY.json says of each run, by its path.
-        suite: as it is now.
-        again: the command that judges a run, by its path.
 
     Raises:
         BadInput: the hashes of their suites differ.

@@ -101,13 +101,7 @@ def look_through(lines: Sequence[bytes], question: Question) -> list[Found]:
 
 
 def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) -> Found:
-    """What one row says.
-
-    Args:
-        row: of an evaluation.
-        question: what is looked for.
-        formula: its formula, parsed.
-    """
+    """What one row says."""
     worlds, undecided = [], []
     for number, verdict in _asked(row, question):
         if formula is not None and "cut" in verdict:

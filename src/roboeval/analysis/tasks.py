@@ -15,12 +15,7 @@ from roboeval.evaluation.results import Results
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:
-    """A task, prompt by prompt: how many completions passed, and how the others failed.
-
-    Args:
-        results: that have completions of the task.
-        task: its name.
-    """
+    """A task, prompt by prompt: how many completions passed, and how the others failed."""
     suite = results.suite
     of_task = completions_of(results.table).filter(pl.col("task") == task).sort("prompt", maintain_order=True)
     return {

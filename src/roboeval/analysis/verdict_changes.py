@@ -67,11 +67,6 @@ class VerdictChanges:
 def verdict_changes(name: str, first: Results, second: Results) -> VerdictChanges:
     """Find the completions whose verdicts differ.
 
-    Args:
-        name: of the run.
-        first: as one suite judges it.
-        second: as the other does.
-
     Raises:
         BadInput: no completion was judged by both.
     """

@@ -74,18 +74,18 @@ def evaluate(
     try:
         opened = open_source(source, judged_by)
         run = run or opened.run
-        scope = Scope.of(watched(opened.read(), "reading"), wanted)
-        if (aside := opened.passed_over()) is not None:
-            note(aside)
+        scope = Scope.of(opened.completions, wanted)
+        if opened.left_aside is not None:
+            note(opened.left_aside)
         if scope.total == 0:
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
-            run.keep(opened)
+            run.keep(opened.completions)
         how = How(ablated=ablation, engine=opened_engine)
         rows = (
             (judged_row(to_line(row)) for row in judge_all(opened.of(wanted), judged_by, **how))
             if run is None
-            else evaluate_run(run, judged_by, tasks=wanted, redo=redo, **how)
+            else evaluate_run(run, judged_by, tasks=wanted, redo=redo, completions=opened.completions, **how)
         )
         builder = TableBuilder()
         for row in watched(tally.of(rows), "judging", scope.total):
@@ -113,9 +113,10 @@ def import_(
 
     known = load(suite)
     opened = open_source(path, known)
-    count = Run(out).keep(opened)
-    if (aside := opened.passed_over()) is not None:
-        note(aside)
+    Run(out).keep(opened.completions)
+    if opened.left_aside is not None:
+        note(opened.left_aside)
+    count = len(opened.completions)
     again = command("evaluate", out, suite=suite)
     they = ("is", "it") if count == 1 else ("are", "them")
     note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")

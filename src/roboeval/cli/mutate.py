@@ -114,7 +114,7 @@ def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Or
 
     found: dict[str, list[Original]] = {}
     for source in sources:
-        for completion in watched(open_source(source, suite).read(), "reading"):
+        for completion in open_source(source, suite).completions:
             name = f"{source}:{name_of(completion.key)}"
             found.setdefault(completion.task, []).append(Original(name, completion.program, claimed=False))
     return found

@@ -29,6 +29,7 @@ def evaluate_run(
     workers: int = 1,
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
+    completions: Iterable[Completion] | None = None,
 ) -> Iterator[JudgedRow]:
     """Judge a run's completions, going on where an earlier evaluation stopped; yields all rows in order.
 
@@ -41,6 +42,7 @@ def evaluate_run(
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing.
         engine: where programs are run; by default on so many cores of this machine.
+        completions: those of the run, if they were read before.
 
     Raises:
         BadInput: the run is being written, or was judged otherwise or holds other completions than it did.
@@ -55,13 +57,14 @@ def evaluate_run(
         about = {**head(suite), "ablation": ablated, "tasks": None if tasks is None else sorted(tasks)}
         was = _go_on_or_refuse(run.head(key), about, run.rows(key))
         with contextlib.closing(Appender(run.rows(key))) as rows:
-            completions = run.source(suite).of(tasks)
+            written = run.read(suite) if completions is None else completions
+            selected = (one for one in written if tasks is None or one.task in tasks)
             left_out = LeftOut(run.head(key))
-            seal = yield from _judged_before(rows, completions, was, left_out)
-            left = [*left_out.waiting.values(), *islice(completions, 1)]
+            seal = yield from _judged_before(rows, selected, was, left_out)
+            left = [*left_out.waiting.values(), *islice(selected, 1)]
             if is_sealed(was) and (left or seal.is_broken(was)):
                 write_whole(run.head(key), to_text({**about, **left_out.data()}))
-            judged = judgements(chain(left, completions), suite, ablated=ablated, engine=chosen)
+            judged = judgements(chain(left, selected), suite, ablated=ablated, engine=chosen)
             is_whole = yield from _judge(judged, rows, seal, left_out)
             finished = {**about, **left_out.data(), **seal.data()}
             if is_whole and finished != was:

@@ -6,10 +6,8 @@ import contextlib
 import fcntl
 import json
 import os
-import shutil
-import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,29 +28,25 @@ from roboeval.suites.load import ABLATED, Suite
 
 @dataclass(frozen=True)
 class Source:
-    """Where completions come from.
+    """Completions that somebody names.
 
     Args:
-        read: reads them from the start, each time it is called; each is one that the suite knows.
+        completions: all of them; each is one that the suite knows.
         run: the run folder they stand in, if they do.
-        passed_over: what is to be said of what was not read there, once the rest has been.
+        left_aside: what is to be said of files that are none; None if there is nothing to say.
     """
 
-    read: Callable[[], Iterator[Completion]]
+    completions: Sequence[Completion]
     run: Run | None = None
-    passed_over: Callable[[], str | None] = lambda: None
+    left_aside: str | None = None
 
-    def of(self, tasks: frozenset[str] | None) -> Iterator[Completion]:
-        """Read them again, those of some tasks or all.
-
-        Raises:
-            BadInput: one is wrong, or of a task or prompt that the suite does not know.
-        """
-        return (completion for completion in self.read() if tasks is None or completion.task in tasks)
+    def of(self, tasks: frozenset[str] | None) -> list[Completion]:
+        """Those of some tasks, or all."""
+        return [one for one in self.completions if tasks is None or one.task in tasks]
 
 
 def open_source(text: str, suite: Suite) -> Source:
-    """Find out what completions a person means.
+    """Read the completions that a person names.
 
     Args:
         text: a run folder, a .jsonl file or a pipe, a folder or zip of published .py files, or
@@ -60,36 +54,24 @@ def open_source(text: str, suite: Suite) -> Source:
         suite: whose tasks and prompts they are of.
 
     Raises:
-        BadInput: there is no such thing.
+        BadInput: there is no such thing, or a completion is wrong or unknown to the suite.
     """
     if not text:
         raise BadInput("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
     if text.partition(":")[0] == "recorded" and not path.exists():
-        return Source(lambda: recorded_completions(text, suite))
+        return Source([*recorded_completions(text, suite)])
     if not path.exists():
         raise BadInput(
             "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
         )
     if (path / COMPLETIONS).is_file():
-        return Run(path).source(suite)
+        return Source([*Run(path).read(suite)], Run(path))
     if path.is_dir() or path.suffix == ".zip":
-        return Source(lambda: published_completions(path, suite), passed_over=lambda: passed_over(path))
+        return Source([*published_completions(path, suite)], left_aside=passed_over(path))
     if path.suffix == ".py":
         raise BadInput(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
-    lines = path if path.is_file() else _spooled(path)
-    return Source(lambda: read_completions(lines, suite, name=path))
-
-
-def _spooled(path: Path) -> Path:
-    """A file with what a pipe says, since that is read more than once; it is gone when this process ends."""
-    with path.open("rb") as pipe, tempfile.TemporaryFile() as file:
-        try:
-            shutil.copyfileobj(pipe, file)
-            file.flush()
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, tempfile.gettempdir()) from None
-        return Path(f"/proc/self/fd/{os.dup(file.fileno())}")
+    return Source([*read_completions(path, suite)])
 
 
 @dataclass(frozen=True)
@@ -142,9 +124,9 @@ class Run:
         keys = (path.stem for path in self.rows("").parent.glob("*.jsonl"))
         return sorted({key.removesuffix(ABLATED) for key in keys})
 
-    def source(self, suite: Suite | None = None) -> Source:
+    def read(self, suite: Suite | None = None) -> Iterator[Completion]:
         """Its completions; with a suite, all must be of tasks and prompts of it."""
-        return Source(lambda: read_completions(self.completions, suite, growing=True), self)
+        return read_completions(self.completions, suite, growing=True)
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
@@ -188,38 +170,31 @@ class Run:
                 f'is no run, but holds other files, such as "{others[0]}"; name a new folder', file=self.path
             )
 
-    def keep(self, source: Source) -> int:
-        """Make this the run of a source's completions: copy them, unless they are here already.
-
-        Returns:
-            how many they are.
+    def keep(self, completions: Sequence[Completion]) -> None:
+        """Make this the run of some completions: copy them, unless they are here already.
 
         Raises:
-            BadInput: one of them is wrong, or other completions are here; then nothing is changed.
+            BadInput: other completions are here; then nothing is changed.
             OSError: they cannot be written; then nothing is changed either.
         """
-        models: set[str | None] = set()
-        count = 0
-        for completion in source.read():
-            models.add(completion.model)
-            count += 1
+        models = {completion.model for completion in completions}
+        lines = (to_line(completion.row) for completion in completions)
         with self.writing():
             if self.completions.exists():
-                self._expect(source)
-                return count
+                self._expect(lines)
+                return
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
             write_whole(self.about, to_text(about))
             try:
                 with written_whole(self.completions) as file:
-                    file.writelines(map(_line, source.read()))
+                    file.writelines(lines)
             except BaseException:
                 self.about.unlink()
                 raise
-        return count
 
-    def _expect(self, source: Source) -> None:
+    def _expect(self, lines: Iterable[bytes]) -> None:
         with self.completions.open("rb") as file:
-            same = all(file.read(len(line)) == line for line in map(_line, source.read()))
+            same = all(file.read(len(line)) == line for line in lines)
             if not same or file.read(1):
                 raise BadInput("this run holds other completions; name another folder", file=self.path)
 
@@ -238,10 +213,6 @@ def _locked(descriptor: int) -> bool:
         else:
             return True
     return False
-
-
-def _line(completion: Completion) -> bytes:
-    return to_line(completion.row)
 
 
 def _remove_empty(folders: list[Path]) -> None:

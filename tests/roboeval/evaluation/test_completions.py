@@ -69,7 +69,7 @@ def test_what_is_accepted_near_the_limit_is_read_again_from_its_copy(
     row = ROW | {"program": program}
     path.write_text(json.dumps(row, ensure_ascii=False).replace("\ud800", "\\ud800"))
     run = Run(tmp_path / "run")
-    run.keep(open_source(str(path), paper))
+    run.keep(open_source(str(path), paper).completions)
     assert [c.program for c in read_completions(run.completions)] == [program]
 
 
@@ -81,7 +81,7 @@ def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
     assert len(line) < MAX_ROW
     assert "5,000,000 bytes" in error_about(path, line).sentence
     with pytest.raises(BadInput, match="5,000,000 bytes"):
-        Run(tmp_path / "run").keep(open_source(str(path), paper))
+        Run(tmp_path / "run").keep(open_source(str(path), paper).completions)
     assert not (tmp_path / "run").exists()
 
 

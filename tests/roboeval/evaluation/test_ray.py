@@ -24,11 +24,12 @@ from codebotler.simulator.engine import NO_SECCOMP, EngineError
 from codebotler.simulator.lane import Lane
 from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine
-from roboeval.evaluation.completions import Row, recorded_completions
+from roboeval.evaluation.completions import recorded_completions
 from roboeval.evaluation.engines import Local
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import LARGEST, LOOPBACK_ONLY, OURS, Cluster, Shards, Told, call_all
 from roboeval.evaluation.rayaddress import PING_PATIENCE_S
+from roboeval.evaluation.rows import Row
 from roboeval.suites.load import Suite
 
 # Read when Ray is imported.

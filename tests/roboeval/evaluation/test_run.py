@@ -21,7 +21,7 @@ from roboeval.cli.app import app
 from roboeval.evaluation.completions import Completion, read_completions, recorded_completions
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.rows import JudgedRow
-from roboeval.evaluation.run import Run, Source, open_source, tasks_to_judge
+from roboeval.evaluation.run import Run, open_source, tasks_to_judge
 from roboeval.evaluation.timelimit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Suite, load_suite
 from seals import unseal
@@ -47,7 +47,7 @@ def judged(run: Run, suite: Suite, *, redo: bool = False) -> list[JudgedRow]:
 
 def careful_run(path: Path, suite: Suite) -> Run:
     run = Run(path)
-    run.keep(Source(lambda: recorded_completions("recorded:careful", suite)))
+    run.keep([*recorded_completions("recorded:careful", suite)])
     return run
 
 
@@ -277,25 +277,25 @@ def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more
     run = a_run(tmp_path / "run", [GREETS, "#"])
     other = a_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
     with pytest.raises(BadInput, match="other completions"):
-        run.keep(open_source(str(other.path), paper))
-    assert run.keep(open_source(str(run.path), paper)) == 2
+        run.keep(open_source(str(other.path), paper).completions)
+    run.keep(open_source(str(run.path), paper).completions)
 
 
 def test_a_run_that_cannot_be_kept_leaves_nothing(tmp_path: Path) -> None:
-    times = 0
+    class Interrupted(list[Completion]):
+        times = 0
 
-    def read() -> Iterator[Completion]:
-        nonlocal times
-        times += 1
-        yield Completion(task="SayGoodDay", prompt=0, index=0, program=GREETS)
-        if times > 1:
-            raise KeyboardInterrupt
+        def __iter__(self) -> Iterator[Completion]:
+            yield from super().__iter__()
+            self.times += 1
+            if self.times > 1:
+                raise KeyboardInterrupt
 
     (tmp_path / "there").mkdir()
     for path in (tmp_path / "there" / "run", tmp_path / "new" / "run", tmp_path / "there"):
-        times = 0
+        one = Completion(task="SayGoodDay", prompt=0, index=0, program=GREETS)
         with pytest.raises(KeyboardInterrupt):
-            Run(path).keep(Source(read))
+            Run(path).keep(Interrupted([one]))
     assert sorted(path.name for path in tmp_path.rglob("*")) == [".lock", "there"]
 
 
@@ -306,8 +306,8 @@ def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Pat
     folder = tmp_path / "published"
     folder.mkdir()
     (folder / "SayGoodDay_0_3.py").write_text(f"name = 'x'\nprompt = 'p'\ncompletion = {GREETS!r}\n")
-    assert [c.key for c in open_source(str(folder), paper).read()] == [("SayGoodDay", 0, 3)]
-    assert len(list(open_source("recorded:hasty", paper).read())) >= 160
+    assert [c.key for c in open_source(str(folder), paper).completions] == [("SayGoodDay", 0, 3)]
+    assert len(open_source("recorded:hasty", paper).completions) >= 160
     with pytest.raises(BadInput, match="no such file or folder") as error:
         open_source(str(tmp_path / "nothing"), paper)
     assert str(error.value.file) == str(tmp_path / "nothing")
@@ -347,7 +347,7 @@ def test_a_completion_keeps_what_other_tools_added(tmp_path: Path, paper: Suite)
     path = tmp_path / "rows.jsonl"
     path.write_bytes(to_line(row))
     run = Run(tmp_path / "run")
-    run.keep(open_source(str(path), paper))
+    run.keep(open_source(str(path), paper).completions)
     assert [c.row for c in read_completions(run.completions)] == [row]
     assert Completion.of(row).key == ("SayGoodDay", 0, 0)
 

@@ -193,7 +193,7 @@ def test_reports_of_published_completions_equal_the_published_cells(
     corpus: Path, paper_suite: Suite, tmp_path: Path, file: str, model: str
 ) -> None:
     run = Run(tmp_path / file)
-    run.keep(open_source(str(corpus / "corpus" / "completions" / f"{file}.jsonl"), paper_suite))
+    run.keep(open_source(str(corpus / "corpus" / "completions" / f"{file}.jsonl"), paper_suite).completions)
     for _ in evaluate_run(run, paper_suite, tasks=None, ablated=False, redo=False, workers=2):
         pass
     evaluation = Evaluation(run, "paper")
@@ -232,7 +232,7 @@ def test_a_run_as_it_is_read(paper_suite: Suite, tmp_path: Path) -> None:
     ]
     (tmp_path / "a.jsonl").write_bytes(b"".join(map(to_line, rows)))
     run = Run(tmp_path / "gpt-4")
-    run.keep(open_source(str(tmp_path / "a.jsonl"), paper_suite))
+    run.keep(open_source(str(tmp_path / "a.jsonl"), paper_suite).completions)
     for _ in evaluate_run(run, paper_suite, tasks=None, ablated=False, redo=False, workers=1):
         pass
     evaluation = Evaluation(run, "paper")

@@ -23,12 +23,7 @@ COUNTS = ("both", "first_only", "second_only", "neither")
 
 
 def comparison_view(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
-    """A comparison as text and tables.
-
-    Args:
-        comparison: of two runs.
-        names: of both.
-    """
+    """A comparison as text and tables."""
     a, b = map(visible, names)
     rows = grid("left", "right", "left")
     rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")

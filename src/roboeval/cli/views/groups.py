@@ -23,12 +23,7 @@ MOST_LINES = 60  # of a difference between programs
 
 
 def found_view(found: Sequence[Found], total: int) -> RenderableType:
-    """How many completions were found, by task, for a person.
-
-    Args:
-        found: those that do what was looked for.
-        total: how many were looked at.
-    """
+    """How many completions were found, by task, for a person."""
     head = Text(f"found {len(found):,} of {how_many(total)}", "bold")
     if not found:
         return head

@@ -24,12 +24,7 @@ ALL_GONE = "the programs that were judged no longer stand in this run"
 
 
 def summary_view(summary: Summary, *, title: str) -> RenderableType:
-    """The tables of an evaluation.
-
-    Args:
-        summary: what they show.
-        title: what was judged.
-    """
+    """The tables of an evaluation."""
     head = Text(visible(title) + by_hand(summary.scope.models), style="bold")
     if summary.ablated:
         head.append(" (ablation: only common sense was required)", style="not bold")
