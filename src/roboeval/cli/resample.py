@@ -84,13 +84,10 @@ def checked(
         engine: where programs are checked.
     """
     from roboeval.analysis.resample import Trial, by_prompt
-    from roboeval.evaluation.checks import Checks
+    from roboeval.evaluation.checks import check_programs
 
     programs = {c.key: (c.task, c.program_sha256) for c in evaluation.judged() if c.key in ended}
-    checks = Checks(evaluation.run, suite, samples=samples, seed=seed)
-    checking = checks.add((c for c in evaluation.judged() if c.key in ended), engine=engine)
-    for _ in watched(checking, "checking", len(set(programs.values()))):
-        pass
-    return by_prompt(
-        (key, Trial(not checks.problems[programs[key]], *outcome)) for key, outcome in ended.items()
-    )
+    completions = (c for c in evaluation.judged() if c.key in ended)
+    checking = check_programs(evaluation.run, suite, completions, engine, samples=samples, seed=seed)
+    problems = dict(watched(checking, "checking", len(set(programs.values()))))
+    return by_prompt((key, Trial(not problems[programs[key]], *outcome)) for key, outcome in ended.items())
