@@ -28,13 +28,9 @@ File: TypeAlias = tuple[str, Callable[[], str]]
 
 
 def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Completion]:
-    """Read a folder or zip of `TASK_PROMPT_INDEX.py`, one file at a time; other files are skipped.
+    """The completions in a folder or zip of `TASK_PROMPT_INDEX.py`, of prompts that a suite knows.
 
-    The files assign texts to `name`, `prompt` and `completion`; they are parsed and never imported.
-
-    Args:
-        path: the folder or zip.
-        suite: whose tasks and prompts they must be of; any by default.
+    The files assign texts to `prompt` and `completion`; they are parsed and never imported.
 
     Raises:
         BadInput: it holds no such file, one of them is wrong or unknown to the suite, or a zip is damaged,
@@ -44,14 +40,10 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
         for key, (name, read) in sorted(_by_key(files, path).items()):
             if suite is not None and (problem := unknown(key, suite)):
                 raise BadInput(problem, file=name)
-            values = _assigned(read(), name)
-            completion = Completion(
-                task=key[0],
-                prompt=key[1],
-                index=key[2],
-                instruction=values.get("prompt"),
-                program=values["completion"],
-            )
+            texts = _assigned(read(), name)
+            row = dict(zip(("task", "prompt", "index"), key, strict=True))
+            row |= {"program": texts["completion"], "instruction": texts.get("prompt")}
+            completion = Completion.of(row)
             check_length(completion.row, name)
             yield completion
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from concurrent.futures import CancelledError, Future
+from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
@@ -83,11 +83,12 @@ class Share:
     kept: float
 
     @classmethod
-    def of(cls, outcome: Outcome, scenario: Scenario, free: Sequence[bool]) -> Share:
-        """The share of a run, by which of its world's requirements hold before the robot does anything."""
-        held = [is_met(requirement, outcome.trace) for requirement in scenario.require]
-        gained = [holds for holds, is_free in zip(held, free, strict=True) if not is_free]
-        kept = [holds for holds, is_free in zip(held, free, strict=True) if is_free]
+    def of(cls, outcome: Outcome, scenario: Scenario) -> Share:
+        """The share of a run in a world."""
+        gained: list[bool] = []
+        kept: list[bool] = []
+        for requirement in scenario.require:
+            (kept if is_met(requirement, ()) else gained).append(is_met(requirement, outcome.trace))
         whole = 1.0 if may_satisfy(outcome, scenario) else ERRED
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
 
@@ -104,15 +105,13 @@ def total(shares: Sequence[Share]) -> float:
 
 
 class Rewards:
-    """The rewards of programs, each judged once and then remembered."""
+    """The rewards of programs, remembered so that each is judged once."""
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()
         self._known: OrderedDict[bytes, float] = OrderedDict()
-        self._running: dict[bytes, Future[float]] = {}
-        os.register_at_fork(
-            before=self._lock.acquire, after_in_parent=self._lock.release, after_in_child=self._start_over
-        )
+        self._lock = threading.Lock()
+        release = self._lock.release
+        os.register_at_fork(before=self._lock.acquire, after_in_parent=release, after_in_child=release)
 
     def of(self, suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
         """The rewards of programs, in their order.
@@ -120,59 +119,35 @@ class Rewards:
         Raises:
             EngineError: a process was lost twice.
         """
-        scenarios = suite.tasks[task].scenarios
-        free = [[is_met(requirement, ()) for requirement in scenario.require] for scenario in scenarios]
-
-        def judged(program: str) -> float:
-            lane = warm().here()
-            shares = []
-            for scenario, its in zip(scenarios, free, strict=True):
-                outcome = lane.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
-                shares.append(Share.of(outcome, scenario, its))
-            return total(shares)
-
-        asks = [partial(self._ask, digest(suite.digest, task, one), judged, one) for one in programs]
+        names = [digest(suite.digest, task, program) for program in programs]
+        with self._lock:
+            rewards = {name: self._known[name] for name in names if name in self._known}
+        new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
         futures: list[Future[float]] = []
         try:
-            futures.extend(ask() for ask in asks)
-            return [self._result(*each) for each in zip(futures, asks, strict=True)]
-        except BaseException:  # nobody waits for the rest any more
+            judge = partial(judged, suite, task)
+            futures.extend(warm().submit(judge, program) for program in new.values())
+            rewards.update(zip(new, (future.result() for future in futures), strict=True))
+        finally:  # after an interrupt, nobody waits for the rest
             for future in futures:
                 future.cancel()
-            raise
-
-    def _start_over(self) -> None:
-        """In a forked process: forget programs that are judged by threads of the one before."""
-        self._running.clear()
-        self._lock.release()
-
-    def _ask(self, name: bytes, judged: Callable[[str], float], program: str) -> Future[float]:
         with self._lock:
-            if name in self._known:
+            self._known |= rewards
+            for name in rewards:
                 self._known.move_to_end(name)
-                done: Future[float] = Future()
-                done.set_result(self._known[name])
-                return done
-            if name not in self._running:
-                future = self._running[name] = warm().submit(judged, program)
-                future.add_done_callback(partial(self._remember, name))
-                return future
-            return self._running[name]
+            while len(self._known) > REMEMBERED:
+                self._known.popitem(last=False)
+        return [rewards[name] for name in names]
 
-    def _result(self, future: Future[float], ask: Callable[[], Future[float]]) -> float:
-        while True:
-            try:
-                return future.result()
-            except CancelledError:  # by another thread, which was interrupted
-                future = ask()
 
-    def _remember(self, name: bytes, ended: Future[float]) -> None:
-        with self._lock:
-            self._running.pop(name, None)
-            if not ended.cancelled() and ended.exception() is None:
-                self._known[name] = ended.result()
-                if len(self._known) > REMEMBERED:
-                    self._known.popitem(last=False)
+def judged(suite: Suite, task: str, program: str) -> float:
+    """The reward of a program, in a thread that has a lane."""
+    lane = warm().here()
+    shares = []
+    for scenario in suite.tasks[task].scenarios:
+        outcome = lane.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
+        shares.append(Share.of(outcome, scenario))
+    return total(shares)
 
 
 REWARDS = Rewards()
