@@ -16,7 +16,7 @@ from contextlib import contextmanager
 
 from codebotler.simulator.lane import Lane
 from roboeval.evaluation.completions import Completion, recorded_completions
-from roboeval.evaluation.engines import Engine, Local
+from roboeval.evaluation.engines import Engine, Local, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import Cluster
 from roboeval.suites.load import Suite, load_suite
@@ -42,11 +42,11 @@ def seconds(engine: Engine, completions: list[Completion], suite: Suite) -> tupl
 def fed(cluster: Engine, row: str) -> float:
     """How many calls a second one process hands out and takes back."""
 
-    def give(_lane: Lane, key: int) -> str:
-        return row[: -1 - key % 2]
+    def give(_lane: Lane, work: Work) -> str:
+        return row[: -1 - int(work[1]) % 2]
 
     start = time.perf_counter()
-    count = sum(1 for _ in cluster.map_distinct(give, range(EMPTY), name=lambda key: b"%d" % key, then=len))
+    count = sum(1 for _ in cluster.map_distinct(give, (("", str(n)) for n in range(EMPTY)), len))
     return count / (time.perf_counter() - start)
 
 

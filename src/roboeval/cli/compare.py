@@ -163,13 +163,11 @@ def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEn
         seed: from which they are drawn.
         engine: where programs are checked.
     """
-    from roboeval.evaluation.checks import Checks
+    from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.results import with_answers
 
     assert results.suite is not None, "it judged them"
     judged = [results.completions[key] for key in results.places]
-    checks = Checks(results.run, results.suite, samples=samples, seed=seed)
     different = {(completion.task, completion.program) for completion in judged}
-    for _ in watched(checks.add(judged, engine=engine), "checking", len(different)):
-        pass
-    return with_answers(results.table, checks.problems)
+    checking = check_programs(results.run, results.suite, judged, engine, samples=samples, seed=seed)
+    return with_answers(results.table, dict(watched(checking, "checking", len(different))))

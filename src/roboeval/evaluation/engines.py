@@ -1,39 +1,34 @@
-"""Where programs are run: on the cores of this machine, or on those of a Ray cluster."""
+"""Where programs run: on the cores of this machine, or on those of a Ray cluster."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
-from types import TracebackType
-from typing import Protocol, Self, TypeVar
+from typing import Protocol, Self, TypeAlias, TypeVar
 
 from codebotler.arguments import expect_whole
-from codebotler.simulator.engine import Lanes
+from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.lane import Lane
 
-Key = TypeVar("Key")
+Work: TypeAlias = tuple[str, str]
+"""The name of a task, and a program."""
+
 Ran = TypeVar("Ran")
 Value = TypeVar("Value")
 
 
 class Engine(Protocol):
-    """Calls a function with a lane, which runs programs isolated, and with each of many keys."""
+    """Calls functions that run programs isolated."""
 
     def map_distinct(
-        self,
-        function: Callable[[Lane, Key], Ran],
-        keys: Iterable[Key],
-        *,
-        name: Callable[[Key], bytes],
-        then: Callable[[Ran], Value],
+        self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
-        """The results in the order of the keys; equal keys are one call, and keys are read as needed.
+        """The results for programs, in their order; equal ones are one call, and they are read as needed.
 
         Args:
-            function: what to call; it, the keys and the results can be pickled.
-            keys: what to call it with.
-            name: a short name of a key, which no other key has.
-            then: what to call with what comes of it, in the main thread of a process where that is possible.
+            function: what to call with each program; it and its results can be pickled.
+            works: the programs.
+            then: what to call with each result, in the main thread of a process where that is possible.
 
         Raises:
             EngineError: no isolated process can be started, or none is left.
@@ -48,8 +43,8 @@ class Local:
     """The cores of this machine; use as a context manager.
 
     Args:
-        lanes: those that run programs, or how many are to be started and ended.
-        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+        lanes: those that run programs, or how many to start and end.
+        require_isolation: whether to refuse where programs are not fully isolated, rather than warn.
 
     Raises:
         BadInput: there are to be less than 1.
@@ -59,29 +54,21 @@ class Local:
         if not isinstance(lanes, Lanes):
             expect_whole(lanes, "the number of workers", least=1)
         self._given, self._required = lanes, require_isolation
-        self._lanes = lanes if isinstance(lanes, Lanes) else None
 
     def __enter__(self) -> Self:
-        if self._lanes is None and not isinstance(self._given, Lanes):
-            self._lanes = Lanes(self._given, require_isolation=self._required)
+        given = self._given
+        self._lanes = given if isinstance(given, Lanes) else Lanes(given, require_isolation=self._required)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
-    ) -> None:
-        if self._lanes is not None and self._lanes is not self._given:
-            self._lanes.__exit__(kind, error, where)
-            self._lanes = None
+    def __exit__(self, *_: object) -> None:
+        if self._lanes is not self._given:
+            self._lanes.__exit__()
 
     def map_distinct(
-        self,
-        function: Callable[[Lane, Key], Ran],
-        keys: Iterable[Key],
-        *,
-        name: Callable[[Key], bytes],
-        then: Callable[[Ran], Value],
+        self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
-        """The results in the order of the keys."""
-        lanes = self._lanes
-        assert lanes is not None, "enter it first"
-        return lanes.map_distinct(lambda key: function(lanes.here(), key), keys, name=name, then=then)
+        """The results for programs, in their order."""
+        here = self._lanes.here
+        return self._lanes.map_distinct(
+            lambda work: function(here(), work), works, name=lambda work: digest(*work), then=then
+        )

@@ -88,11 +88,11 @@ def generate_run(
     """Request the completions that a run still lacks; each is on the disk before it counts.
 
     Args:
-        run: its folder is made where it does not exist.
-        plan: which completions the run should have.
-        model: is closed at the end.
-        settings: those with which the model was opened.
-        pace: how many requests are sent.
+        run: a run to complete, or a new folder.
+        plan: which completions it should have.
+        model: the model, which is closed at the end.
+        settings: those with which it was opened.
+        pace: how many requests to send.
         on_progress: called before the first request, and after each completion.
 
     Raises:

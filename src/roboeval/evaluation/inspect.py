@@ -26,7 +26,7 @@ Registered = TypeVar("Registered", bound=Callable[..., object])
 
 
 def of_codebotler(function: Registered) -> Registered:
-    """Have Inspect call it `codebotler/...`: it takes the name of the package that the module says."""
+    """Have Inspect name a function `codebotler/...`, by what its module is called."""
     function.__module__ = "codebotler"
     return function
 
@@ -48,10 +48,19 @@ def roboeval(
         seed: from which to draw them.
     """
     our, drawn = Settings(), _suite(suite, worlds, seed)
-    names = tasks.split(",") if isinstance(tasks, str) else tasks or list(drawn.tasks)
+    samples = [
+        Sample(
+            id=f"{name}/{number}",
+            input=instruction,
+            target="satisfied in every world",
+            metadata={"task": name, "prompt": number},
+        )
+        for name in (tasks.split(",") if isinstance(tasks, str) else tasks or drawn.tasks)
+        for number, instruction in enumerate(drawn.task(name).prompts)
+    ]
     return Task(
-        dataset=MemoryDataset([one for name in names for one in _samples(drawn, name)], name=drawn.name),
-        setup=asking(),
+        dataset=MemoryDataset(samples, name=drawn.name),
+        setup=prompting(),
         scorer=verdict(suite, worlds, seed),
         config=model.GenerateConfig(temperature=our.temperature, top_p=our.top_p, max_tokens=our.max_tokens),
         version=drawn.version,
@@ -62,48 +71,36 @@ def _suite(name: str, worlds: int | None, seed: int | None) -> Suite:
     return load_suite(name) if (worlds, seed) == (None, None) else load_suite(name).with_worlds(worlds, seed)
 
 
-def _samples(suite: Suite, task: str) -> list[Sample]:
-    return [
-        Sample(
-            id=f"{task}/{number}",
-            input=instruction,
-            target="satisfied in every world",
-            metadata={"task": task, "prompt": number},
-        )
-        for number, instruction in enumerate(suite.task(task).prompts)
-    ]
-
-
 @solver
 @of_codebotler
-def asking() -> Solver:
-    """Ask as `roboeval generate` does: with the skills and some examples before the instruction."""
+def prompting() -> Solver:
+    """The prompt of `roboeval generate`: with the skills and some examples before the instruction."""
 
-    async def ask(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - comes later
-        messages = prompt_for(state.input_text).messages
+    async def prompt(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001 - comes later
         state.messages = [
-            getattr(model, f"ChatMessage{said.role.title()}")(content=said.text) for said in messages
+            getattr(model, f"ChatMessage{message.role.title()}")(content=message.text)
+            for message in prompt_for(state.input_text).messages
         ]
         return state
 
-    return ask
+    return prompt
 
 
 @scorer(metrics=[accuracy(), stderr(cluster="task"), grouped(accuracy(), "task", all=False)])
 @of_codebotler
 def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = None) -> Scorer:
-    """What `roboeval evaluate` says of the program in a reply, in a thread beside the event loop."""
+    """The verdict of `roboeval evaluate` on the program in a reply, in a thread beside the event loop."""
 
     def judged(state: TaskState) -> Score:
         by, program = _suite(suite, worlds, seed), program_of(state.output.completion).source
         completion = Completion(**state.metadata, index=0, program=program)
         (row,) = evaluate([completion], by, engine=Local(warm()))
-        told = json.dumps(completion_data(row, completion, by), ensure_ascii=False).encode(errors="replace")
-        data = json.loads(told)  # a log cannot hold half of a surrogate pair
+        text = json.dumps(completion_data(row, completion, by), ensure_ascii=False)
+        data = json.loads(text.encode(errors="replace"))  # a log cannot hold half of a surrogate pair
         return Score(
             value=CORRECT if row["passed"] else INCORRECT,
             answer=data["program"],
-            explanation="\n\n".join(map(_in_words, data["worlds"])),
+            explanation="\n\n".join(map(_explanation, data["worlds"])),
             metadata={"failure": data["failure"], "worlds": data["worlds"]},
         )
 
@@ -113,7 +110,7 @@ def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = 
     return score
 
 
-def _in_words(world: Mapping[str, Any]) -> str:
+def _explanation(world: Mapping[str, Any]) -> str:
     ended = f"{world['world']}: {'satisfied' if world['satisfied'] else 'not satisfied'}"
     errors = [f"{error['kind']}: {error['message']}" for error in (world["error"],) if error]
     failed = [f"{each['check']}: {each['explanation']}" for each in world["failed_checks"]]

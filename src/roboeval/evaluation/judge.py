@@ -14,7 +14,6 @@ from msgspec import to_builtins
 from codebotler import __version__
 from codebotler.badinput import BadInput
 from codebotler.rtl import CannotJudge, holds
-from codebotler.simulator.engine import digest
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
@@ -118,7 +117,7 @@ def judgements(
     with engine as opened:
         running = partial(run_in_worlds, suite, ablated=ablated)
         judging = partial(judged, suite, ablated=ablated)
-        for told in opened.map_distinct(running, works(), name=lambda work: digest(*work), then=judging):
+        for told in opened.map_distinct(running, works(), judging):
             completion = waiting.popleft()
             if told is None:
                 LOG.warning(

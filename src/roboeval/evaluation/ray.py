@@ -1,282 +1,195 @@
-"""Runs programs on a Ray cluster: in shards, which are given out anew where a machine is lost."""
+"""The engine that runs programs on a Ray cluster: in shards, which Ray retries where a machine is lost."""
 
 from __future__ import annotations
 
 import logging
 import os
 import platform
-import sys
+import socket
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import cache, partial
+from functools import cache
 from itertools import islice
-from types import TracebackType
-from typing import Any, Generic, Self, TypeVar
+from pathlib import Path
+from typing import Any, Self
 
 from codebotler import __version__
 from codebotler.badinput import BadInput
 from codebotler.simulator.distinct import MOST_AHEAD, Done
-from codebotler.simulator.engine import NO_SECCOMP
+from codebotler.simulator.engine import NO_SECCOMP, digest
 from codebotler.simulator.lane import EngineError, Lane
-from roboeval.evaluation.rayaddress import LOCAL, expect_cluster, is_here_only, named_address, outside
+from roboeval.evaluation.engines import Ran, Value, Work
 
 LOG = logging.getLogger("roboeval.ray")
-Key = TypeVar("Key")
-Ran = TypeVar("Ran")
-Value = TypeVar("Value")
+VERSIONS = f"codebotler {__version__} with Python {'.'.join(platform.python_version_tuple()[:2])}"
 
-LARGEST = 16  # keys of a shard: some tens of milliseconds, beside which Ray's one or two are little
+LARGEST = 16  # programs of a shard: some tens of milliseconds, beside which Ray's one or two are little
 AHEAD = 2  # shards for each core that are under way, so that none waits for this process
-TRIES = 20  # of a shard whose machine is lost
-PATIENCE = 10  # seconds until it is asked whether the cluster has any core left
+RETRIES = 20  # of a shard whose machine is lost
+PATIENCE_S = 10  # until it is asked whether the cluster has any core left
+CONNECT_S = 5  # until something must have accepted a connection
 
 
 class Cluster:
     """The cores of a Ray cluster; use as a context manager.
 
     The cluster is the one that RAY_ADDRESS names, or else the one that this machine is part of. Where there
-    is none, or RAY_ADDRESS is "local", one is started on this machine, which is reached by nobody else, and
+    is none, or RAY_ADDRESS is "local", one is started on this machine, which no other machine reaches, and
     ended again.
 
     Args:
         workers: how many shards are under way at the same time; twice the cores of the cluster by default.
-        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+        require_isolation: whether to refuse where programs are not fully isolated, rather than warn.
 
     Raises:
         BadInput: Ray is not installed, or no cluster answers at the address.
     """
 
     def __init__(self, workers: int | None = None, *, require_isolation: bool = False) -> None:
-        self._ray = _imported()
-        expect_cluster()
         self._workers, self._required = workers, require_isolation
         self._warned = False
+        self._address = os.environ.get("RAY_ADDRESS") or "auto"
+        current = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108
+        starts = self._address == "local" or (self._address == "auto" and not current.exists())
+        if starts:
+            os.environ.setdefault("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")  # listen on loopback only
+        else:
+            os.environ.setdefault("RAY_gcs_server_port_wait_time_s", "1")  # try once, for half a minute
+        if self._address not in {"auto", "local"}:
+            self._expect_listener()
+        self._ray = _import_ray()
 
     def __enter__(self) -> Self:
-        _connect(self._ray)
+        try:
+            self._ray.init(include_dashboard=False, logging_level=logging.ERROR, log_to_driver=False)
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            raise self._no_cluster(str(error.__cause__ or error).splitlines()[-1]) from None
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._ray.shutdown()
 
     def map_distinct(
-        self,
-        function: Callable[[Lane, Key], Ran],
-        keys: Iterable[Key],
-        *,
-        name: Callable[[Key], bytes],
-        then: Callable[[Ran], Value],
+        self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
-        """The results in the order of the keys.
+        """The results for programs, in their order.
 
-        What is under way when no more results are wanted comes to its end in the cluster: Ray 2.60 can abort
-        this process when a shard that is just done is cancelled.
+        Shards that are under way when no more results are wanted run to their end: Ray 2.60 can abort this
+        process when a shard is cancelled that has just ended.
         """
-        shards: Shards[Key] = Shards(self._give_out(partial(call_both, function, then)))
-        remaining = iter(keys)
-        waiting: deque[bytes] = deque()
+        remote = self._ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(run_shard)
+        functions = self._ray.put((function, then))
+        works, waiting = iter(works), deque[bytes]()
+        shards: dict[Any, list[bytes]] = {}
+        running: set[bytes] = set()
+        sent, most = 0, self._most()
         with Done() as done:
             while True:
-                self._read(remaining, waiting, shards, done, name)
+                while len(shards) < most:
+                    size = min(shard_size(sent, most), MOST_AHEAD - len(waiting))
+                    read = [(digest(*work), work) for work in islice(works, size)]
+                    if not read:
+                        break
+                    waiting.extend(name for name, _ in read)
+                    new = {name: work for name, work in read if name not in done and name not in running}
+                    if new:
+                        shard = remote.remote(functions, list(new.values()), VERSIONS, self._required)
+                        shards[shard] = list(new)
+                        running.update(new)
+                        sent += len(new)
                 if not waiting:
                     return
                 if waiting[0] in done:
                     yield done[waiting.popleft()]
-                else:
-                    self._await(shards, done)
+                    continue
+                for shard, values in self._ended(shards):
+                    for name, value in zip(shards.pop(shard), values, strict=True):
+                        running.remove(name)
+                        done[name] = value
+                most = self._most()
 
-    def _give_out(self, function: Callable[[Lane, Key], Value]) -> Callable[[Sequence[Key]], Any]:
-        """What gives a shard to the cluster, and says by which reference its results are found."""
-        ray = self._ray
-        remote = ray.remote(num_cpus=1, max_retries=TRIES, retry_exceptions=False)(call_all)
-        kept = ray.put(function)
-        return lambda keys: remote.remote(kept, list(keys), OURS)
-
-    def _read(
-        self,
-        remaining: Iterator[Key],
-        waiting: deque[bytes],
-        shards: Shards[Key],
-        done: Done,
-        name: Callable[[Key], bytes],
-    ) -> None:
-        """Read so many keys that the cluster has work, and no more than this process should hold."""
-        most = self._workers or AHEAD * self._cores()
-        while len(shards.running) < most and len(waiting) < MOST_AHEAD:
-            read = False
-            for key in islice(remaining, min(shards.size(most), MOST_AHEAD - len(waiting))):
-                read = True
-                named = name(key)
-                waiting.append(named)
-                if named not in done and named not in shards.names:
-                    shards.add(named, key)
-            shards.send()
-            if not read:
-                return
+    def _most(self) -> int:
+        """How many shards may be under way."""
+        return self._workers or AHEAD * max(1, self._cores())
 
     def _cores(self) -> int:
-        return max(1, int(self._ray.cluster_resources().get("CPU", 0)))
+        return int(self._ray.cluster_resources().get("CPU", 0))
 
-    def _await(self, shards: Shards[Key], done: Done) -> None:
-        """Wait until some shard is done, and keep its results."""
-        ready, _ = self._ray.wait(list(shards.running), num_returns=1, timeout=PATIENCE)
-        if not ready and not self._ray.cluster_resources().get("CPU"):
+    def _ended(self, shards: Iterable[Any]) -> Iterator[tuple[Any, list[Any]]]:
+        """Wait until some shards have ended, and get their results."""
+        ended, _ = self._ray.wait(list(shards), timeout=PATIENCE_S)
+        if not ended and not self._cores():
             raise EngineError("the Ray cluster has no core left; start another node, and go on")
-        for reference in ready:
-            told = _fetched(self._ray, reference)
-            if told.complaint is not None:
-                raise EngineError(told.complaint)
-            self._look_at_walls(told)
-            for named, value in zip(shards.running.pop(reference), told.values, strict=True):
-                shards.names.discard(named)
-                done[named] = value
+        for shard in ended:
+            try:
+                values, warning = self._ray.get(shard)
+            except self._ray.exceptions.RayTaskError as error:
+                raise error.cause from None
+            except self._ray.exceptions.RayError as error:
+                raise EngineError(f"Ray lost a shard for good: {str(error).splitlines()[0]}") from None
+            if warning and not self._warned:
+                LOG.warning(warning)
+                self._warned = True
+            yield shard, values
 
-    def _look_at_walls(self, told: Told) -> None:
-        if told.has_seccomp:
-            return
-        if self._required:
-            raise EngineError(f"{told.machine}: {NO_SECCOMP}")
-        if not self._warned:
-            LOG.warning("%s: %s", told.machine, NO_SECCOMP)
-            self._warned = True
+    def _expect_listener(self) -> None:
+        """Refuse an address at which nothing listens, before Ray tries for half a minute."""
+        host, _, port = self._address.rpartition(":")
+        try:
+            socket.create_connection((host.strip("[]"), int(port)), CONNECT_S).close()
+        except (OSError, ValueError, OverflowError) as error:
+            raise self._no_cluster(str(error)) from None
 
-
-@dataclass
-class Shards(Generic[Key]):
-    """Keys that were given out or are about to be.
-
-    Args:
-        give: gives a shard out.
-        running: the names of the keys of each shard that was, by its reference.
-        names: of all keys whose results are not there.
-        given: how many keys were given out so far.
-    """
-
-    give: Callable[[Sequence[Key]], Any]
-    running: dict[Any, list[bytes]] = field(default_factory=dict)
-    names: set[bytes] = field(default_factory=set)
-    given: int = 0
-    _next: list[tuple[bytes, Key]] = field(default_factory=list)
-
-    def size(self, most: int) -> int:
-        """How many keys to put into a shard: few at first, so that small jobs are spread over all cores."""
-        return min(LARGEST, 1 + self.given // (2 * most))
-
-    def add(self, name: bytes, key: Key) -> None:
-        """Have a key be part of the next shard."""
-        self._next.append((name, key))
-        self.names.add(name)
-
-    def send(self) -> None:
-        """Give the next shard out, if anything is in it."""
-        if self._next:
-            self.running[self.give([key for _, key in self._next])] = [name for name, _ in self._next]
-            self.given += len(self._next)
-            self._next = []
+    def _no_cluster(self, why: str) -> BadInput:
+        return BadInput(
+            f"RAY_ADDRESS: no Ray cluster answers at {self._address} ({why}); start its head with "
+            "`ray start --head`, or set RAY_ADDRESS=local to use the cores of this machine"
+        )
 
 
-# --- at the other end
+def shard_size(sent: int, most: int) -> int:
+    """How many programs to put into a shard: few at first, so that small jobs are spread over all cores."""
+    return min(LARGEST, 1 + sent // (2 * most))
 
 
-@dataclass(frozen=True)
-class Told:
-    """What comes back of a shard.
+def run_shard(
+    functions: tuple[Callable[[Lane, Work], Ran], Callable[[Ran], Value]],
+    works: Sequence[Work],
+    versions: str,
+    require_isolation: bool,  # noqa: FBT001 - Ray passes positions
+) -> tuple[list[Value], str | None]:
+    """The results for programs, and a warning if they are not fully isolated; in a process of Ray's.
 
-    Args:
-        values: the results.
-        has_seccomp: whether no wall is missing there.
-        machine: its name.
-        complaint: why there are no results; None where there are.
-    """
-
-    values: tuple[Any, ...] = ()
-    has_seccomp: bool = True
-    machine: str = ""
-    complaint: str | None = None
-
-
-OURS = __version__, ".".join(platform.python_version_tuple()[:2])
-
-
-def call_all(function: Callable[[Lane, Any], Any], keys: Sequence[Any], theirs: tuple[str, str]) -> Told:
-    """Call a function with each key, in a process of Ray's, whose lane stays for the next shard.
-
-    Args:
-        function: what to call.
-        keys: what to call it with.
-        theirs: the versions of codebotler and Python of who asks: another one might judge otherwise.
+    Raises:
+        EngineError: no isolated process can be started, or the versions here might judge otherwise.
     """
     machine = platform.node()
-    if theirs != OURS:
-        versions = [f"codebotler {version} with Python {python}" for version, python in (OURS, theirs)]
-        return Told(machine=machine, complaint=f"{machine} has {versions[0]}, and not {versions[1]}")
+    if versions != VERSIONS:
+        raise EngineError(f"{machine} has {VERSIONS}, and not {versions}")
+    function, then = functions
     try:
-        lane = own_lane()
-        values = tuple(function(lane, key) for key in keys)
+        lane = own_lane(require_isolation=require_isolation)
+        values = [then(function(lane, work)) for work in works]
     except EngineError as error:
-        return Told(machine=machine, complaint=f"{machine}: {error}")
-    return Told(values, lane.has_seccomp, machine)
-
-
-def call_both(
-    function: Callable[[Lane, Key], Ran], then: Callable[[Ran], Value], lane: Lane, key: Key
-) -> Value:
-    """What comes of a key after both functions."""
-    return then(function(lane, key))
+        raise EngineError(f"{machine}: {error}") from None
+    return values, None if lane.has_seccomp else f"{machine}: {NO_SECCOMP}"
 
 
 @cache
-def own_lane() -> Lane:
-    """The lane of this process; it ends with it."""
-    return Lane()
+def own_lane(*, require_isolation: bool) -> Lane:
+    """The lane of this process, which stays for the next shard."""
+    lane = Lane()
+    if require_isolation and not lane.has_seccomp:
+        lane.close()
+        raise EngineError(NO_SECCOMP)
+    return lane
 
 
-# --- Ray
-
-
-def _imported() -> Any:  # noqa: ANN401 - the extra has no types here
+def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types here
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # else it calls home
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # its warning about accelerators
-    if is_here_only():
-        if "ray" in sys.modules and os.environ.get(LOOPBACK_ONLY) != "0":
-            raise BadInput(f"Ray would let other machines in: set {LOOPBACK_ONLY}=0 before it is imported")
-        os.environ.setdefault(LOOPBACK_ONLY, "0")
     try:
         import ray  # noqa: PLC0415 - an extra, which starts slowly
     except ImportError:
         raise BadInput("the engine ray needs Ray; pip install 'codebotler[ray]'") from None
     return ray
-
-
-LOOPBACK_ONLY = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
-"""Set to 0 before Ray is imported, it has a cluster of one machine listen there only, and looks for one
-there. Else Ray takes this machine's address in the network for 127.0.0.1, and waits for ever."""
-
-
-def _connect(ray: Any) -> None:  # noqa: ANN401 - a module without types
-    quiet = {"logging_level": logging.ERROR, "log_to_driver": False}
-    address = named_address()
-    try:
-        if address != LOCAL:
-            ray.init(address="auto", **quiet)
-            return
-    except ConnectionError:
-        if address:  # it answered before
-            raise outside(address) from None
-    try:
-        ray.init(address="local", include_dashboard=False, **quiet)
-    except OSError as error:  # such as a folder in RAY_TMPDIR whose name is too long for sockets
-        raise BadInput(f"Ray cannot be started here: {error}") from None
-
-
-def _fetched(ray: Any, reference: Any) -> Told:  # noqa: ANN401 - a module without types
-    try:
-        told: Told = ray.get(reference)
-    except ray.exceptions.RayTaskError as error:
-        raise error.cause from None
-    except ray.exceptions.RayError as error:
-        raise EngineError(f"Ray lost a shard for good: {str(error).splitlines()[0]}") from None
-    return told

@@ -26,7 +26,7 @@ LONGEST_VALUE = 24  # characters of a setting that an error quotes
 
 @dataclass(frozen=True)
 class GenerationPlan:
-    """Which completions a run should have: so many for each prompt of some tasks, by default all."""
+    """Which completions a run should have: so many for each prompt of some tasks, by default of all."""
 
     suite: Suite
     tasks: frozenset[str] | None = None
@@ -34,12 +34,8 @@ class GenerationPlan:
 
     def keys(self) -> list[Key]:
         """The completions: the first of each prompt, then the second, so that a part covers all tasks."""
-        prompts = [
-            (task.name, prompt)
-            for task in self.suite.tasks.values()
-            if self.tasks is None or task.name in self.tasks
-            for prompt in range(len(task.prompts))
-        ]
+        tasks = [task for name, task in self.suite.tasks.items() if self.tasks is None or name in self.tasks]
+        prompts = [(task.name, prompt) for task in tasks for prompt in range(len(task.prompts))]
         return [(*prompt, index) for index in range(self.num_completions) for prompt in prompts]
 
     def instruction(self, key: Key) -> str:
@@ -56,11 +52,8 @@ class GenerationPlan:
             return
         for completion in read_completions(run.completions, self.suite):
             if completion.instruction != self.instruction(completion.key):
-                raise BadInput(
-                    f"{name_of(completion.key)} was generated from another instruction than the suite has "
-                    "now; name another folder",
-                    file=run.completions,
-                )
+                which = f"{name_of(completion.key)} was generated from another instruction"
+                raise BadInput(f"{which} than the suite has now; name another folder", file=run.completions)
             yield completion
 
 
@@ -109,10 +102,8 @@ def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: Settings)
         kept = ("started", "ended", "possibly_paid_twice")
         metadata |= {name: earlier.get(name, metadata[name]) for name in kept}
     elif run.completions.exists() and run.completions.stat().st_size:
-        raise BadInput(
-            "is missing, so that the settings of the completions are unknown; name another folder",
-            file=run.about,
-        )
+        why = "is missing, so that the settings of the completions are unknown"
+        raise BadInput(f"{why}; name another folder", file=run.about)
     return metadata
 
 
@@ -121,11 +112,9 @@ def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> 
     for name, value in now.items():
         if before.get(name) != value:
             what = "prompt template" if name == "template" else name.replace("_", "-")
-            raise BadInput(
-                f"the completions were generated with another {what} "
-                f"({_brief(before.get(name))}, now {_brief(value)}); name another folder to start over",
-                file=file,
-            )
+            which = f"another {what} ({_brief(before.get(name))}, now {_brief(value)})"
+            sentence = f"the completions were generated with {which}; name another folder to start over"
+            raise BadInput(sentence, file=file)
 
 
 def _brief(value: object) -> str:
@@ -160,10 +149,8 @@ class RequestLog:
     def __init__(self, path: Path, done: set[Key], lost: int) -> None:
         self.path = path
         earlier, noted = self._read()
-        self.interrupted = len(noted - done)
-        """How many requests were under way at the last interruption."""
+        self.interrupted = len(noted - done)  # at the last interruption
         self.lost = max(lost, earlier + self.interrupted)
-        """How many were at any interruption."""
         self.under_way: set[Key] = set()
 
     def __enter__(self) -> Self:

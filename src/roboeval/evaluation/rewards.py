@@ -1,12 +1,12 @@
-"""Rewards for training: how much of what a task requires each of many programs does, as a number."""
+"""Rewards for training: how much of its task a program does, as a number from 0 to 1."""
 
 from __future__ import annotations
 
 import os
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
-from concurrent.futures import CancelledError, Future
+from collections.abc import Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
 from os import PathLike
@@ -23,9 +23,9 @@ from roboeval.evaluation.judge import is_met, may_satisfy
 from roboeval.suites.load import Scenario, Suite, load_suite
 
 ERRED = 0.5
-"""What is left of a run's share that ends in an error: who errs had better returned at that line."""
+"""The part that remains of what a run did before an error: it had better returned at that line."""
 
-KEPT = 100_000  # rewards that are remembered; a policy that learns writes the same program again and again
+REMEMBERED = 100_000  # rewards; a policy that learns writes the same program again and again
 
 
 def reward(
@@ -37,7 +37,7 @@ def reward(
     seed: int | None = None,
     suite: Suite | str | PathLike[str] = "paper",
 ) -> list[float]:
-    """Say of each program how much of its task it does: 1 exactly if it passes, 0 if it does nothing.
+    """The reward of each program: 1 exactly if it passes, 0 if it does nothing.
 
     In each world, requirements that hold before the robot has moved (such as "never say it in the lobby")
     are worth nothing by themselves: the share of the others that are satisfied counts, times the share of
@@ -49,11 +49,10 @@ def reward(
 
     Args:
         task: its name.
-        prompt: which phrasing the programs were written for, counted from 0; all have the same worlds.
+        prompt: for which phrasing the programs were written, counted from 0; all have the same worlds.
         programs: their sources, which need not even parse; equal ones are judged once.
-        worlds: how many worlds to draw, 1 to 10,000, for a suite whose worlds are drawn; as many as it says
-            by default.
-        seed: from which to draw them; that of the suite by default.
+        worlds: how many worlds to draw, 1 to 10,000, for a suite whose worlds are drawn.
+        seed: from which to draw them.
         suite: a suite, or the name or folder of one.
 
     Raises:
@@ -72,7 +71,7 @@ def reward(
 
 @dataclass(frozen=True)
 class Share:
-    """How a program did in one world.
+    """How much a program did in one world.
 
     Args:
         gained: the share of the requirements that did not hold before it began, and do now; None if there are
@@ -84,17 +83,12 @@ class Share:
     kept: float
 
     @classmethod
-    def of(cls, outcome: Outcome, scenario: Scenario, free: Sequence[bool]) -> Share:
-        """Look at a run.
-
-        Args:
-            outcome: of the run.
-            scenario: its world, with the requirements.
-            free: for each requirement, whether it holds before the robot has done anything.
-        """
-        held = [is_met(requirement, outcome.trace) for requirement in scenario.require]
-        gained = [holds for holds, is_free in zip(held, free, strict=True) if not is_free]
-        kept = [holds for holds, is_free in zip(held, free, strict=True) if is_free]
+    def of(cls, outcome: Outcome, scenario: Scenario) -> Share:
+        """The share of a run in a world."""
+        gained: list[bool] = []
+        kept: list[bool] = []
+        for requirement in scenario.require:
+            (kept if is_met(requirement, ()) else gained).append(is_met(requirement, outcome.trace))
         whole = 1.0 if may_satisfy(outcome, scenario) else ERRED
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
 
@@ -102,8 +96,8 @@ class Share:
 def total(shares: Sequence[Share]) -> float:
     """The reward for what a program did in all worlds of its task.
 
-    Where there is nothing to gain, and a world only asks to let something be, it counts as much as was gained
-    in the other worlds; if no world asks for anything to be done, doing nothing is right.
+    A world in which there is nothing to gain counts as much as was gained in the others; if there is nothing
+    to gain in any, doing nothing is right.
     """
     earned = [share.gained * share.kept for share in shares if share.gained is not None]
     elsewhere = fmean(earned) if earned else 1.0
@@ -111,12 +105,13 @@ def total(shares: Sequence[Share]) -> float:
 
 
 class Rewards:
-    """Judges programs, equal ones once, and remembers what came of each."""
+    """The rewards of programs, remembered so that each is judged once."""
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()
         self._known: OrderedDict[bytes, float] = OrderedDict()
-        self._running: dict[bytes, Future[float]] = {}
+        self._lock = threading.Lock()
+        release = self._lock.release
+        os.register_at_fork(before=self._lock.acquire, after_in_parent=release, after_in_child=release)
 
     def of(self, suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
         """The rewards of programs, in their order.
@@ -124,73 +119,35 @@ class Rewards:
         Raises:
             EngineError: a process was lost twice.
         """
-        scenarios = suite.tasks[task].scenarios
-        free = [[is_met(requirement, ()) for requirement in scenario.require] for scenario in scenarios]
-
-        def judged(program: str) -> float:
-            lane = warm().here()
-            shares = []
-            for scenario, its in zip(scenarios, free, strict=True):
-                outcome = lane.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
-                shares.append(Share.of(outcome, scenario, its))
-            return total(shares)
-
         names = [digest(suite.digest, task, program) for program in programs]
-        asked: list[float | Future[float]] = []
+        with self._lock:
+            rewards = {name: self._known[name] for name in names if name in self._known}
+        new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
+        futures: list[Future[float]] = []
         try:
-            asked.extend(self._ask(*each, judged) for each in zip(names, programs, strict=True))
-            return [self._told(*each, judged) for each in zip(asked, names, programs, strict=True)]
-        except BaseException:  # nobody waits for the rest any more
-            for one in asked:
-                if isinstance(one, Future):
-                    one.cancel()
-            raise
-
-    def before_fork(self) -> None:
-        """Let nothing change in the meantime."""
-        self._lock.acquire()
-
-    def after_fork(self) -> None:
-        """Go on, in the process that has forked."""
-        self._lock.release()
-
-    def begin_anew(self) -> None:
-        """Expect nothing of threads that are not here, in the process that was forked."""
-        self._running.clear()
-        self._lock.release()
-
-    def _ask(self, name: bytes, program: str, judged: Callable[[str], float]) -> float | Future[float]:
+            judge = partial(judged, suite, task)
+            futures.extend(warm().submit(judge, program) for program in new.values())
+            rewards.update(zip(new, (future.result() for future in futures), strict=True))
+        finally:  # after an interrupt, nobody waits for the rest
+            for future in futures:
+                future.cancel()
         with self._lock:
-            if name in self._known:
+            self._known |= rewards
+            for name in rewards:
                 self._known.move_to_end(name)
-                return self._known[name]
-            if name not in self._running:
-                future = self._running[name] = warm().submit(judged, program)
-                future.add_done_callback(lambda ended: self._remember(name, ended))
-                return future
-            return self._running[name]
-
-    def _told(
-        self, asked: float | Future[float], name: bytes, program: str, judged: Callable[[str], float]
-    ) -> float:
-        while isinstance(asked, Future):
-            try:
-                return asked.result()
-            except CancelledError:  # by another thread, which was interrupted
-                asked = self._ask(name, program, judged)
-        return asked
-
-    def _remember(self, name: bytes, ended: Future[float]) -> None:
-        with self._lock:
-            self._running.pop(name, None)
-            if ended.cancelled() or ended.exception() is not None:
-                return
-            self._known[name] = ended.result()
-            if len(self._known) > KEPT:
+            while len(self._known) > REMEMBERED:
                 self._known.popitem(last=False)
+        return [rewards[name] for name in names]
+
+
+def judged(suite: Suite, task: str, program: str) -> float:
+    """The reward of a program, in a thread that has a lane."""
+    lane = warm().here()
+    shares = []
+    for scenario in suite.tasks[task].scenarios:
+        outcome = lane.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
+        shares.append(Share.of(outcome, scenario))
+    return total(shares)
 
 
 REWARDS = Rewards()
-os.register_at_fork(
-    before=REWARDS.before_fork, after_in_parent=REWARDS.after_fork, after_in_child=REWARDS.begin_anew
-)

@@ -60,7 +60,6 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
         ("completion = 3\n", None, "`completion`"),
         ("a = 1\ncompletion = 'x\n", 2, "(unterminated string literal (detected"),
         ("a = 1\ncompletion = f'{x}'\n", 2, "`completion` is no plain text"),
-        ("name = n()\ncompletion = 'x'\n", 1, "`name` is no plain text"),
         ("completion = " + "-" * 100_000 + "1\n", None, "no readable Python"),
         (b"a = 1\ncompletion = '\xff'\n", 2, "UTF-8"),
         (b"#" * 5_000_001, None, "is larger than 5,000,000 bytes"),
@@ -107,8 +106,8 @@ def test_an_encrypted_member(tmp_path: Path) -> None:
     data[data.index(b"PK\x01\x02") + 8] |= 1
     path.write_bytes(data)
     error = error_about(path)
-    assert str(error.file) == f"{path}/T_0_0.py"
-    assert "encrypted" in error.sentence
+    assert error.file == path
+    assert "is encrypted" in error.sentence
 
 
 @pytest.mark.parametrize("how", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
@@ -167,8 +166,6 @@ def test_all_members_together_are_bounded(tmp_path: Path, monkeypatch: pytest.Mo
     assert f"more than {9 * len(FILE)} bytes" in error.sentence
     monkeypatch.setattr(published, "MAX_UNPACKED", 10 * len(FILE))
     assert sum(1 for _ in published_completions(path)) == 10
-    monkeypatch.setattr(published, "MAX_ZIP", path.stat().st_size - 1)
-    assert f"{path.stat().st_size - 1:,} bytes" in error_about(path).sentence
 
 
 def test_odd_escapes_say_nothing_on_the_terminal_and_halves_of_a_pair_are_joined(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-import socket
+import signal
 import subprocess
 import sys
 import threading
@@ -14,73 +14,81 @@ from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from types import SimpleNamespace
 
 import pytest
 
-from codebotler.badinput import BadInput
 from codebotler.simulator.distinct import MOST_AHEAD
-from codebotler.simulator.engine import NO_SECCOMP, EngineError
-from codebotler.simulator.lane import Lane
+from codebotler.simulator.engine import NO_SECCOMP
+from codebotler.simulator.lane import EngineError
 from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine
 from roboeval.evaluation.completions import recorded_completions
-from roboeval.evaluation.engines import Local
+from roboeval.evaluation.engines import Local, Work
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.ray import LARGEST, LOOPBACK_ONLY, OURS, Cluster, Shards, Told, call_all
-from roboeval.evaluation.rayaddress import PING_PATIENCE_S
+from roboeval.evaluation.ray import LARGEST, VERSIONS, Cluster, run_shard, shard_size
 from roboeval.evaluation.rows import Row
 from roboeval.suites.load import Suite
 
 # Read when Ray is imported.
+LOOPBACK_ONLY = "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"
 os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": "0123456789abcdef" * 4, LOOPBACK_ONLY: "0"}
-ray = pytest.importorskip("ray", reason="Ray is an extra")
+pytest.importorskip("ray", reason="Ray is an extra")
 cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is an extra")
 
 HERE = "127.0.0.1"
+EVALUATE = ("evaluate", "recorded:hasty", "--engine", "ray", "--out")
 
 
-# --- without a cluster: first, as long as there is none
+def started(cwd: Path, *words: str, **variables: str | None) -> subprocess.Popen[str]:
+    """Python in a process of its own, since Ray reads some variables only once."""
+    environment = {**ENVIRONMENT, **os.environ, **variables}
+    return subprocess.Popen(
+        [sys.executable, *words],
+        cwd=cwd,
+        env={name: value for name, value in environment.items() if value is not None},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def numbered(numbers: range) -> Iterator[Work]:
+    return (("", str(number)) for number in numbers)
+
+
+# --- without a cluster
 
 
 def test_shards_are_small_at_first() -> None:
-    given: list[list[int]] = []
-
-    def give(keys: Any) -> int:  # noqa: ANN401 - keys of a shard
-        given.append(list(keys))
-        return len(given)
-
-    shards: Shards[int] = Shards(give)
-    keys = iter(range(1000))
+    sizes: list[int] = []
     for _ in range(60):
-        for _, key in zip(range(shards.size(4)), keys, strict=False):
-            shards.add(str(key).encode(), key)
-        shards.send()
-    sizes = list(map(len, given))
+        sizes.append(shard_size(sum(sizes), 4))
     assert sizes[:8] == [1] * 8
     assert sizes == sorted(sizes)
     assert sizes[-1] == LARGEST
-    assert [key for those in given for key in those] == list(range(sum(sizes)))
-    shards.send()  # there is nothing in it
-    assert len(given) == 60
 
 
 def test_another_version_does_not_judge() -> None:
-    told = call_all(lambda _, key: key, [1], ("0.0.1", "3.9"))
-    assert told.values == ()
-    assert re.search(r"codebotler 0\.0\.1 .*Python 3\.9", str(told.complaint))
-    assert call_all(lambda _, key: key, [1], OURS).values == (1,)
+    functions = (lambda _, work: work, list)
+    with pytest.raises(EngineError, match=r"has codebotler .*, and not codebotler 0\.0\.1"):
+        run_shard(functions, [], "codebotler 0.0.1 with Python 3.9", require_isolation=False)
 
 
-def test_a_wall_that_is_missing_is_told_once_or_refused(caplog: pytest.LogCaptureFixture) -> None:
-    bare = Told((1,), has_seccomp=False, machine="far")
-    lenient = Cluster()
-    for _ in range(3):
-        lenient._look_at_walls(bare)
-    assert caplog.messages == [f"far: {NO_SECCOMP}"]
-    with pytest.raises(EngineError, match=r"^far: .*isolated"):
-        Cluster(require_isolation=True)._look_at_walls(bare)
-    Cluster(require_isolation=True)._look_at_walls(Told((1,)))
+def test_missing_isolation_is_warned_of_once_or_refused(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(rayengine, "Lane", lambda: SimpleNamespace(has_seccomp=False, close=lambda: None))
+    monkeypatch.setattr(rayengine, "own_lane", rayengine.own_lane.__wrapped__)
+    functions, works = (lambda _, work: int(work[1]), abs), list(numbered(range(2)))
+    with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
+        run_shard(functions, works, VERSIONS, require_isolation=True)
+    result = run_shard(functions, works, VERSIONS, require_isolation=False)
+    cluster = Cluster()
+    cluster._ray = SimpleNamespace(wait=lambda shards, **_: (shards, []), get=lambda _: result)
+    assert [values for _, values in cluster._ended(range(3))] == [[0, 1]] * 3
+    (message,) = caplog.messages
+    assert message.endswith(f": {NO_SECCOMP}")
 
 
 ALONE = """
@@ -88,7 +96,8 @@ from roboeval.evaluation.ray import Cluster
 with Cluster() as cluster:
     import ray
     import psutil  # which comes with it
-    print(list(cluster.map_distinct(lambda lane, key: key, [1, 2, 1], name=lambda k: b"%d" % k, then=abs)))
+    works = [("", "1"), ("", "2"), ("", "1")]
+    print(list(cluster.map_distinct(lambda lane, work: int(work[1]), works, abs)))
     print([node["NodeManagerAddress"] for node in ray.nodes()])
     ours = {process.pid for process in psutil.Process().children(recursive=True)}
     sockets = [one for one in psutil.net_connections("tcp") if one.pid in ours and one.status == "LISTEN"]
@@ -97,63 +106,15 @@ print(ray.is_initialized())
 """
 
 
-def alone(folder: str, address: str = "") -> subprocess.CompletedProcess[str]:
-    environment = {
-        name: value for name, value in os.environ.items() if name not in {"RAY_ADDRESS", LOOPBACK_ONLY}
-    }
-    return subprocess.run(
-        [sys.executable, "-c", ALONE],
-        env={**environment, "RAY_TMPDIR": folder, "RAY_ADDRESS": address},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-def test_ray_that_was_imported_before_would_let_others_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(LOOPBACK_ONLY, "1")
-    monkeypatch.setenv("RAY_ADDRESS", "localhost:6379")
-    with pytest.raises(BadInput, match=f"{LOOPBACK_ONLY}=0"):
-        Cluster()
-
-
-def test_where_ray_cannot_start_there_is_a_sentence(tmp_path: Path) -> None:
-    ended = alone(str(tmp_path / ("long" * 20)))
-    assert "BadInput: Ray cannot be started" in ended.stderr.splitlines()[-1]
-
-
-@pytest.mark.parametrize("address", ["", "local"])
-def test_a_cluster_is_started_where_there_is_none_and_only_this_machine_reaches_it(address: str) -> None:
-    with TemporaryDirectory() as folder:  # whose name is short: there are sockets in it
-        ended = alone(folder, address)
-    assert ended.stdout.splitlines() == ["[1, 2, 1]", "['127.0.0.1']", "{'127.0.0.1'}", "False"], ended
-
-
-def test_without_a_cluster_at_the_address_the_command_ends_soon_and_leaves_nothing(tmp_path: Path) -> None:
-    with socket.create_server((HERE, 0)) as server:
-        port = server.getsockname()[1]
-    started = time.monotonic()
-    for address in (f"{HERE}:{port}", "nonsense", f"ray://{HERE}:10001", f"http://{HERE}:8265"):
-        ended = roboeval(
-            *("evaluate", "recorded:hasty", "--out", "far", "--engine", "ray"),
-            cwd=tmp_path,
-            environment={**ENVIRONMENT, **os.environ, "RAY_ADDRESS": address},
-        )
-        assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1), ended
-        assert ended.err.startswith("roboeval: RAY_ADDRESS: ")
-        assert not list(tmp_path.iterdir())
-    assert time.monotonic() - started < 60
-
-
-def test_a_server_that_is_no_cluster_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    with ThreadingHTTPServer((HERE, 0), BaseHTTPRequestHandler) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        monkeypatch.setenv("RAY_ADDRESS", f"{HERE}:{server.server_port}")
-        started = time.monotonic()
-        with pytest.raises(BadInput, match="does not answer"):
-            Cluster()
-        assert time.monotonic() - started < 2 * PING_PATIENCE_S
-        server.shutdown()
+@pytest.mark.parametrize("address", [f"{HERE}:1", "nonsense", f"http://{HERE}:8265"])
+def test_without_a_cluster_at_the_address_the_command_ends_soon_and_leaves_nothing(
+    tmp_path: Path, address: str
+) -> None:
+    environment = {**ENVIRONMENT, **os.environ, "RAY_ADDRESS": address}
+    ended = roboeval(*EVALUATE, "far", cwd=tmp_path, environment=environment)
+    assert (ended.status, ended.out, ended.err.count("\n")) == (2, "", 1), ended
+    assert ended.err.startswith(f"roboeval: RAY_ADDRESS: no Ray cluster answers at {address} (")
+    assert not list(tmp_path.iterdir())
 
 
 # --- on a cluster
@@ -163,11 +124,11 @@ class Nodes:
     """A head without a core, and nodes with one each, as processes of this machine."""
 
     def __init__(self) -> None:
-        head = {"num_cpus": 0, "node_ip_address": HERE, "include_dashboard": False}
+        soon = {"health_check_period_ms": 200, "health_check_timeout_ms": 2000}
+        head = {"num_cpus": 0, "node_ip_address": HERE, "include_dashboard": False, "_system_config": soon}
         self._cluster = cluster_utils.Cluster(initialize_head=True, head_node_args=head)
         self._nodes = [self._cluster.add_node(num_cpus=1, node_ip_address=HERE) for _ in range(2)]
         self.address = str(self._cluster.address)
-        self.port_of_a_node = self._nodes[0].node_manager_port
 
     def kill(self) -> None:
         """Kill a node with all that belongs to it, as a machine that loses its power."""
@@ -178,122 +139,124 @@ class Nodes:
 
 
 @pytest.fixture(scope="module")
-def nodes() -> Iterator[Nodes]:
+def background(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, subprocess.Popen[str]]]:
+    """Processes that mostly wait, while the nodes start: for an own cluster, and for one that is none."""
+    cwd = tmp_path_factory.mktemp("background")
+    with ThreadingHTTPServer((HERE, 0), BaseHTTPRequestHandler) as server, TemporaryDirectory() as folder:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        other = {"RAY_ADDRESS": f"{HERE}:{server.server_port}", "RAY_py_gcs_connect_timeout_s": "1"}
+        alone = {"RAY_ADDRESS": None, "RAY_TMPDIR": folder, LOOPBACK_ONLY: None}  # short: it holds sockets
+        processes = {
+            "alone": started(cwd, "-c", ALONE, **alone),
+            "other": started(cwd, "-m", "roboeval", *EVALUATE, "other", **other),
+        }
+        yield processes
+        for process in processes.values():
+            with process:
+                process.kill()
+        server.shutdown()
+
+
+@pytest.fixture(scope="module")
+def nodes(
+    background: dict[str, subprocess.Popen[str]], tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Nodes]:
     nodes = Nodes()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_ADDRESS", nodes.address)
+        locked = tmp_path_factory.mktemp("locked")
+        background["locked"] = started(locked, "-m", "roboeval", *EVALUATE, "run", RAY_AUTH_MODE="disabled")
         yield nodes
     nodes.end()
 
 
-def environment(nodes: Nodes) -> dict[str, str]:
-    return {**ENVIRONMENT, **os.environ, "RAY_ADDRESS": nodes.address}
+@pytest.fixture(scope="module")
+def cluster(nodes: Nodes) -> Iterator[Cluster]:
+    assert nodes.address
+    with Cluster() as cluster:
+        yield cluster
 
 
-def test_the_command_writes_the_same_bytes(nodes: Nodes, tmp_path: Path) -> None:
-    local = roboeval("evaluate", "recorded:hasty", "--out", "local", cwd=tmp_path)
-    far = roboeval(
-        *("evaluate", "recorded:hasty", "--out", "far", "--engine", "ray"),
-        cwd=tmp_path,
-        environment=environment(nodes),
-    )
-    assert (far.status, far.out.replace("far", "local")) == (0, local.out), far
-    assert re.fullmatch(r"verdicts are in far; .*\n", far.err), far.err
-    for name in ("paper.jsonl", "paper.sha256", "paper.json"):
-        there, here = (tmp_path / run / "evaluations" / name for run in ("far", "local"))
-        assert there.read_bytes() == here.read_bytes()
-
-
-def test_a_cluster_that_wants_its_token_says_so(nodes: Nodes, tmp_path: Path) -> None:
-    for token in ({"RAY_AUTH_TOKEN": "f" * 64}, {"RAY_AUTH_MODE": "disabled"}):
-        ended = roboeval(
-            *("evaluate", "recorded:hasty", "--out", "far", "--engine", "ray"),
-            cwd=tmp_path,
-            environment={**environment(nodes), **token},
-        )
-        assert (ended.status, ended.out) == (2, "")
-        assert re.fullmatch(r"roboeval: RAY_ADDRESS: .* RAY_AUTH_MODE=.*\n", ended.err)
-        assert not list(tmp_path.iterdir())
-
-
-def test_what_is_of_ray_and_no_head_is_not_waited_for(nodes: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RAY_ADDRESS", f"{HERE}:{nodes.port_of_a_node}")
-    with pytest.raises(BadInput, match="does not answer"):
-        Cluster()
-
-
-def test_checks_are_the_same(nodes: Nodes, tmp_path: Path) -> None:
-    few = ("--tasks", "LunchTime,GetDrink")
-    for name in ("local", "far"):
-        assert roboeval("evaluate", "recorded:careful", *few, "--out", name, cwd=tmp_path).status == 0
-    local = roboeval("resample", "local", "--json", cwd=tmp_path)
-    far = roboeval(
-        *("resample", "far", "--json", "--engine", "ray"), cwd=tmp_path, environment=environment(nodes)
-    )
-    assert (far.status, json.loads(far.out)) == (0, json.loads(local.out)), far
-    checks = [(tmp_path / name / "checks" / "paper.jsonl").read_bytes() for name in ("far", "local")]
-    assert checks[0] == checks[1] != b""
+@pytest.fixture(scope="module")
+def local(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run that is judged and checked on this machine."""
+    folder = tmp_path_factory.mktemp("local")
+    assert roboeval("evaluate", "recorded:hasty", "--out", "run", cwd=folder).status == 0
+    assert roboeval("resample", "run", cwd=folder).status == 0
+    return folder / "run"
 
 
 @pytest.mark.usefixtures("nodes")
-def test_keys_are_read_as_they_are_needed_and_equal_ones_are_one_call() -> None:
+def test_commands_write_the_same_bytes(local: Path, tmp_path: Path) -> None:
+    assert roboeval(*EVALUATE, "run", cwd=tmp_path).status == 0
+    assert roboeval("resample", "run", "--engine", "ray", cwd=tmp_path).status == 0
+    for name in ("evaluations/paper.jsonl", "evaluations/paper.sha256", "evaluations/paper.json"):
+        assert (tmp_path / "run" / name).read_bytes() == (local / name).read_bytes()
+    checks = (tmp_path / "run" / "checks" / "paper.jsonl").read_bytes()
+    assert checks == (local / "checks" / "paper.jsonl").read_bytes() != b""
+
+
+def test_control_c_ends_it_and_keeps_what_was_judged(nodes: Nodes, tmp_path: Path) -> None:
+    words = ("-m", "roboeval", *EVALUATE, "run", "--workers", "1")
+    process = started(tmp_path, *words, RAY_ADDRESS=nodes.address)
+    rows = tmp_path / "run" / "evaluations" / "paper.jsonl"
+    while process.poll() is None and not (rows.exists() and rows.stat().st_size):
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert process.returncode == 130
+    assert err.splitlines()[-1].startswith("roboeval: stopped; "), err
+    assert all(json.loads(line) for line in rows.read_text().splitlines())
+
+
+def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluster: Cluster) -> None:
     read: list[int] = []
 
-    def keys() -> Iterator[int]:
+    def works() -> Iterator[Work]:
         for number in range(100_000):
             read.append(number)
-            yield number % 3000
+            yield "", str(number % 3000)
 
-    with Cluster(2) as cluster:
-        results = cluster.map_distinct(
-            lambda _, key: (key, time.time_ns()), keys(), name=lambda key: str(key).encode(), then=tuple
-        )
-        first = [next(results) for _ in range(50)]
-        assert [key for key, _ in first] == list(range(50))
-        assert len(read) <= 50 + MOST_AHEAD
-        more = [next(results) for _ in range(6000)]
-        del results
+    results = cluster.map_distinct(lambda _, work: (int(work[1]), time.time_ns()), works(), tuple)
+    first = [next(results) for _ in range(50)]
+    assert [number for number, _ in first] == list(range(50))
+    assert len(read) <= 50 + MOST_AHEAD
+    more = [next(results) for _ in range(6000)]
+    del results
     assert more[2950:3000] == first  # the very same calls
     assert len(read) <= 6050 + MOST_AHEAD
 
 
+def test_what_a_call_raises_is_raised_here(cluster: Cluster) -> None:
+    results = cluster.map_distinct(lambda _, work: 1 // (int(work[1]) - 1), numbered(range(2)), abs)
+    with pytest.raises(ZeroDivisionError):
+        list(results)
+
+
+def test_results_that_are_not_wanted_do_no_harm(cluster: Cluster) -> None:
+    for number in range(40):  # a shard that was cancelled when just done would abort this process soon
+        results = cluster.map_distinct(lambda _, work: int(work[1]), numbered(range(500)), abs)
+        assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
+        del results
+
+
+@pytest.mark.parametrize("name", ["locked", "other"])
 @pytest.mark.usefixtures("nodes")
-def test_what_a_call_throws_is_thrown_here() -> None:
-    def broken(_lane: Lane, key: int) -> int:
-        return 1 // (key - 1)
-
-    with Cluster() as cluster:
-        results = cluster.map_distinct(broken, [0, 1], name=lambda key: str(key).encode(), then=abs)
-        with pytest.raises(ZeroDivisionError):
-            list(results)
-
-
-@pytest.mark.usefixtures("nodes")
-def test_who_wants_no_more_results_harms_nothing() -> None:
-    with Cluster() as cluster:
-        for number in range(40):  # a shard that was cancelled when just done would abort this process soon
-            results = cluster.map_distinct(
-                lambda _, key: key, range(500), name=lambda key: b"%d" % key, then=abs
-            )
-            assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
-            del results
+def test_a_cluster_that_refuses_or_is_none_ends_the_command(
+    name: str, background: dict[str, subprocess.Popen[str]]
+) -> None:
+    out, err = background[name].communicate()
+    assert (background[name].returncode, out) == (2, "")
+    last = err.splitlines()[-1]
+    assert last.startswith("roboeval: RAY_ADDRESS: ")
+    assert ("RAY_AUTH_MODE" in last) == (name == "locked")
 
 
-def test_a_node_that_is_killed_in_the_middle_loses_nothing(nodes: Nodes, paper: Suite) -> None:
-    completions = list(recorded_completions("recorded:hasty", paper))
-    here = list(evaluate(completions, paper, engine=Local(2)))
-    with Cluster() as cluster:
-        assert cluster._cores() == 2
-        there: list[Row] = []
-        for row in evaluate(completions, paper, engine=Same(cluster)):
-            there.append(row)
-            if len(there) == 20:
-                nodes.kill()
-        assert there == here
-        end = time.monotonic() + 60
-        while cluster._cores() > 1:  # until the head has noticed that it is gone
-            assert time.monotonic() < end
-            time.sleep(0.5)
+def test_a_cluster_is_started_where_there_is_none_and_only_this_machine_reaches_it(
+    background: dict[str, subprocess.Popen[str]],
+) -> None:
+    out, err = background["alone"].communicate()
+    assert out.splitlines() == ["[1, 2, 1]", "['127.0.0.1']", "{'127.0.0.1'}", "False"], err
 
 
 class Same:
@@ -309,12 +272,18 @@ class Same:
         pass
 
 
-def test_a_cluster_without_a_core_ends_with_a_sentence(nodes: Nodes, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rayengine, "PATIENCE", 1)
+def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
+    nodes: Nodes, cluster: Cluster, paper: Suite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    completions = list(recorded_completions("recorded:hasty", paper))
+    here = list(evaluate(completions, paper, engine=Local(2)))
+    there: list[Row] = []
+    for row in evaluate(completions, paper, engine=Same(cluster)):
+        there.append(row)
+        if len(there) == 20:
+            nodes.kill()
+    assert there == here
     nodes.kill()
-    with Cluster() as cluster:
-        results = cluster.map_distinct(
-            lambda _, key: key, [1, 2], name=lambda key: str(key).encode(), then=abs
-        )
-        with pytest.raises(EngineError, match="no core"):
-            list(results)
+    monkeypatch.setattr(rayengine, "PATIENCE_S", 1)
+    with pytest.raises(EngineError, match="no core"):
+        list(cluster.map_distinct(lambda _, work: work[1], numbered(range(2)), int))

@@ -9,8 +9,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from itertools import groupby
 from typing import Any
@@ -19,13 +19,13 @@ import pytest
 
 from codebotler.badinput import BadInput
 from codebotler.simulator.isolated import ONE_AT_A_TIME
-from codebotler.simulator.lane import EVENTS
+from codebotler.simulator.lane import EVENTS, Lane
 from codebotler.simulator.warm import warm
 from codebotler.trace import Event, Outcome, RunError, Status
 from processes import are_gone, children_of
 from roboeval.evaluation.completions import recorded_completions
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.rewards import REWARDS, Share, reward, total
+from roboeval.evaluation.rewards import Share, reward, total
 from roboeval.suites.load import Suite, load_suite
 
 RIGHT = """
@@ -74,7 +74,6 @@ def test_who_errs_gets_half_of_who_returns() -> None:
 
 def test_what_was_let_be_only_scales_what_was_gained(paper: Suite) -> None:
     scenario = paper.tasks["SayGoodDay"].scenarios[3]  # nobody is in a lab
-    free = [False, True, False, True, True]
     assert [requirement.text for requirement in scenario.require] == [
         "visits_every_lab",
         "visits_nothing_else",
@@ -83,11 +82,11 @@ def test_what_was_let_be_only_scales_what_was_gained(paper: Suite) -> None:
         'says_nothing_like_it("amy")',
     ]
     trace = (Event("goto", "sam's lab"), Event("say", "good day"), Event("goto", "amy's lab"))
-    share = Share.of(Outcome(Status.FINISHED, trace), scenario, free)
+    share = Share.of(Outcome(Status.FINISHED, trace), scenario)
     assert share == Share(gained=1 / 2, kept=2 / 3)
     stopped = Outcome(Status.TIMEOUT, trace, RunError("TimeoutError", "an hour"))
-    assert Share.of(stopped, scenario, free) == Share(gained=1 / 2, kept=1 / 3)
-    assert Share.of(Outcome(Status.FINISHED, ()), scenario, free) == Share(gained=0.0, kept=1.0)
+    assert Share.of(stopped, scenario) == Share(gained=1 / 2, kept=1 / 3)
+    assert Share.of(Outcome(Status.FINISHED, ()), scenario) == Share(gained=0.0, kept=1.0)
 
 
 def test_a_world_that_only_asks_to_let_something_be_counts_as_the_others_do() -> None:
@@ -127,40 +126,37 @@ def uncollected() -> Iterator[None]:
     gc.enable()
 
 
-def interrupt(asked: int) -> None:
-    """Interrupt this process once it waits for so many programs."""
-    while len(REWARDS._running) < asked:
-        time.sleep(0.01)
-    time.sleep(0.1)
-    os.kill(os.getpid(), signal.SIGINT)
-
-
 @pytest.mark.usefixtures("uncollected")
 def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # in the place of polars' own
-    lanes = warm()
-    gate, patience = threading.Event(), 60
-    here, plain_submit = lanes.here, lanes.submit
+    lanes, gate, patience = warm(), threading.Event(), 60
+    here, submit = lanes.here, lanes.submit
     monkeypatch.setattr(lanes, "here", lambda: gate.wait(patience) and here())
-    waited_for = distinct(8, "interrupted")
-    asked = threading.Event()
+    futures: list[Future[object]] = []
 
-    def submit(function: Callable[..., object], *args: object) -> object:
-        asked.set()
-        return plain_submit(function, *args)
+    def noted(*call: Any) -> Future[object]:  # noqa: ANN401 - passed on
+        futures.append(submit(*call))
+        return futures[-1]
 
-    monkeypatch.setattr(lanes, "submit", submit)
-    with ThreadPoolExecutor(1) as beside:
+    monkeypatch.setattr(lanes, "submit", noted)
+    waited_for, given_up = distinct(8, "interrupted"), distinct(1_000, "given up")
+
+    def interrupt() -> None:
+        while len(futures) < len(waited_for) + len(given_up):
+            time.sleep(0.01)
+        time.sleep(0.1)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    with ThreadPoolExecutor(2) as beside:
         other = beside.submit(reward, "SayGoodDay", 0, waited_for)
-        assert asked.wait(patience)
-        beside_it = threading.Thread(target=interrupt, args=(len(waited_for) + 1_000,))
-        beside_it.start()
+        while len(futures) < len(waited_for):
+            time.sleep(0.01)
+        beside.submit(interrupt)
         with pytest.raises(KeyboardInterrupt):
-            reward("SayGoodDay", 0, [*waited_for, *distinct(1_000, "given up")])
-        beside_it.join()
+            reward("SayGoodDay", 0, given_up)
+        assert sum(future.cancelled() for future in futures) == len(given_up)
         gate.set()
-        assert other.result() == [1.0] * 8  # the other thread asks again for what was taken from it
-    assert not REWARDS._running
+        assert other.result() == [1.0] * len(waited_for)
 
 
 def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
@@ -286,13 +282,18 @@ def test_a_forked_process_does_not_wait_for_threads_of_the_one_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     lanes, gate, patience = warm(), threading.Event(), 60
-    here = lanes.here
-    monkeypatch.setattr(lanes, "here", lambda: gate.wait(patience) and here())
+    here, began = lanes.here, threading.Event()
+
+    def held() -> Lane:
+        began.set()
+        gate.wait(patience)
+        return here()
+
+    monkeypatch.setattr(lanes, "here", held)
     (program,) = distinct(1, "under way")
     with ThreadPoolExecutor(1) as beside:
         other = beside.submit(reward, "SayGoodDay", 0, [program])
-        while not REWARDS._running:
-            time.sleep(0.01)
+        assert began.wait(patience)
         child = os.fork()
         if child == 0:
             signal.alarm(patience // 2)
