@@ -164,7 +164,7 @@ def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEn
         engine: where programs are checked.
     """
     from roboeval.evaluation.checks import check_programs
-    from roboeval.evaluation.results import with_answers
+    from roboeval.evaluation.table import with_answers
 
     assert results.suite is not None, "it judged them"
     judged = [results.completions[key] for key in results.places]

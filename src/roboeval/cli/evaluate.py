@@ -58,9 +58,10 @@ def evaluate(
     from roboeval.evaluation.completions import how_many
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import evaluate as judge_all
-    from roboeval.evaluation.results import Scope, TableBuilder
+    from roboeval.evaluation.results import Scope
     from roboeval.evaluation.rows import judged_row
     from roboeval.evaluation.run import Run, open_source, tasks_to_judge
+    from roboeval.evaluation.table import TableBuilder
 
     opened_engine = engine_named(engine, workers, require_isolation=require_isolation)
     judged_by = load(suite)

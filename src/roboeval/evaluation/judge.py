@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import platform
+import signal
+import threading
+import time
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
+from types import FrameType
 from typing import Any
 
 from msgspec import to_builtins
@@ -23,7 +28,6 @@ from roboeval.evaluation.completions import Completion, name_of, unknown
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.rows import Judgement, Row, bounded
-from roboeval.evaluation.timelimit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Requirement, Scenario, Suite, expect_suite
 
 LOG = logging.getLogger("roboeval.evaluation.judge")
@@ -227,3 +231,49 @@ def head(suite: Suite) -> dict[str, Any]:
         "codebotler": __version__,
         "python": ".".join(platform.python_version_tuple()[:2]),
     }
+
+
+# --- how long judging may take
+
+
+LOOKS = 100
+"""How often the clock is looked at within a limit; then other threads have their turn, too."""
+
+
+class TimeLimitExceeded(Exception):  # noqa: N818 - no mistake of the caller
+    """The limit was reached."""
+
+
+@contextlib.contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Let what is inside use no more than so much processor time of this thread, if it is the main one.
+
+    Only the main thread can be interrupted in the search for a regex: elsewhere there is no limit.
+
+    Args:
+        seconds: how much, more than 0.
+
+    Raises:
+        TimeLimitExceeded: it used more.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    end = time.thread_time() + seconds
+
+    def look(_signal: int, _frame: FrameType | None) -> None:
+        if time.thread_time() > end:
+            raise TimeLimitExceeded
+        time.sleep(0)  # a search lets no other thread run
+
+    before = signal.signal(signal.SIGVTALRM, look)
+    try:
+        try:
+            signal.setitimer(signal.ITIMER_VIRTUAL, seconds / LOOKS, seconds / LOOKS)
+            yield
+        finally:
+            signal.signal(signal.SIGVTALRM, signal.SIG_IGN)
+    finally:  # also where the limit is reached just when the work is done
+        signal.signal(signal.SIGVTALRM, signal.SIG_IGN)
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.signal(signal.SIGVTALRM, before)

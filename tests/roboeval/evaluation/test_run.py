@@ -20,9 +20,9 @@ from codebotler.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.completions import Completion, read_completions, recorded_completions
 from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.judge import TimeLimitExceeded, time_limit
 from roboeval.evaluation.rows import JudgedRow
 from roboeval.evaluation.run import Run, open_source, tasks_to_judge
-from roboeval.evaluation.timelimit import TimeLimitExceeded, time_limit
 from roboeval.suites.load import Suite, load_suite
 from seals import unseal
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from roboeval.evaluation.evaluation import Evaluation
 
 from codebotler.files import to_line
 from made_up_runs import HOSTILE, SUITE, made_up, usual
 from roboeval.evaluation.evaluate import evaluate_run
-from roboeval.evaluation.evaluation import Evaluation
 from roboeval.evaluation.failures import PYTHON
 from roboeval.evaluation.run import Run, open_source
 from roboeval.report import paper

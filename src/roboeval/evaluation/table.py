@@ -1,0 +1,164 @@
+"""The one table of a judged run: its columns, and how rows of an evaluation become rows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import UnionType
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from roboeval.evaluation.completions import Completion, Key
+from roboeval.evaluation.rows import JudgedRow
+
+CHUNK = 10_000  # rows of the table that are held as Python objects at one time
+MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
+
+COMPLETION_COLUMNS: Mapping[str, type[pl.DataType]] = {
+    "task": pl.String,
+    "prompt": pl.Int64,
+    "index": pl.Int64,
+    "model": pl.String,
+    "program_sha256": pl.String,
+    "passed": pl.Boolean,
+    "failure_class": pl.String,
+    "failure_kind": pl.String,
+    "failure_world": pl.Int64,
+    "failure_check": pl.String,
+    "stale": pl.Boolean,
+    "input_tokens": pl.Int64,
+    "output_tokens": pl.Int64,
+    "latency_s": pl.Float64,
+    "cost": pl.Float64,
+    "accepted": pl.Boolean,
+}
+"""What a row says of its completion; see docs/results.md."""
+
+WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
+    "world_number": pl.Int64,
+    "world": pl.String,
+    "satisfied": pl.Boolean,
+    "status": pl.String,
+    "error_kind": pl.String,
+    "error_message": pl.String,
+    "line": pl.Int64,
+    "failed_checks": pl.String,
+    "category": pl.String,
+    "events": pl.Int64,
+}
+"""What a row says of one world."""
+
+
+def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
+    """A table whose `accepted` says what a check says.
+
+    Args:
+        table: as `load_results` gives it.
+        problems: what the check found, by task and hash of the program.
+    """
+    names = ["task", "program_sha256"]
+    answers = [(*key, not found) for key, found in problems.items()]
+    accepted = pl.DataFrame(
+        answers, schema={**dict.fromkeys(names, pl.String), "accepted": pl.Boolean}, orient="row"
+    )
+    joined = table.drop("accepted").join(accepted, on=names, how="left", maintain_order="left")
+    return joined.select(table.columns)
+
+
+class TableBuilder:
+    """Collects rows of an evaluation, column by column.
+
+    Args:
+        completions: those that stand in the run now.
+        categories: of requirements, by task and text.
+        accepted: whether the check found no problem, by task and hash of the program.
+    """
+
+    def __init__(
+        self,
+        completions: Mapping[Key, Completion] = {},
+        categories: Mapping[tuple[str, str], str] = {},
+        accepted: Mapping[tuple[str, str], bool] = {},
+    ) -> None:
+        self._completions, self._categories, self._accepted = completions, categories, accepted
+        self._frame = pl.DataFrame(schema={**COMPLETION_COLUMNS, **WORLD_COLUMNS})
+        self._start()
+
+    def _start(self) -> None:
+        self._rows: list[tuple[Any, ...]] = []
+        self._worlds: list[tuple[Any, ...]] = []
+        self._counts: list[int] = []
+
+    def add(self, row: JudgedRow) -> None:
+        """Add a completion with its verdicts."""
+        if len(self._worlds) >= CHUNK:
+            self._store()
+        written = self._completions.get(row.key)
+        failure = row.failure
+        why: tuple[str | int | None, ...] = (None,) * 4
+        if failure is not None:
+            why = failure.failure_class, failure.kind, failure.world, failure.check
+        self._rows.append(
+            (
+                row.task,
+                row.prompt,
+                row.index,
+                None if written is None else _storable(written.model),
+                row.program_sha256,
+                row.passed,
+                *why,
+                written is None or written.program_sha256 != row.program_sha256,
+                *_usage(written),
+                None,
+                self._accepted.get((row.task, row.program_sha256)),
+            )
+        )
+        self._counts.append(len(row.verdicts))
+        for number, verdict in enumerate(row.verdicts):
+            checks, error = verdict.failed_checks, verdict.error
+            self._worlds.append(
+                (
+                    number,
+                    verdict.world,
+                    verdict.satisfied,
+                    verdict.status.value,
+                    None if error is None else error.kind,
+                    None if error is None else error.message,
+                    verdict.line,
+                    "; ".join(checks) or None,
+                    self._categories.get((row.task, checks[0])) if checks else None,
+                    verdict.events,
+                )
+            )
+
+    def table(self) -> pl.DataFrame:
+        """All that was added, as `load_results` describes it."""
+        self._store()
+        return self._frame.rechunk()
+
+    def _store(self) -> None:
+        completions = pl.DataFrame(self._rows, schema=dict(COMPLETION_COLUMNS), orient="row")
+        worlds = pl.DataFrame(self._worlds, schema=dict(WORLD_COLUMNS), orient="row")
+        each = np.repeat(np.arange(len(self._counts)), self._counts)
+        self._frame.vstack(completions[each].hstack(worlds), in_place=True)
+        self._start()
+
+
+def _usage(written: Completion | None) -> tuple[float | None, ...]:
+    """The tokens of input and of output, and the seconds, of a completion, where they were recorded."""
+    more = {} if written is None else written.more
+    usage = more.get("usage")
+    usage = usage if isinstance(usage, dict) else {}
+    tokens = [_number(usage.get(name), int) for name in ("input_tokens", "output_tokens")]
+    return *tokens, _number(more.get("latency_s"), int | float)
+
+
+def _number(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401 - JSON has no types
+    is_number = isinstance(value, kind) and not isinstance(value, bool)
+    return value if is_number and 0 <= value <= MOST else None
+
+
+def _storable(text: str | None) -> str | None:
+    """A text that UTF-8 can hold; half of a surrogate pair is written out as an escape."""
+    return None if text is None else text.encode(errors="backslashreplace").decode()
