@@ -153,8 +153,8 @@ class Exists:
 
 
 @dataclass(frozen=True)
-class ActAtFirst:
-    """An event matches during the first stay at a place.
+class _ActAtPlace:
+    """An event matches during a stay at a place.
 
     Args:
         place: a regex for the room.
@@ -172,30 +172,15 @@ class ActAtFirst:
         return Stay.at(self.place)
 
     def __str__(self) -> str:
-        return f"{_cut_trace(self.cuts)}.ActAtFirst({quote(self.place)}, {self.element})"
+        return f"{_cut_trace(self.cuts)}.{type(self).__name__}({quote(self.place)}, {self.element})"
 
 
-@dataclass(frozen=True)
-class ActAtSome:
-    """An event matches during some stay at a place.
+class ActAtFirst(_ActAtPlace):
+    """An event matches during the first stay at a place."""
 
-    Args:
-        place: a regex for the room.
-        element: what the event must match.
-        cuts: how the trace is cut before, in order.
-    """
 
-    place: str
-    element: Element
-    cuts: Cuts = ()
-
-    @cached_property
-    def stay(self) -> Stay:
-        """The moves that begin and end a stay at the place."""
-        return Stay.at(self.place)
-
-    def __str__(self) -> str:
-        return f"{_cut_trace(self.cuts)}.ActAtSome({quote(self.place)}, {self.element})"
+class ActAtSome(_ActAtPlace):
+    """An event matches during some stay at a place."""
 
 
 @dataclass(frozen=True)
