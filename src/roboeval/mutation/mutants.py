@@ -5,16 +5,20 @@ from __future__ import annotations
 import difflib
 import hashlib
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, zip_longest
 
 from codebotler.cachedproperty import cached_property
-from roboeval.mutation.operator import Operator, Setting
-from roboeval.mutation.operators import OPERATORS
-from roboeval.mutation.rewriting import Source, changed, read
+from roboeval.mutation import control_flow, counting, manipulation, navigation, speech
+from roboeval.mutation.operator import Context, Operator, operators_in
+from roboeval.mutation.program_tree import ProgramTree, changed, read
 from roboeval.suites.load import Task
-from roboeval.suites.solutions import solutions
+from roboeval.suites.solutions import bare_diff, solutions
+
+MODULES = navigation, speech, manipulation, counting, control_flow
+OPERATORS = tuple(chain.from_iterable(map(operators_in, MODULES)))
+"""All mutation operators, by what they are about; the names are unique."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Original:
     Args:
         name: what is special about it, or where it comes from.
         program: its source.
-        claimed: whether whoever wrote it says that it is right.
+        claimed: whether its author says that it is right.
     """
 
     name: str
@@ -32,14 +36,14 @@ class Original:
     claimed: bool = True
 
     @cached_property
-    def source(self) -> Source | None:
-        """It as operators read it; None where they cannot."""
+    def tree(self) -> ProgramTree | None:
+        """What operators read; None where they cannot."""
         return read(self.program)
 
     @property
     def text(self) -> str:
-        """What all programs with the same tree share; as it stands where there is none."""
-        return self.program if self.source is None else self.source.text
+        """What all programs with the same tree share; the source where there is none."""
+        return self.program if self.tree is None else self.tree.text
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Mutant:
     Args:
         operator: its name.
         original: of which it was made.
-        program: its source, in the one way in which trees are written.
+        program: its source, as trees are written.
     """
 
     operator: str
@@ -62,11 +66,14 @@ class Mutant:
         before, after = self.original.text.splitlines(), self.program.splitlines()
         return "\n".join([*difflib.unified_diff(before, after, lineterm="")][2:]) + "\n"
 
+    @property
+    def key(self) -> tuple[str, str]:
+        """By what a list of equivalent mutants knows it."""
+        return self.operator, bare_diff(self.diff)
+
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """The programs for a task that may be right: its right solutions, and further ones.
-
-    Of programs with the same tree only the first is among them.
+    """The right solutions of a task, and further programs; of those with the same tree the first.
 
     Args:
         task: the task.
@@ -75,31 +82,24 @@ def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, .
     Raises:
         BadInput: a file of solutions is wrong.
     """
-    right = (one for one in solutions(task) if one.fails is None or one.right)
-    written = (Original(one.about, one.program) for one in right)
+    right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
-    for original in chain(written, further):
+    for original in chain(right, further):
         distinct.setdefault(original.text, original)
     return tuple(distinct.values())
 
 
 def mutants(
-    right: Sequence[Original], setting: Setting, operators: Iterable[Operator] = OPERATORS
+    right: Sequence[Original], context: Context, operators: Iterable[Operator] = OPERATORS
 ) -> Iterator[Mutant]:
-    """All mutants of right programs, those with the same tree once, and none that is a right program again.
-
-    Args:
-        right: programs.
-        setting: the names that operators put in place of others.
-        operators: what makes mutants.
-    """
+    """All mutants of right programs: of those with the same tree the first, and no right program again."""
     seen = {original.text for original in right}
     for original in right:
-        if original.source is None:
+        if (tree := original.tree) is None:
             continue
         for operator in operators:
-            for edit in operator(original.source, setting):
-                program = changed(original.source, edit)
+            for edit in operator.edits(tree, context):
+                program = changed(tree, edit)
                 if program is not None and program not in seen:
                     seen.add(program)
                     yield Mutant(operator.name, original, program)
@@ -113,13 +113,13 @@ def drawn(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
         most: how many at most.
         seed: from which they are drawn; the same seed draws the same ones.
     """
+
+    def lot(mutant: Mutant) -> bytes:
+        return hashlib.sha256(f"{seed}\n{mutant.program}".encode(errors="surrogatepass")).digest()
+
     by_operator: dict[str, list[Mutant]] = defaultdict(list)
     for mutant in every:
         by_operator[mutant.operator].append(mutant)
-    shuffled = [sorted(by_operator[name], key=_lot(seed)) for name in sorted(by_operator)]
+    shuffled = [sorted(by_operator[name], key=lot) for name in sorted(by_operator)]
     turns = zip_longest(*shuffled)
     return tuple([one for turn in turns for one in turn if one is not None][:most])
-
-
-def _lot(seed: int) -> Callable[[Mutant], bytes]:
-    return lambda mutant: hashlib.sha256(f"{seed}\n{mutant.program}".encode(errors="surrogatepass")).digest()

@@ -43,12 +43,12 @@ def test_two_tasks_from_end_to_end(tmp_path: Path) -> None:
     for score, (task, worlds, originals, mutants, killed, survived, rate) in zip(scores, lines, strict=True):
         rows = rows_of(found, task)
         assert len({row["program"] for row in rows}) == len(rows) == 60
-        fates = [row["fate"] for row in rows]
-        assert (fates.count("killed"), fates.count("survived")) == (int(killed), int(survived))
+        statuses = [row["status"] for row in rows]
+        assert (statuses.count("killed"), statuses.count("survived")) == (int(killed), int(survived))
         assert int(mutants) == int(killed) + int(survived)
         assert (score["worlds"], score["originals"]) == (int(worlds), int(originals))
         assert float(rate) == round(int(killed) / int(mutants), 3)
-        survivors = [(row["operator"], row["diff"]) for row in rows if row["fate"] == "survived"]
+        survivors = [(row["operator"], row["diff"]) for row in rows if row["status"] == "survived"]
         listed = yaml.safe_load((found / "survivors" / f"{task}.yaml").read_text())["equivalent_mutants"]
         assert [(entry["operator"], entry["diff"]) for entry in listed] == survivors
         assert len(re.findall(rf"^{task} \d+  ", ended.out, re.MULTILINE)) == int(survived)
@@ -141,7 +141,7 @@ def test_a_score_that_is_too_low(small: Path) -> None:
     assert mutate("--suite", small, "--brief", "--at-least", "0.999", cwd=small).status == 1
 
 
-def test_a_mutant_on_the_list_is_not_shown_again(small: Path) -> None:
+def test_an_equivalent_mutant_is_not_shown_again(small: Path) -> None:
     words = ("--suite", small, "--out", small / "found")
     assert mutate(*words, cwd=small).status == 0
     survivors = (small / "found" / "survivors" / "T.yaml").read_text()
@@ -150,7 +150,7 @@ def test_a_mutant_on_the_list_is_not_shown_again(small: Path) -> None:
     ended = mutate(*words, cwd=small)
     (score,) = json.loads((small / "found" / "scores.json").read_text())["tasks"]
     assert (score["survived"], score["score"]) == (0, 1.0)
-    assert score["score_of_all"] == score["killed"] / (score["killed"] + score["still_right"]) < 1
+    assert score["score_of_all"] == score["killed"] / (score["killed"] + score["equivalent"]) < 1
     assert not (small / "found" / "survivors" / "T.yaml").exists()
     assert re.search(r"\bmutants\b.*\b15%", ended.err)
     assert "@@" not in ended.out

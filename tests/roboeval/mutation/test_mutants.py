@@ -7,17 +7,16 @@ from collections import Counter
 import pytest
 
 from codebotler.world import Room, World
-from roboeval.mutation.mutants import Mutant, Original, drawn, mutants, originals
-from roboeval.mutation.operator import Setting
-from roboeval.mutation.operators import OPERATORS
+from roboeval.mutation.mutants import OPERATORS, Mutant, Original, drawn, mutants, originals
+from roboeval.mutation.operator import Context
 from roboeval.suites.load import Suite
 
-SETTING = Setting.of([World((Room("hall"), Room("lobby"), Room("kitchen")), "hall")])
+CONTEXT = Context.of([World((Room("hall"), Room("lobby"), Room("kitchen")), "hall")])
 GOES = 'def task_program():\n    go_to("lobby")\n    say("hello")\n'
 
 
 def made(*programs: str) -> list[Mutant]:
-    return list(mutants([Original(f"p{n}", program) for n, program in enumerate(programs)], SETTING))
+    return list(mutants([Original(f"p{n}", program) for n, program in enumerate(programs)], CONTEXT))
 
 
 def test_equal_mutants_are_one() -> None:
@@ -83,7 +82,7 @@ def test_originals_are_right_solutions_and_what_a_user_names(paper: Suite) -> No
 def test_every_operator_finds_something_to_do_in_the_right_programs(paper: Suite) -> None:
     idle = {operator.name: operator for operator in OPERATORS}
     for task in paper.tasks.values():
-        setting = Setting.of([scenario.world for scenario in task.scenarios])
-        for made in mutants(originals(task), setting, idle.copy().values()):
+        context = Context.of([scenario.world for scenario in task.scenarios])
+        for made in mutants(originals(task), context, idle.copy().values()):
             idle.pop(made.operator, None)
     assert not idle

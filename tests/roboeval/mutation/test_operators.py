@@ -17,9 +17,9 @@ from codebotler.simulator.engine import run
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.trace import Event, Outcome, Status
 from codebotler.world import Person, Room, World
-from roboeval.mutation.operator import Operator, Setting
-from roboeval.mutation.operators import OPERATORS
-from roboeval.mutation.rewriting import changed, read
+from roboeval.mutation.mutants import OPERATORS
+from roboeval.mutation.operator import Context, Operator
+from roboeval.mutation.program_tree import changed, read
 
 WORLD = World(
     rooms=(
@@ -31,7 +31,7 @@ WORLD = World(
     ),
     robot="hall",
 )
-SETTING = Setting.of([WORLD])
+CONTEXT = Context.of([WORLD])
 RULES = Rules(literals="as-written", limits=Limits(calls=20))
 BY_NAME = {operator.name: operator for operator in OPERATORS}
 
@@ -59,7 +59,7 @@ def mutants(operator: Operator, body: str) -> Iterator[str]:
     """What an operator makes of a body."""
     source = read(program(body))
     assert source is not None
-    found = (changed(source, edit) for edit in operator(source, SETTING))
+    found = (changed(source, edit) for edit in operator.edits(source, CONTEXT))
     yield from (one for one in found if one is not None)
 
 
@@ -153,7 +153,7 @@ def test_what_no_phrasing_asks_for_may_be_left_out(name: str, body: str, asking:
     source = read(program(body))
     assert source is not None
     made = {
-        phrasings: len([*BY_NAME[name](source, Setting.of([WORLD], phrasings))])
+        phrasings: len([*BY_NAME[name].edits(source, Context.of([WORLD], phrasings))])
         for phrasings in ((), ("Go to the lobby.",), ("Go to the lobby.", asking))
     }
     assert [*made.values()] == [1, 0, 1]
@@ -174,4 +174,4 @@ def test_what_is_only_to_be_brought_here_may_be_held(
 ) -> None:
     source = read(program("pick('mug')\nplace('mug')"))
     assert source is not None
-    assert len([*BY_NAME[name](source, Setting.of([WORLD], phrasings))]) == made
+    assert len([*BY_NAME[name].edits(source, Context.of([WORLD], phrasings))]) == made

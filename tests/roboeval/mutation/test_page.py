@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 
 from command_line import ENVIRONMENT, roboeval
-from roboeval.mutation.operators import OPERATORS
+from roboeval.mutation.mutants import OPERATORS
 
 PAGE = (Path(__file__).parents[3] / "docs" / "roboeval-plus.md").read_text()
 WIDE = {**ENVIRONMENT, "COLUMNS": "160"}

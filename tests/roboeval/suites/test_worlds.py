@@ -8,7 +8,6 @@ from random import Random
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.mutation.worlds import worlds_of
 from roboeval.suites.expression import ExpressionError, PersonFact, each_of, parsed, value
 from roboeval.suites.load import _suite_of, load_suite
 from roboeval.suites.pairwise import covering, met, pairs, spread
@@ -111,8 +110,6 @@ def test_more_worlds_than_fit_into_memory_are_not_drawn(tmp_path: Path) -> None:
     mine, most = load_suite(suite(tmp_path)), MOST_WORLDS
     with pytest.raises(BadInput, match=f"{most + 1}.* {most:,}"):
         mine.with_worlds(most + 1)
-    with pytest.raises(BadInput, match=f"{most + 1}.* {most:,}"):
-        worlds_of(mine, mine.tasks["Tea"], most + 1, 1)
 
 
 def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:

@@ -1,0 +1,64 @@
+"""Operators about what the robot picks up and puts down."""
+
+from __future__ import annotations
+
+import ast
+import re
+
+from roboeval.mutation.operator import Context, Edits, others, where
+from roboeval.mutation.program_tree import ProgramTree, argument, statement, text_of
+
+BRINGING_HERE = re.compile(
+    r"\b(bring|fetch|carry|take|have|come back)\b[^.:;]*\b(here|to me|with me|with it)\b", re.IGNORECASE
+)
+PUTTING_DOWN = re.compile(
+    r"\b((put|set|lay|leav)(e|ting|ing)? (it|them|that) (down|here|there)|put down)\b", re.IGNORECASE
+)
+
+
+def _is_put_down(context: Context) -> bool:
+    """Whether no phrasing is content with what is brought back and still held."""
+    return not any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in context.prompts)
+
+
+@where(_is_put_down)
+def forget_to_place(program: ProgramTree, _: Context) -> Edits:
+    """Does not put down what it brings."""
+    return ({step: []} for step, _call in program.steps("place"))
+
+
+def forget_to_pick(program: ProgramTree, _: Context) -> Edits:
+    """Does not pick up what it should bring."""
+    return ({step: []} for step, _call in program.steps("pick"))
+
+
+def bring_nothing(program: ProgramTree, _: Context) -> Edits:
+    """Drives about without picking up or putting down anything."""
+    steps = [step for step, _ in program.steps("pick", "place")]
+    if len(steps) > 1:
+        yield {step: [] for step in steps}
+
+
+@where(_is_put_down)
+def place_by_words(program: ProgramTree, _: Context) -> Edits:
+    """Says that it brings something, and keeps it."""
+    return ({step: statement('say("Here it is.")')} for step, _call in program.steps("place"))
+
+
+def wrong_thing(program: ProgramTree, context: Context) -> Edits:
+    """Brings another thing."""
+    things = [argument(call, 0) for _, call in program.steps("pick", "place")]
+    named = next((name for thing in things if (name := text_of(thing))), "")
+    if len(context.things) > 1 and things:
+        for other in others(context.things, named):
+            if other.lower() not in named.lower():
+                yield {thing: ast.Constant(other) for thing in things if thing is not None}
+
+
+def place_where_found(program: ProgramTree, _: Context) -> Edits:
+    """Puts a thing down where it found it."""
+    places = [step for step, _ in program.steps("place")]
+    for step, call in program.steps("pick"):
+        thing = argument(call, 0)
+        if thing is not None and places:
+            yield {step: [step, statement("place(thing)", thing=thing)], **{place: [] for place in places}}

@@ -1,0 +1,115 @@
+"""Mutation scores as tables and diffs for people, and as files."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import yaml
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.files import to_line, to_text, write_whole
+from codebotler.terminal import visible
+from roboeval.mutation.mutants import OPERATORS, Mutant
+from roboeval.mutation.score import CHANGED, MutantStatus, MutationScore
+
+STYLES = {"+": "green", "-": "red"}
+ABOUT = {operator.name: operator.about for operator in OPERATORS}
+
+
+def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
+    """The score of each task.
+
+    Args:
+        scores: of tasks.
+        suite: the name of the suite whose checks were tried.
+    """
+    heads = "task", "worlds", "originals", "mutants", "killed", "equivalent", "survived", "score", "of all"
+    table = _table(*heads, "same traces", "crashes")
+    for score in scores:
+        outcomes = MutantStatus.KILLED, MutantStatus.EQUIVALENT, MutantStatus.SURVIVED
+        table.add_row(
+            score.task,
+            *(f"{n:,}" for n in (score.worlds, len(score.right), score.count(*CHANGED))),
+            *(f"{score.count(status):,}" for status in outcomes),
+            *("-" if share is None else f"{share:.3f}" for share in (score.score, score.score_of_all)),
+            *(f"{score.count(status):,}" for status in (MutantStatus.SAME, MutantStatus.CRASHES)),
+        )
+    title = Text.assemble(("Mutation scores", "bold"), f" under the suite {suite}")
+    return Group(title, Text(), table)
+
+
+def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
+    """What became of the mutants of each operator that change behaviour."""
+    table = _table("operator", "mutants", "killed", "survived")
+    tried = (one for score in scores for one in score.mutants)
+    counts = Counter((one.mutant.operator, one.result.status) for one in tried)
+    for name in ABOUT:
+        if changing := sum(counts[name, status] for status in CHANGED):
+            killed, survived = counts[name, MutantStatus.KILLED], counts[name, MutantStatus.SURVIVED]
+            table.add_row(name, *map(str, (changing, killed, survived)))
+    return Group(Text("By operator", "bold"), Text(), table)
+
+
+def survivors_view(score: MutationScore) -> RenderableType:
+    """The survivors of a task, each with what its operator does and its diff."""
+    parts = (_survivor(score.task, number, mutant) for number, mutant in enumerate(score.survivors, 1))
+    return Group(*(line for part in parts for line in (Text(), part)))
+
+
+def _survivor(task: str, number: int, mutant: Mutant) -> RenderableType:
+    of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
+    diff = Text("\n").join(Text(visible(line), STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
+    diff.rstrip()
+    head = Text.assemble((f"{task} {number}", "bold"), of)
+    return Group(head, Text(ABOUT[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2)))
+
+
+def _table(*heads: str) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
+    for number, head in enumerate(heads):
+        table.add_column(head, justify="right" if number else "left", no_wrap=True)
+    return table
+
+
+def keep(scores: Sequence[MutationScore], folder: Path) -> None:
+    """Write scores.json, mutants/TASK.jsonl and survivors/TASK.yaml; what stood there before is replaced.
+
+    Args:
+        scores: of tasks.
+        folder: made if it is not there.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    for score in scores:
+        rows = b"".join(to_line(one.row()) for one in score.mutants)
+        write_whole(folder / "mutants" / f"{score.task}.jsonl", rows)
+        survivors = folder / "survivors" / f"{score.task}.yaml"
+        if score.survivors:
+            write_whole(survivors, to_yaml(score.survivors).encode(errors="backslashreplace"))
+        else:
+            survivors.unlink(missing_ok=True)
+    write_whole(folder / "scores.json", to_text({"tasks": [score.data() for score in scores]}))
+
+
+def to_yaml(mutants: Iterable[Mutant]) -> str:
+    """A list of equivalent mutants to fill in: each `because` waits for its reason."""
+    entries = [{"operator": one.operator, "diff": one.diff, "because": ""} for one in mutants]
+    listed = {"equivalent_mutants": entries}
+    return yaml.dump(listed, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes texts of several lines line by line."""
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="|" if "\n" in text else None)
+
+
+_Dumper.add_representer(str, _text)

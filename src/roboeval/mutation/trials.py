@@ -1,0 +1,148 @@
+"""Runs right programs and their mutants in the worlds of a task: which mutants do the checks kill?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Protocol, TypeAlias, TypeVar
+
+from codebotler.badinput import BadInput
+from codebotler.simulator.engine import Lanes, digest
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.trace import Outcome, Status
+from codebotler.world import World
+from roboeval.evaluation.failures import Verdict
+from roboeval.evaluation.judge import judge
+from roboeval.mutation.mutants import Mutant, Original, drawn, mutants, originals
+from roboeval.mutation.operator import Context
+from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMutant
+from roboeval.suites.load import Scenario, Suite, Task
+from roboeval.suites.solutions import equivalent_mutants
+
+WORLDS = 200
+"""How many worlds a suite makes for mutants by default."""
+CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})
+
+Item = TypeVar("Item")
+Run: TypeAlias = Callable[[str, World], Outcome]
+
+
+class Watch(Protocol):
+    """Passes things on, and shows how far they have come."""
+
+    def __call__(self, items: Iterable[Item], doing: str, total: int) -> Iterator[Item]:
+        """Pass on items, of which there are `total`."""
+
+
+def mutation_score(
+    task: Task,
+    suite: Suite,
+    lanes: Lanes,
+    *,
+    further: Iterable[Original] = (),
+    worlds: int | None = None,
+    most: int = 400,
+    seed: int = 1,
+    watched: Watch = lambda items, doing, total: iter(items),  # noqa: ARG005
+) -> MutationScore:
+    """Run the originals of a task, make mutants of the right ones, and try these.
+
+    Args:
+        task: the task.
+        suite: of the task.
+        lanes: in which programs are run.
+        further: originals beside the solutions of the task.
+        worlds: how many to make; by default 200, or those that are written out.
+        most: how many mutants to try at most.
+        seed: from which mutants are drawn and worlds are made; never that of the suite's own worlds.
+        watched: shows how far this has come.
+
+    Raises:
+        BadInput: a file of solutions is wrong, or worlds are to be made and the suite makes none.
+        EngineError: no isolated process can be started.
+    """
+    scenarios = worlds_of(suite, task, worlds, seed)
+
+    def run(program: str, world: World) -> Outcome:
+        return lanes.here().run(program, lambda: SimulatedRobot(world, suite.rules))
+
+    def outcomes(original: Original) -> tuple[Outcome, ...]:
+        return tuple(run(original.program, scenario.world) for scenario in scenarios)
+
+    def result(mutant: Mutant) -> Result:
+        found = result_of(mutant.program, before[mutant.original], scenarios, run)
+        if found.status is MutantStatus.SURVIVED and mutant.key in equivalent:
+            return Result(MutantStatus.EQUIVALENT, why=equivalent[mutant.key])
+        return found
+
+    equivalent = equivalent_mutants(task)
+    programs = originals(task, further)
+    ran = lanes.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
+    before = dict(zip(programs, watched(ran, f"running {task.name}", len(programs)), strict=True))
+    faults = {original: fault_in(before[original], scenarios) for original in programs}
+    right = tuple(original for original in programs if faults[original] is None)
+    context = Context.of([scenario.world for scenario in scenarios], task.prompts)
+    made = drawn(mutants(right, context), most, seed)
+    tried = lanes.map_distinct(result, made, name=lambda mutant: digest(mutant.program))
+    results = watched(tried, f"mutating {task.name}", len(made))
+    return MutationScore(
+        task=task.name,
+        worlds=len(scenarios),
+        right=right,
+        wrong=tuple((original, fault) for original, fault in faults.items() if fault is not None),
+        mutants=tuple(map(TriedMutant, made, results)),
+    )
+
+
+def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
+    """The worlds in which mutants of a task are tried, with what they require."""
+    if suite.further is not None:
+        return suite.further(task, count or WORLDS, seed + 1 + (suite.seed or 0))
+    if count is not None:
+        raise BadInput(
+            f'the worlds of the suite "{suite.name}" are written out, and no further ones can be made; '
+            "leave --worlds out"
+        )
+    return task.scenarios
+
+
+def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> Result | None:
+    """Where an original is wrong, and why; None for a right one."""
+    verdicts = map(judge, outcomes, scenarios)
+    return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
+
+
+def result_of(program: str, before: Sequence[Outcome], scenarios: Sequence[Scenario], run: Run) -> Result:
+    """What becomes of one mutant; no world is tried after the one that kills it.
+
+    One that crashes is tried further: if it crashes in each world, no check is needed to find it wrong.
+
+    Args:
+        program: of the mutant.
+        before: how its original did, world by world.
+        scenarios: the worlds.
+        run: runs a program in a world.
+    """
+    crashes: list[Verdict] = []
+    changed = False
+    for outcome, scenario in zip(before, scenarios, strict=True):
+        verdict = judge(run(program, scenario.world), scenario)
+        if verdict.outcome.status in CRASHED:
+            crashes.append(verdict)
+        elif not verdict.satisfied:
+            return _killed(verdict)
+        changed = changed or not _alike(outcome, verdict.outcome)
+    if crashes:
+        killed = _killed(crashes[0])
+        return killed._replace(status=MutantStatus.CRASHES) if len(crashes) == len(scenarios) else killed
+    return Result(MutantStatus.SURVIVED if changed else MutantStatus.SAME)
+
+
+def _killed(verdict: Verdict) -> Result:
+    error = verdict.outcome.error
+    why = verdict.failed[0].text if verdict.failed else "" if error is None else error.kind
+    return Result(MutantStatus.KILLED, verdict.world, why)
+
+
+def _alike(one: Outcome, other: Outcome) -> bool:
+    kinds = [None if end.error is None else end.error.kind for end in (one, other)]
+    return one.status == other.status and kinds[0] == kinds[1] and one.trace == other.trace

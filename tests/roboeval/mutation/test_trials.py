@@ -1,0 +1,193 @@
+"""What becomes of a mutant: killed by a check or an error, alive, the same as before, or no robot program."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput
+from codebotler.simulator.engine import Lanes
+from codebotler.simulator.robot import SimulatedRobot
+from roboeval.mutation.mutants import Mutant, Original
+from roboeval.mutation.report import to_yaml
+from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMutant
+from roboeval.mutation.trials import Run, mutation_score, result_of, worlds_of
+from roboeval.suites.load import Scenario, Suite, Task, load_suite
+from roboeval.suites.solutions import equivalent_mutants
+from small_suite import a_suite
+
+TASK = """\
+name: T
+summary: Visit the kitchen, and say bye where somebody is.
+prompts: [p]
+checks:
+  goes: {category: Location, rtl: 'tr.Exists(goto("kitchen"))'}
+  says: {category: SayAtLocation, rtl: 'tr.Exists(say("bye"))'}
+worlds:
+  - about: nobody is in
+    robot: hall
+    rooms: [hall, kitchen]
+    require: [goes, not says]
+  - about: ann is in
+    robot: hall
+    rooms: [hall, kitchen]
+    people: {kitchen: [{name: ann, answers: ["yes"]}]}
+    require: [goes, says]
+"""
+KILLED, SURVIVED, EQUIVALENT, SAME, CRASHES = MutantStatus
+RIGHT = Original(
+    "right", "def task_program():\n    go_to('kitchen')\n    if is_in_room('ann'):\n        say('bye')\n"
+)
+
+
+@pytest.fixture(scope="module")
+def lanes() -> Iterator[Lanes]:
+    with Lanes(1) as lanes:
+        yield lanes
+
+
+@pytest.fixture
+def suite(tmp_path: Path) -> Suite:
+    return load_suite(a_suite(tmp_path, TASK))
+
+
+@pytest.fixture
+def task(suite: Suite) -> Task:
+    return suite.task("T")
+
+
+def program(body: str) -> str:
+    return "def task_program():\n" + "".join(f"    {line}\n" for line in body.split("; "))
+
+
+def runner(suite: Suite, lanes: Lanes) -> Run:
+    return lambda source, world: lanes.here().run(source, lambda: SimulatedRobot(world, suite.rules))
+
+
+@pytest.mark.parametrize(
+    ("body", "result"),
+    [
+        ("say('bye')", Result(KILLED, "nobody is in", "goes")),
+        ("go_to('kitchen')", Result(KILLED, "ann is in", "says")),
+        ("go_to('attic')", Result(KILLED, "nobody is in", "GoToInvalidLocation")),
+        ("go_to('kitchen'); ask('ann', 'Hm?', ['yes'])", Result(KILLED, "nobody is in", "AskNoPerson")),
+        ("go_to('kitchen'); while True: pass", Result(KILLED, "nobody is in", "TimeoutError")),
+        ("go_to('kitchen'); [1][is_in_room('x')]; say('bye')", Result(KILLED, "nobody is in", "not says")),
+        ("go_to('kitchen'); [1][is_in_room('x')]", Result(KILLED, "ann is in", "IndexError")),
+        ("go_to('kitchen'); say(1)", Result(CRASHES, "nobody is in", "TypeError")),
+        ("go_to('kitchen'); [say('bye') for _ in [1] if is_in_room('ann')]", Result(SAME)),
+        ("go_to('kitchen'); say('hi'); [say('bye') for _ in [1] if is_in_room('x')]", Result(SURVIVED)),
+    ],
+)
+def test_what_becomes_of_a_mutant(body: str, result: Result, suite: Suite, lanes: Lanes) -> None:
+    scenarios, run = suite.task("T").scenarios, runner(suite, lanes)
+    before = [run(RIGHT.program, scenario.world) for scenario in scenarios]
+    assert result_of(program(body), before, scenarios, run) == result
+
+
+def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, lanes: Lanes) -> None:
+    wrong = Original("wrong", program("go_to('kitchen')")), Original("broken", "def (")
+    score = mutation_score(task, suite, lanes, further=[RIGHT, *wrong])
+    assert score.right == (RIGHT,)
+    assert score.wrong == (
+        (wrong[0], Result(KILLED, "ann is in", "says")),
+        (wrong[1], Result(KILLED, "nobody is in", "SyntaxError")),
+    )
+
+
+# --- the score
+
+
+def score_of(*statuses: MutantStatus) -> MutationScore:
+    made = (Mutant("drop-the-look", RIGHT, program(f"say({n})")) for n in range(len(statuses)))
+    tried = tuple(TriedMutant(one, Result(status)) for one, status in zip(made, statuses, strict=True))
+    return MutationScore("T", 2, (RIGHT,), (), tried)
+
+
+def test_the_score_is_the_share_of_wrong_mutants_that_are_killed() -> None:
+    score = score_of(*[KILLED] * 6, *[SURVIVED] * 2, *[EQUIVALENT] * 2, SAME, CRASHES)
+    assert (score.score, score.score_of_all) == (6 / 8, 6 / 10)
+    assert len(score.survivors) == 2
+    assert score_of(SAME).score is None
+
+
+def test_what_makes_a_score_doubtful() -> None:
+    assert score_of(*[KILLED] * 60).warnings == ()
+    (few,) = score_of(*[KILLED] * 59, SAME).warnings
+    assert re.match(r"T: .*\b59 mutants\b", few)
+    assert score_of(*[KILLED] * 51, *[EQUIVALENT] * 9).warnings == ()
+    (many,) = score_of(*[KILLED] * 50, *[EQUIVALENT] * 10).warnings
+    assert re.match(r"T: 10 of 60 mutants\b.*\b15%", many)
+
+
+# --- equivalent mutants
+
+
+def filled(*mutants: Mutant) -> str:
+    return to_yaml(mutants).replace("because: ''", "because: It does no harm.")
+
+
+def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, lanes: Lanes) -> None:
+    before = mutation_score(task, suite, lanes, further=[RIGHT])
+    survivor, *_ = before.survivors
+    killed = next(one.mutant for one in before.mutants if one.result.status is KILLED)
+    other = replace(survivor, operator="and-or")
+    path = task.path.parents[1] / "solutions" / "T.yaml"
+    path.parent.mkdir()
+    for listed, equivalent in (
+        (filled(survivor, killed), 1),
+        (filled(survivor).replace("-1,", "-9,"), 1),
+        (filled(other), 0),
+    ):
+        path.write_text(listed)
+        found = mutation_score(task, suite, lanes, further=[RIGHT])
+        results = {one.mutant: one.result for one in found.mutants}
+        assert found.count(EQUIVALENT) == equivalent
+        assert results[killed].status is KILLED
+        assert results[survivor] == (
+            Result(EQUIVALENT, why="It does no harm.") if equivalent else Result(SURVIVED)
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "named"),
+    [
+        (to_yaml([Mutant("detour", RIGHT, program("go_to('kitchen')"))]), 9, '"because" is empty'),
+        ("equivalent_mutants: [{operator: x, diff: y, because: z, why: w}]", 1, '"why"'),
+    ],
+    ids=["without a reason", "unknown key"],
+)
+def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> None:
+    path = task.path.parents[1] / "solutions" / "T.yaml"
+    path.parent.mkdir()
+    path.write_text(text)
+    with pytest.raises(BadInput, match=named) as error:
+        equivalent_mutants(task)
+    assert (error.value.file, error.value.line) == (path, line)
+
+
+# --- worlds
+
+
+def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
+    assert worlds_of(suite, task, None, 1) == task.scenarios
+    with pytest.raises(BadInput, match=r'"mine".* written out'):
+        worlds_of(suite, task, 200, 1)
+
+
+def test_worlds_that_a_suite_makes_for_mutants_are_not_those_it_judges_by(suite: Suite, task: Task) -> None:
+    seeds: list[int] = []
+
+    def further(task: Task, count: int, seed: int) -> tuple[Scenario, ...]:
+        seeds.append(seed)
+        return (task.scenarios * count)[:count]
+
+    makes = replace(suite, further=further, seed=3)
+    assert worlds_of(makes, task, 3, 1) == (*task.scenarios, *task.scenarios)[:3]
+    assert [len(worlds_of(makes, task, None, seed)) for seed in range(5)] == [200] * 5
+    assert 3 not in seeds
+    assert len(set(seeds)) == 5
