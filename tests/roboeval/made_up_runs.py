@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from roboeval.evaluation.tables import RowData
+import polars as pl
 
 from codebotler.files import to_line
 from codebotler.simulator.rules import Rules
-from roboeval.analysis.resample import Trial, by_prompt
+from made_results import VERDICT, results_of
+from roboeval.evaluation.completions import Completion
+from roboeval.evaluation.rows import RowData
 from roboeval.evaluation.run import Run
-from roboeval.report.reading import JudgedRun, Written, scored
+from roboeval.report.runs import JudgedRun
 from roboeval.suites.load import Suite
 from seals import unseal
 from small_run import TASK
@@ -30,6 +32,7 @@ SUITE = Suite(
     {n: replace(TASK, name=n, path=Path(f"{n}.yaml")) for n in NAMES},
     "0" * 64,
 )
+HEAD = {"suite": SUITE.name, "digest": SUITE.digest, "python": "3.11", "codebotler": "0.1.0"}
 FAILURES = (
     ("PythonError", "NameError"),
     ("PythonError", "ZeroDivisionError"),
@@ -39,6 +42,9 @@ FAILURES = (
     ("TaskCompletionError", "InitialTerminal"),
     ("TaskCompletionError", "EventOrdering"),
 )
+PROGRAM = 'def task_program():\n    say("hello")\n'
+UNCHECKED = pl.lit(None)
+RUNS = pl.col("passed") | (pl.col("failure_class") == "TaskCompletionError")
 
 
 def made_up(
@@ -46,62 +52,86 @@ def made_up(
     passes: Mapping[str, tuple[int, ...]],
     *,
     of: int = 10,
+    suite: Suite = SUITE,
     ablated: tuple[str, ...] = (),
-    **changes: Any,  # noqa: ANN401 - any field of a run
+    accepted: pl.Expr = RUNS,
+    written: Callable[[int, int], Mapping[str, Any]] = lambda prompt, index: {},
+    **about: Any,  # noqa: ANN401 - `folder`, and any field of results
 ) -> JudgedRun:
-    """A run of which so many completions pass, by task and prompt; the others fail by all kinds in turn."""
+    """A run of which so many completions pass, by task and prompt; the others fail by all kinds in turn.
+
+    Args:
+        name: of its model, and of its folder, if no other is given.
+        passes: how many completions of each prompt pass, by task.
+        of: how many completions each prompt has.
+        suite: by which they were judged.
+        ablated: the tasks that were judged by common sense only as well.
+        accepted: what the check says; null where it was not asked.
+        written: what else the row of a completion says, by prompt and index.
+        about: the name of the `folder`, and fields of the results.
+    """
     rows = [
         _row(task, prompt, index, passed=index < passed)
         for task, prompts in passes.items()
         for prompt, passed in enumerate(prompts)
         for index in range(of)
     ]
-    trials = by_prompt(
-        ((r["task"], r["prompt"], r["index"]), Trial(_accepted(r), _accepted(r), r["passed"])) for r in rows
+    return judged(name, rows, suite=suite, ablated=ablated, accepted=accepted, written=written, **about)
+
+
+def judged(
+    name: str,
+    rows: list[dict[str, Any]],
+    *,
+    suite: Suite = SUITE,
+    ablated: tuple[str, ...] = (),
+    accepted: pl.Expr = RUNS,
+    written: Callable[[int, int], Mapping[str, Any]] = lambda prompt, index: {},
+    folder: str = "",
+    model: str | None = "",
+    **fields: Any,  # noqa: ANN401 - of results
+) -> JudgedRun:
+    """A run of such rows; see `made_up`."""
+    model = name if model == "" else model
+    completions = [
+        Completion.of(
+            {key: row[key] for key in ("task", "prompt", "index")}
+            | {"program": PROGRAM, "model": model, **written(row["prompt"], row["index"])}
+        )
+        for row in rows
+    ]
+    results = replace(
+        results_of(rows, suite, completions=completions, head={**HEAD, "suite": suite.name}),
+        run=Run(Path(folder or name.partition("<")[0] or "hostile")),
+        **fields,
     )
-    run = JudgedRun(
+    alone = [row for row in rows if row["task"] in ablated]
+    return JudgedRun(
+        results,
+        results.table.with_columns(accepted=accepted.cast(pl.Boolean)),
+        ablated=results_of(alone, suite, ablated=True) if alone else None,
         name=name,
-        folder=name,
-        model=name,
-        about={},
-        head={"suite": SUITE.name, "digest": SUITE.digest, "python": "3.11", "codebotler": "0.1.0"},
-        rows=tuple(rows),
-        written={(r["task"], r["prompt"], r["index"]): Written(PROGRAM) for r in rows},
-        scores=scored(rows, SUITE),
-        total=len(rows),
-        ablated=scored((r for r in rows if r["task"] in ablated), SUITE) or None,
-        trials=trials,
     )
-    return replace(run, **changes)
 
 
-PROGRAM = 'def task_program():\n    say("hello")\n'
-
-
-def _accepted(row: RowData) -> bool:
-    return bool(row["passed"] or row["failure"]["class"] == "TaskCompletionError")
-
-
-def _row(task: str, prompt: int, index: int, *, passed: bool) -> RowData:
+def _row(task: str, prompt: int, index: int, *, passed: bool) -> dict[str, Any]:
+    row = {"task": task, "prompt": prompt, "index": index, "passed": passed}
+    if passed:
+        return row
     name, kind = FAILURES[(index + 3 * prompt) % len(FAILURES)]
-    check = None if name != "TaskCompletionError" else f"{kind.lower()}()"
-    error = None if check else {"kind": kind, "message": f"{kind} it is"}
+    check = f"{kind.lower()}()" if name == "TaskCompletionError" else None
     verdict = {
+        **VERDICT,
         "world": "somebody is in",
-        "satisfied": passed,
+        "satisfied": False,
         "status": "finished" if check else "robot-error" if name.startswith("Robot") else "python-error",
-        "error": error,
+        "error": None if check else {"kind": kind, "message": f"{kind} it is"},
         "line": 1,
         "failed_checks": [check] if check else [],
-        "trace": [],
     }
-    return {
-        "task": task,
-        "prompt": prompt,
-        "index": index,
-        "passed": passed,
-        "failure": None if passed else {"class": name, "kind": kind, "world": 0, "check": check},
-        "verdicts": [] if passed else [verdict],
+    return row | {
+        "failure": {"class": name, "kind": kind, "world": 0, "check": check},
+        "verdicts": [verdict],
     }
 
 
@@ -132,14 +162,22 @@ def cases() -> dict[str, list[JudgedRun]]:
         "one prompt": [one],
         "one completion": [made_up("one", {"Visit": (0,)}, of=1)],
         "no failures": [made_up("perfect", {"Visit": (10, 10), "CountMugs": (10,)})],
-        "all failures": [made_up("hopeless", {"Visit": (0, 0), "CountMugs": (0,)}, trials=None)],
-        "unfinished": [replace(one, total=500), *usual()[:1]],
+        "all failures": [made_up("hopeless", {"Visit": (0, 0), "CountMugs": (0,)}, accepted=UNCHECKED)],
+        "unfinished": [unfinished(one, 500), *usual()[:1]],
         "40 models": many,
         "long names": [
             made_up(f"openai-chat:somebody/model-34b-hf-{n}", {"Visit": (n, 5)}) for n in range(7)
         ],
         "hostile": [made_up(HOSTILE, {"Visit": (4, 5)})],
     }
+
+
+def unfinished(run: JudgedRun, total: int) -> JudgedRun:
+    """The same run where there are so many completions to judge."""
+    (task, prompt, _), last = next(reversed(run.results.completions.items()))
+    more = {(task, prompt, index): replace(last, index=index) for index in range(1_000, total + 990)}
+    completions = {**run.results.completions, **more}
+    return replace(run, results=replace(run.results, completions=completions))
 
 
 def grown(run: Path, times: int) -> None:
@@ -152,5 +190,3 @@ def grown(run: Path, times: int) -> None:
             for n in range(times):
                 file.writelines(to_line({**row, "index": row["index"] + n * most}) for row in rows)
     unseal(run)
-    hashes = found.programs("paper")
-    hashes.write_bytes(hashes.read_bytes() * times)

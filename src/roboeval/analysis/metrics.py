@@ -9,6 +9,8 @@ from functools import lru_cache
 
 import polars as pl
 
+ROUNDING = 1e-9  # what sums of shares may lack of a threshold
+
 
 def pass_at_k(n: int, c: int, k: int) -> float:
     """The chance that at least one of k completions passes, estimated without bias from n of which c pass.
@@ -132,6 +134,18 @@ def completions_of(table: pl.DataFrame) -> pl.DataFrame:
     return table.filter(pl.col("world_number") == 0)
 
 
+def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
+    """How many completions of each prompt were judged (`n`) and passed (`c`), and its `pass@1`.
+
+    Args:
+        table: as `load_results` gives it.
+    """
+    counted = completions_of(table).group_by("task", "prompt", maintain_order=True)
+    return counted.agg(n=pl.len(), c=pl.col("passed").sum()).with_columns(
+        (pl.col("c") / pl.col("n")).alias("pass@1")
+    )
+
+
 def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskScore, ...]:
     """How often completions pass, by task and prompt (paper, section IV.C).
 
@@ -139,16 +153,10 @@ def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskSco
         table: as `load_results` gives it.
         order: of the tasks; others come behind these, as they stand in the table.
     """
-    counted = (
-        completions_of(table)
-        .group_by("task", "prompt", maintain_order=True)
-        .agg(n=pl.len(), c=pl.col("passed").sum())
-        .sort("prompt", maintain_order=True)
-    )
     prompts: dict[str, list[PromptScore]] = {
         task: [] for task in [*order, *table["task"].unique(maintain_order=True)]
     }
-    for task, prompt, n, c in counted.iter_rows():
+    for task, prompt, n, c, _ in prompt_scores(table).sort("prompt", maintain_order=True).iter_rows():
         prompts[task].append(PromptScore(task, prompt, n, c))
     return tuple(TaskScore(task, tuple(scores)) for task, scores in prompts.items() if scores)
 
@@ -173,6 +181,26 @@ def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
         ValueError: a prompt, which is named, has fewer than k completions; or there is no prompt.
     """
     return clustered_interval([prompt.pass_at(k) for task in tasks for prompt in task.prompts])
+
+
+def share_at_least(values: Sequence[float], threshold: float) -> float:
+    """The share of values that reach a threshold.
+
+    Args:
+        values: at least one.
+        threshold: above 0.
+    """
+    return sum(value >= threshold - ROUNDING for value in values) / len(values)
+
+
+def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
+    """The share of prompts that reach each threshold at which it changes, from 1 down (paper, section V.A).
+
+    Args:
+        values: pass@1 of each prompt.
+    """
+    thresholds = sorted({1.0, *(value for value in values if value > ROUNDING)}, reverse=True)
+    return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
 
 def clustered_interval(values: Sequence[float], *, level: float = 0.95) -> Estimate:

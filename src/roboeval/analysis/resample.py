@@ -1,4 +1,4 @@
-"""What asking again for each program that the check rejects would have given (paper, section V).
+"""What asking again for each program that the check rejects would have given (paper, section VI).
 
 Whoever checks programs before they run asks for another when one is rejected, up to a limit of retries. From
 a run whose completions are both checked and judged, what that gives is known exactly: completions of a prompt
@@ -14,11 +14,10 @@ from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.metrics import Estimate, clustered_interval
+from roboeval.analysis.metrics import Estimate, clustered_interval, share_at_least
 
 LIMITS = (0, 2, 4, 8, 100)
 THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
-ROUNDING = 1e-9  # what sums of shares may lack of a threshold
 
 
 @dataclass(frozen=True)
@@ -141,13 +140,23 @@ def resampled(prompts: Sequence[CheckedPrompt], retries: int) -> Limit:
         passed=clustered_interval([min(one.passed, 1.0) for one in each]),
         accepted=_mean([one.accepted for one in each]),
         ran=_mean([one.ran for one in each]),
-        prompts={t: _mean([one.passed >= t - ROUNDING for one in each]) for t in THRESHOLDS},
+        prompts={t: share_at_least([one.passed for one in each], t) for t in THRESHOLDS},
         by_prompt=each,
     )
 
 
 def _mean(values: Sequence[float]) -> float:
     return sum(values) / len(values)
+
+
+def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
+    """The share of programs that the check accepts after 0, 1, ... retries.
+
+    Args:
+        prompts: at least one.
+        most: the last number of retries.
+    """
+    return [_mean([chances(prompt.trials, n).accepted for prompt in prompts]) for n in range(most + 1)]
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
@@ -180,7 +189,5 @@ def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[
             }
             for i, prompt in enumerate(prompts)
         ],
-        "accepted_after": [
-            _mean([chances(prompt.trials, n).accepted for prompt in prompts]) for n in range(max(limits) + 1)
-        ],
+        "accepted_after": accepted_after(prompts, max(limits)),
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -142,6 +142,48 @@ def failures(table: pl.DataFrame) -> tuple[Failures, ...]:
         return Failures(name, counts.total(), counts.total() / n, kinds)
 
     return tuple(of_class(name) for name in [*CLASSES, *sorted(failed.keys() - set(CLASSES))])
+
+
+PASSED, ALL = "passed", "all"
+
+
+@dataclass(frozen=True)
+class Causes:
+    """How completions ended, in shares.
+
+    Args:
+        classes: the share of all completions by class of failure, and of those that passed.
+        kinds: by class, the share of its failures by kind.
+        counts: of completions by class and kind, which is `ALL` for the class; empty where only shares are
+            known.
+    """
+
+    classes: Mapping[str, float]
+    kinds: Mapping[str, Mapping[str, float]]
+    counts: Mapping[tuple[str, str], int]
+
+
+def causes(table: pl.DataFrame) -> Causes:
+    """How the completions of a run ended (paper, section V.B).
+
+    Args:
+        table: as `load_results` gives it, with at least one row.
+    """
+    found = failures(table)
+    failed = sum(one.count for one in found)
+    kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
+    return Causes(
+        {PASSED: 1 - failed / completions_of(table).height, **{one.name: one.share for one in found}},
+        {one.name: {kind: count / one.count for kind, count in kinds[one.name]} for one in found},
+        {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
+    )
+
+
+def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
+    """The kinds of a class by which some completion fails, known ones first."""
+    there = {kind for one in found for kind in one.kinds.get(name, {})}
+    known = [kind for kind in CLASSES[name].kinds if kind in there]
+    return [*known, *sorted(there - {*known})]
 
 
 def judged_count(prompts: Iterable[PromptScore]) -> int:

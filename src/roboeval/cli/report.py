@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.results import Results
-    from roboeval.report.reading import JudgedRun
+    from roboeval.report.runs import JudgedRun
 
 
 def report(
@@ -52,13 +52,12 @@ def report(
     """
     from codebotler.terminal import busy
     from roboeval.evaluation.engines import Local
-    from roboeval.report.contents import Wishes, headline, sections
-    from roboeval.report.cost import expect_known, price_from
-    from roboeval.report.reading import named_apart
-    from roboeval.report.writing import expect_no_others, pieces, write_report
+    from roboeval.report.cost import expect_known, read_prices
+    from roboeval.report.runs import named_apart
+    from roboeval.report.writing import expect_no_others, headline, pieces, sections, write_report
 
     expect_no_others(out)
-    prices = tuple(map(price_from, price or ()))
+    prices = read_prices(price or ())
     if beside == suite:
         fail(f'--beside takes another suite than "{suite}", by which the report judges')
     opened = [open_current(run, suite, ablated=False) for run in runs]
@@ -75,11 +74,10 @@ def report(
         *([] if check else ["--no-check"]),
     ]
     words += [word for text in price or () for word in ("--price", text)]
-    known = opened[0].suite
-    wishes = Wishes(published, prices, command_anywhere("report", *words, suite=suite))
+    again = command_anywhere("report", *words, suite=suite)
     with busy("putting together"):
-        parts = sections(read, known, wishes)
-    written = write_report(*headline(read, known), parts, out)
+        parts = sections(read, with_published=published, prices=prices, command=again)
+    written = write_report(*headline(read), parts, out)
     for _ in watched(written, "writing", pieces(parts)):
         pass
     note(f"the report is in {out / 'index.html'}")
@@ -95,16 +93,16 @@ def judged_run(opened: Opened, suite: str, *, beside: str | None, engine: OpenEn
         engine: where programs are checked; None where they are not to be.
     """
     from roboeval.evaluation.run import evaluation_key
-    from roboeval.report.reading import JudgedRun
+    from roboeval.report.runs import JudgedRun
 
     results = opened.results
     run = results.run
     ablated = None
     if run.rows(evaluation_key(opened.suite, ablated=True)).is_file():
         ablated = open_current(run.path, suite, ablated=True).results
-    return JudgedRun.of(
+    return JudgedRun(
         results,
-        table=unchecked(results) if engine is None else checked(results, engine=engine),
+        unchecked(results) if engine is None else checked(results, engine=engine),
         ablated=ablated,
         beside=None if beside is None else open_current(run.path, beside, ablated=False).results,
     )

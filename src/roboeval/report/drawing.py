@@ -7,92 +7,69 @@ import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
 
 from codebotler.terminal import visible
 
 WIDE, NARROW = 7.16, 3.5  # inches: both columns of a paper, and one
 
-COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#000000", "#F0E442")
+PAPER, INK, FAINT, QUIET = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
+BLACK, WHITE = "#010101", "#fefefe"  # of data, and of text on full shades; SVG leaves out what is #000000
+FULL = "#00507d"  # the shade of a share of 1; one hue is read by every eye, and in print
+MIDDLE = "#7fb5d5"
+DARK = {PAPER: "#17181c", INK: "#e6e6ea", FAINT: "#3d3f47", QUIET: "#8f919b", BLACK: "#ffffff"}
+"""What takes the place of a colour on a dark page; colours of data stay."""
+DARK_MIDDLE = "#2b5f80"
+
+COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", BLACK, "#F0E442")
 """Okabe and Ito's, which people who see colours differently tell apart, too."""
 
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-MOST_COLOURS = len(COLOURS)
 LONGEST_NAME = 26
 
-
-@dataclass(frozen=True)
-class Look:
-    """The colours of a figure's background, text and lines."""
-
-    paper: str
-    ink: str
-    faint: str
-    quiet: str
-    black: str
-    middle: str
-
-    def colour(self, number: int) -> str:
-        """The colour of something that is told apart by its number."""
-        colour = COLOURS[number % MOST_COLOURS]
-        return self.black if colour == "#000000" else colour
-
-
-LIGHT = Look(
-    paper="#ffffff", ink="#1b1b1f", faint="#d5d5da", quiet="#6f6f78", black="#000000", middle="#7fb5d5"
-)
-DARK = Look(
-    paper="#17181c", ink="#e6e6ea", faint="#3d3f47", quiet="#8f919b", black="#ffffff", middle="#2b5f80"
-)
+STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 7.5,
+    "axes.titlesize": 8,
+    "axes.labelsize": 7.5,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    **dict.fromkeys(("axes.edgecolor", "axes.labelcolor", "text.color", "xtick.color", "ytick.color"), INK),
+    **dict.fromkeys(("axes.facecolor", "figure.facecolor", "savefig.facecolor"), PAPER),
+    "axes.axisbelow": True,
+    "text.parse_math": False,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.5,
+    "hatch.linewidth": 0.5,
+    "lines.linewidth": 1.4,
+    "svg.hashsalt": "roboeval",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+    "pdf.compression": 6,
+}
 
 
 @contextmanager
-def looking(look: Look) -> Iterator[None]:
+def styled() -> Iterator[None]:
     """Draw and write figures in one style; no setting of the reader's own plays a part."""
-    settings: dict[Any, Any] = {
-        "font.family": "DejaVu Sans",
-        "font.size": 7.5,
-        "axes.titlesize": 8,
-        "axes.labelsize": 7.5,
-        "xtick.labelsize": 7,
-        "ytick.labelsize": 7,
-        "legend.fontsize": 7,
-        "legend.frameon": False,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.linewidth": 0.6,
-        "axes.edgecolor": look.ink,
-        "axes.labelcolor": look.ink,
-        "axes.facecolor": look.paper,
-        "axes.axisbelow": True,
-        "text.color": look.ink,
-        "text.parse_math": False,
-        "xtick.color": look.ink,
-        "ytick.color": look.ink,
-        "xtick.major.width": 0.6,
-        "ytick.major.width": 0.6,
-        "grid.color": look.faint,
-        "grid.linewidth": 0.5,
-        "hatch.linewidth": 0.5,
-        "lines.linewidth": 1.4,
-        "figure.facecolor": look.paper,
-        "savefig.facecolor": look.paper,
-        "svg.hashsalt": "roboeval",
-        "svg.fonttype": "path",
-        "pdf.fonttype": 42,
-        "pdf.compression": 6,
-    }
     with warnings.catch_warnings(), mpl.rc_context():
         warnings.simplefilter("ignore")  # a name may hold letters that the font lacks
         mpl.rcdefaults()
-        mpl.rcParams.update(settings)
+        mpl.rcParams.update(STYLE)
         yield
 
 
@@ -110,8 +87,8 @@ def written(figure: Figure, kind: str) -> bytes:
         "pdf": {"Creator": None, "Producer": None, "CreationDate": None},
         "svg": {"Creator": None, "Date": None},
     }
-    if figure.get_layout_engine() is not None:  # once, for all formats: each time moves things a little
-        figure.draw_without_rendering()
+    if (layout := figure.get_layout_engine()) is not None:  # once, for all formats
+        layout.execute(figure)
         figure.set_layout_engine(None)  # "none" would leave one behind, for which all is drawn twice
     content = io.BytesIO()
     figure.savefig(content, format=kind, dpi=300 if kind == "png" else 72, metadata=nothing[kind])
@@ -130,6 +107,19 @@ def _slim(svg: bytes) -> bytes:
     svg = re.sub(rb"<!--.*?-->|<metadata>.*?</metadata>", b"", svg, flags=re.DOTALL)
     svg = re.sub(rb'<path id="(\w+-[0-9a-f]+)"[^>]*?/>', once, svg, flags=re.DOTALL)
     return re.sub(rb"<defs>\s*</defs>|\s*\n\s*", b"\n", svg)
+
+
+def shades(paper: str = PAPER, middle: str = MIDDLE) -> LinearSegmentedColormap:
+    """The shades of shares, from that of 0 to that of 1."""
+    return LinearSegmentedColormap.from_list("shades", [paper, middle, FULL])
+
+
+def darkened(svg: bytes) -> bytes:
+    """A drawing in colours for a dark page."""
+    light, dark = shades(), shades(DARK[PAPER], DARK_MIDDLE)
+    others = {to_hex(light(n)): to_hex(dark(n)) for n in range(light.N)} | DARK
+    colours = {old.encode(): new.encode() for old, new in others.items()}
+    return re.sub(rb"#[0-9a-f]{6}\b", lambda colour: colours.get(colour[0], colour[0]), svg)
 
 
 def brief(name: str, most: int = LONGEST_NAME) -> str:

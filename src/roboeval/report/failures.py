@@ -1,95 +1,168 @@
-"""Groups of failures for the page: who fails alike, why, and what would have helped."""
+"""Why programs fail: causes, groups of failures that are alike, and what other checks say of them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 from roboeval.analysis.cluster import Cluster, clusters, groups
+from roboeval.analysis.summary import ALL, Causes, causes
+from roboeval.analysis.verdict_changes import (
+    VerdictChanges,
+    place,
+    said,
+    said_of_order,
+    said_of_prompts,
+    verdict_changes,
+)
 from roboeval.evaluation.completions import how_many, name_of
-from roboeval.report.reading import JudgedRun
-from roboeval.report.sheets import Column, Sheet, sheet
+from roboeval.report import figures, paper
+from roboeval.report.runs import JudgedRun
+from roboeval.report.sheets import (
+    Cell,
+    Groups,
+    Picture,
+    Prose,
+    Section,
+    Sheet,
+    section,
+    sheet,
+)
 
-MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups that are shown of a run, and of all runs
-ABOUT = (
+GROUPS = (
     "Completions of one task that fail by the same error or check and with similar programs, the largest "
     "groups first. Two programs are similar if they share six in ten of their lines, whatever names they "
     "chose. A group is shown by its most frequent program, beside the program of the same task that passes "
     "and differs in the fewest lines."
 )
+MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups that are shown of a run, and of all runs
+MOST_REVERSALS = 100  # groups of each run
 
 
-@dataclass(frozen=True)
-class Shown:
-    """A group of failures of one run."""
-
-    model: str
-    cluster: Cluster
+# --- causes
 
 
-@dataclass(frozen=True)
-class Failures:
-    """The largest groups of failures of all runs.
-
-    Args:
-        shown: of each run in turn, the largest first.
-        notes: how many more there are.
-    """
-
-    shown: tuple[Shown, ...]
-    notes: tuple[str, ...]
+def why(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
+    """How completions end (paper, section V.B)."""
+    found = all_causes(runs, with_published=with_published)
+    picture = Picture("causes", lambda: figures.causes(found))
+    notes = Prose(beside_notes(runs) if with_published else [])
+    return section("causes", picture, notes, causes_sheet(found))
 
 
-def failures(runs: Sequence[JudgedRun]) -> Failures:
-    """Put the failures of each run together.
+def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:
+    """The causes of each run, each followed by the published ones if they are asked for and there."""
+    found: list[tuple[str, Causes]] = []
+    for run in runs:
+        found.append((run.name, causes(run.table)))
+        if with_published and (model := paper.model_of(run)) is not None:
+            found.append((f"{run.name}, published", paper.causes(model)))
+    return found
 
-    Args:
-        runs: at least one.
-    """
+
+def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
+    """All shares and counts."""
+    rows = [
+        [name, of, kind, one.counts.get((of, kind)), share]
+        for name, one in found
+        for of, whole in one.classes.items()
+        for kind, share in [(ALL, whole), *one.kinds.get(of, {}).items()]
+    ]
+    return sheet("causes", rows)
+
+
+def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
+    """What a reader must know where published causes stand beside ours."""
+    known = [run for run in runs if paper.model_of(run) is not None]
+    if not known:
+        return ["None of these runs names a model of the paper, so no published causes stand beside them."]
+    tasks = {*paper.published()["pass_at_1"]}
+    parts = ", ".join(run.name for run in known if {score.task for score in run.scores} != tasks)
+    more = f"Published causes are of all {len(tasks)} tasks of the paper, which is more than {parts} did."
+    return [*paper.taken_for(runs), paper.TWO_SUMS, *([more] if parts else [])]
+
+
+# --- groups
+
+
+def alike(runs: Sequence[JudgedRun]) -> Section:
+    """The largest groups of failures of all runs."""
     most = max(FEWEST, min(MOST, ALTOGETHER // len(runs)))
-    shown: list[Shown] = []
+    shown: list[tuple[str, Cluster]] = []
     notes: list[str] = []
     for run in runs:
         together = groups(run.results.failed.values(), run.results.programs)
-        told = clusters(together[:most], run.results)
-        shown += [Shown(run.name, cluster) for cluster in told]
-        notes += _left_out(run, [len(rows) for rows in together[most:]])
-    return Failures(tuple(shown), tuple(notes))
+        shown += [(run.name, one) for one in clusters(together[:most], run.results)]
+        if left := together[most:]:
+            those = f"{len(left):,} smaller groups with {how_many(sum(map(len, left)))}"
+            notes.append(f"{run.name}: {those} are left out; `roboeval find` shows as many as --groups says.")
+    about = Prose([GROUPS] if shown else [])
+    return section("failures", about, Groups(shown), Prose(notes), groups_sheet(shown))
 
 
-def _left_out(run: JudgedRun, sizes: Sequence[int]) -> Iterator[str]:
-    if sizes:
-        those = f"{len(sizes):,} smaller groups with {how_many(sum(sizes))}"
-        yield f"{run.name}: {those} are left out; `roboeval find` shows as many as --groups says."
-
-
-def failures_sheet(found: Failures) -> Sheet:
+def groups_sheet(shown: Sequence[tuple[str, Cluster]]) -> Sheet:
     """The groups as numbers."""
-    columns = (
-        Column("model"),
-        Column("completions", "count"),
-        Column("task"),
-        Column("class"),
-        Column("kind"),
-        Column("check"),
-        Column("why"),
-        Column("such as"),
-        Column("passes"),
-        Column("lines apart", "count"),
-    )
     rows = [
-        [
-            one.model,
-            len(one.cluster.members),
-            one.cluster.task,
-            one.cluster.failure["class"],
-            one.cluster.failure["kind"],
-            one.cluster.failure["check"],
-            one.cluster.why,
-            name_of(one.cluster.representative),
-            None if one.cluster.fix is None else one.cluster.fix.name,
-            None if one.cluster.fix is None else one.cluster.fix.changed,
-        ]
-        for one in found.shown
+        [name, len(one.members), *_cells(one), one.fix and one.fix.name, one.fix and one.fix.changed]
+        for name, one in shown
     ]
-    return sheet("failures", "The same as a table", columns, rows)
+    return sheet("failures", rows)
+
+
+def _cells(one: Cluster) -> list[Cell]:
+    ground = [one.failure[name] for name in ("class", "kind", "check")]
+    return [one.task, *ground, one.why, name_of(one.representative)]
+
+
+# --- other checks
+
+
+def beside(runs: Sequence[JudgedRun]) -> Section:
+    """The verdicts of another suite beside those of a report: what they change, of whom, and why."""
+    found = [verdict_changes(run.name, run.results, run.beside) for run in runs if run.beside is not None]
+    sentences = [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
+    sheets = changes_sheet(found), changed_tasks_sheet(found), reversals_sheet(found)
+    return section("beside", Prose(sentences), *sheets)
+
+
+def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:
+    """pass@1 by both suites."""
+    here, there = ({one.name: one.pass_at_1[side] for one in found} for side in (0, 1))
+    rows: list[list[Cell]] = []
+    for one in found:
+        before, after = one.pass_at_1
+        over = one.comparison.over_prompts
+        places = place(one.name, here), place(one.name, there)
+        rows.append([one.name, before, after, after - before, over.low, over.high, *places])
+    return sheet("beside", rows)
+
+
+def changed_tasks_sheet(found: Sequence[VerdictChanges]) -> Sheet:
+    """How many completions pass by which of both suites."""
+    rows = [
+        [task.task, one.name, task.both, task.first_only, task.second_only, task.neither]
+        for one in found
+        for task in one.tasks
+    ]
+    return sheet("beside-tasks", rows)
+
+
+def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
+    """Groups of completions that pass by one of the suites only."""
+    rows: list[list[Cell]] = []
+    notes: list[str] = []
+    for one in found:
+        those = sorted(_both_ways(one), key=lambda pair: -len(pair[1].members))
+        rows += [
+            [one.name, f"{suite} only", len(group.members), *_cells(group)]
+            for suite, group in those[:MOST_REVERSALS]
+        ]
+        if (left := len(those) - MOST_REVERSALS) > 0:
+            more = f"{left:,} smaller groups are left out; `roboeval compare --suites` shows them."
+            notes.append(f"{one.name}: {more}")
+    return sheet("reversals", rows, notes=notes)
+
+
+def _both_ways(one: VerdictChanges) -> Iterator[tuple[str, Cluster]]:
+    """Each group with the suite by which it passes."""
+    for suite, those in zip(one.suites, (one.first_only, one.second_only), strict=True):
+        yield from ((suite, group) for group in those)

@@ -1,115 +1,102 @@
-"""The figures of section V of the paper: bars by task, curves over prompts, curves of rejection sampling."""
+"""The figures of sections V and VI of the paper: bars by task, curves over prompts, causes of failures."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import NullFormatter
 
-from roboeval.analysis.metrics import TaskScore
+from roboeval.analysis.metrics import TaskScore, threshold_curve
 from roboeval.analysis.resample import LIMITS
-from roboeval.report import retries
+from roboeval.analysis.summary import PASSED, Causes, kinds_in_order
+from roboeval.evaluation.failures import CLASSES, label_of
 from roboeval.report.drawing import (
+    COLOURS,
     DASHES,
+    FAINT,
+    INK,
     MARKERS,
-    MOST_COLOURS,
     NARROW,
+    PAPER,
+    QUIET,
+    WHITE,
     WIDE,
-    Look,
     brief,
     new_figure,
+    shades,
     share_axis,
 )
-from roboeval.report.heat import Heat, draw_heat
-from roboeval.report.reading import JudgedRun
-from roboeval.report.scores import curve, tasks_of
-from roboeval.suites.load import Suite
+from roboeval.report.runs import JudgedRun, tasks_of
 
+MOST_COLOURS = len(COLOURS)
 LOWEST = 1e-3  # where the paper ends its axis
 A_ROW = 8  # tasks that stand beside each other
 FEWEST = 4  # tasks for which there is room, lest a single bar fill a page
 SHORT_NAME = 16  # letters up to which two names stand beside each other below a narrow figure
 BAR = 0.82  # of the room that a task has
+MOST_NUMBERS = 14  # rows or columns up to which each cell of a table says its number
+DARK_FROM = 0.75  # the share from which white is read better than black
+
+Points: TypeAlias = Sequence[tuple[float, float]]
+Cells: TypeAlias = Sequence[Sequence[float | None]]
 
 
 # --- pass@1 by task
 
 
-def bars(runs: Sequence[JudgedRun], suite: Suite, look: Look) -> Figure:
+def bars(runs: Sequence[JudgedRun]) -> Figure:
     """pass@1 by task and model, with the range over prompts, and the ablated tasks beside it."""
+    tasks = tasks_of(runs)
+    there = {score.task for run in runs for score in run.ablated_scores}
+    ablated = [task for task in runs[0].suite.tasks if task in there]
     if len(runs) > MOST_COLOURS:
-        return _heat_of_tasks(runs, suite, look)
-    tasks, ablated = tasks_of(runs, suite), _ablated_tasks(runs, suite)
-    lines = max(1, math.ceil(len(tasks) / A_ROW))
-    widest = math.ceil(len(tasks) / lines)
+        return _heat_of_tasks(runs, tasks, ablated)
+    lines = math.ceil(len(tasks) / A_ROW)
+    sides = [("(a) all requirements", [run.scores for run in runs], _in_lines(tasks, lines))]
+    if ablated:
+        alone = [run.ablated_scores for run in runs]
+        sides.append(("(b) common sense only", alone, _in_lines(ablated, lines)))
+    widths = [len(sides[0][2][0]), *([max(2, len(ablated) / lines)] if ablated else [])]
     figure = new_figure(WIDE, 1.75 * lines + 0.45)
-    widths = [widest, max(2, len(ablated) / lines)] if ablated else [widest]
-    grid = figure.add_gridspec(lines, len(widths), width_ratios=widths)
-    for line in range(lines):
-        axes = figure.add_subplot(grid[line, 0])
-        here = tasks[line * widest : (line + 1) * widest]
-        _bars_on(axes, {run.name: run.scores for run in runs}, here, max(widest, FEWEST), look)
-        axes.set_ylabel("pass@1")
-        if line == 0 and ablated:
-            axes.set_title("(a) all requirements", loc="left")
-    for line, there in enumerate(_in_lines(ablated, lines)):
-        axes = figure.add_subplot(grid[line, 1])
-        scores = {run.name: run.ablated_scores for run in runs}
-        _bars_on(axes, scores, there, max(map(len, _in_lines(ablated, lines))), look)
-        if line == 0:
-            axes.set_title("(b) common sense only", loc="left")
-    handles = [Patch(color=look.colour(i), label=brief(run.name)) for i, run in enumerate(runs)]
-    columns = 5 if max(len(brief(run.name)) for run in runs) <= SHORT_NAME else 3
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=min(len(runs), columns), handlelength=1.0
-    )
+    grid = figure.add_gridspec(lines, len(sides), width_ratios=widths)
+    for column, (title, scores, rows) in enumerate(sides):
+        room = max(len(rows[0]), 0 if column else FEWEST)
+        for row, those in enumerate(rows):
+            axes = figure.add_subplot(grid[row, column])
+            _bars_on(axes, scores, those, room)
+            axes.set_ylabel("" if column else "pass@1")
+            axes.set_title(title if ablated and not row else "", loc="left")
+    names = [brief(run.name) for run in runs]
+    handles = [Patch(color=colour, label=name) for colour, name in zip(COLOURS, names, strict=False)]
+    columns = min(len(runs), 5 if max(map(len, names)) <= SHORT_NAME else 3)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, handlelength=1.0)
     return figure
 
 
 def _in_lines(tasks: Sequence[str], lines: int) -> list[Sequence[str]]:
-    if not tasks:
-        return []
     each = math.ceil(len(tasks) / lines)
     return [tasks[start : start + each] for start in range(0, len(tasks), each)]
 
 
-def _ablated_tasks(runs: Sequence[JudgedRun], suite: Suite) -> list[str]:
-    there = {score.task for run in runs for score in run.ablated_scores}
-    return [task for task in suite.tasks if task in there]
-
-
-def _bars_on(
-    axes: Axes, scores: Mapping[str, Sequence[TaskScore]], tasks: Sequence[str], room: int, look: Look
-) -> None:
+def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[str], room: int) -> None:
     width = BAR / len(scores)
-    for number, those in enumerate(scores.values()):
-        by_task = {score.task: score for score in those}
-        there = [(at, by_task[task]) for at, task in enumerate(tasks) if task in by_task]
+    line = {"elinewidth": 0.7, "capsize": min(2.5, 14 * width), "capthick": 0.7, "ecolor": INK}
+    for number, those in enumerate(scores):
+        there = [(tasks.index(score.task), score) for score in those if score.task in tasks]
         places = [at + (number + 0.5) * width - BAR / 2 for at, _ in there]
         means = [score.pass_at(1).mean for _, score in there]
         below = [max(0.0, mean - score.lowest(1)) for mean, (_, score) in zip(means, there, strict=True)]
         above = [max(0.0, score.highest(1) - mean) for mean, (_, score) in zip(means, there, strict=True)]
-        axes.bar(
-            places,
-            means,
-            width * 0.92,
-            color=look.colour(number),
-            yerr=[below, above],
-            error_kw={
-                "elinewidth": 0.7,
-                "capsize": min(2.5, 14 * width),
-                "capthick": 0.7,
-                "ecolor": look.ink,
-            },
-        )
+        axes.bar(places, means, width * 0.92, color=COLOURS[number], yerr=[below, above], error_kw=line)
         zeros = [place for place, mean in zip(places, means, strict=True) if mean == 0]
         if zeros:
-            axes.plot(zeros, [0] * len(zeros), "o", color=look.colour(number), markersize=2.2, clip_on=False)
+            axes.plot(zeros, [0] * len(zeros), "o", color=COLOURS[number], markersize=2.2, clip_on=False)
     beside = (room - len(tasks)) / 2 if len(tasks) < FEWEST else 0
     axes.set_xlim(-0.5 - beside, room - 0.5 - beside)
     axes.set_ylim(0, 1.03)
@@ -120,28 +107,22 @@ def _bars_on(
 
 
 def _two_lines(task: str) -> str:
-    """The name of a task, broken before a capital letter in the middle."""
-    capitals = [at for at, letter in enumerate(task) if at and letter.isupper()]
-    return (
-        f"{brief(task[: capitals[-1]], 14)}\n{brief(task[capitals[-1] :], 14)}"
-        if capitals
-        else brief(task, 14)
-    )
+    """The name of a task, broken before the last capital letter."""
+    last = max((at for at, letter in enumerate(task) if letter.isupper()), default=0)
+    return "\n".join(brief(part, 14) for part in (task[:last], task[last:]) if part)
 
 
-def _heat_of_tasks(runs: Sequence[JudgedRun], suite: Suite, look: Look) -> Figure:
+def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
     """The same for more models than there are colours: one row a model."""
-    tasks, ablated = tasks_of(runs, suite), _ablated_tasks(runs, suite)
-    plain = [_means(run.scores, tasks) for run in runs]
-    alone = [_means(run.ablated_scores, ablated) for run in runs]
     figure = new_figure(WIDE, 1.3 + 0.16 * len(runs))
-    widths = [len(tasks), len(ablated)] if ablated else [len(tasks)]
+    widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
     names = [brief(run.name) for run in runs]
-    draw_heat(figure.add_subplot(grid[0, 0]), Heat(plain, names, tasks), look)
+    heat(figure.add_subplot(grid[0, 0]), [_means(run.scores, tasks) for run in runs], names, tasks)
     if ablated:
         axes = figure.add_subplot(grid[0, 1])
-        draw_heat(axes, Heat(alone, [""] * len(runs), ablated), look)
+        cells = [_means(run.ablated_scores, ablated) for run in runs]
+        heat(axes, cells, [""] * len(runs), ablated)
         axes.set_title("common sense only", loc="left")
     return figure
 
@@ -154,70 +135,61 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 # --- curves
 
 
-def thresholds(runs: Sequence[JudgedRun], look: Look) -> Figure:
+def thresholds(runs: Sequence[JudgedRun]) -> Figure:
     """The share of prompts by threshold of pass@1, one line a model, on the paper's axis."""
-    columns = _legend_columns([run.name for run in runs])
-    width = NARROW if len(runs) <= MOST_COLOURS else WIDE
-    figure = new_figure(width, 2.75 + 0.13 * math.ceil(len(runs) / columns))
-    axes = figure.add_subplot()
-    best = sorted(range(len(runs)), key=lambda i: -_mean_of(runs[i]))[:MOST_COLOURS]
-    for number, run in enumerate(runs):
-        points = curve([*run.by_prompt.values()])
-        if number in best:
-            _line(
-                axes,
-                points,
-                best.index(number) if len(runs) > MOST_COLOURS else number,
-                brief(run.name),
-                look,
-            )
-        else:
-            _steps(axes, points, color=look.faint, linewidth=0.7, zorder=1)
-    if len(runs) > MOST_COLOURS:
-        axes.plot([], [], color=look.faint, linewidth=0.7, label=f"{len(runs) - MOST_COLOURS} others")
-    _threshold_axes(axes)
-    _threshold_labels(axes)
-    figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, handlelength=3.2
-    )
+    lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()])) for run in runs}
+    means = [sum(run.by_prompt.values()) / len(run.by_prompt) for run in runs]
+    figure = _line_a_model(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
+    _threshold_axes(figure.axes[0])
+    _threshold_labels(figure.axes[0])
     return figure
 
 
-def _legend_columns(names: Sequence[str]) -> int:
-    """In how many columns a legend fits below a narrow figure."""
-    is_narrow = len(names) <= MOST_COLOURS
-    return 1 if is_narrow and max(len(brief(name)) for name in names) > SHORT_NAME else 2
+def accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
+    """The share of programs that the check accepts by number of retries, one line a model."""
+    lines = {name: [*enumerate(those)] for name, those in shares.items()}
+    figure = _line_a_model(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
+    axes = figure.axes[0]
+    axes.set_xscale("symlog", linthresh=1)
+    axes.set_xlim(0, LIMITS[-1])
+    axes.set_xticks([*LIMITS], [str(limit) for limit in LIMITS])
+    axes.minorticks_off()
+    share_axis(axes)
+    axes.set_xlabel("retries at most")
+    axes.set_ylabel("programs that are accepted")
+    return figure
 
 
-def _mean_of(run: JudgedRun) -> float:
-    values = [*run.by_prompt.values()]
-    return sum(values) / len(values)
-
-
-def _line(axes: Axes, points: Sequence[tuple[float, float]], number: int, label: str, look: Look) -> None:
-    _steps(
-        axes,
-        points,
-        is_marked=True,
-        color=look.colour(number),
-        linestyle=DASHES[number % len(DASHES)],
-        marker=MARKERS[number % len(MARKERS)],
-        markersize=3.2,
-        label=label,
-    )
-
-
-def _steps(
-    axes: Axes,
-    points: Sequence[tuple[float, float]],
-    *,
-    is_marked: bool = False,
+def _line_a_model(
+    lines: Mapping[str, Points],
+    quality: Sequence[float],
+    height: float,
     **style: Any,  # noqa: ANN401 - matplotlib's own
-) -> None:
+) -> Figure:
+    """A line for each model; where there are more than colours, the best have one."""
+    is_narrow = len(lines) <= MOST_COLOURS
+    columns = 1 if is_narrow and max(len(brief(name)) for name in lines) > SHORT_NAME else 2
+    figure = new_figure(NARROW if is_narrow else WIDE, height + 0.13 * math.ceil(len(lines) / columns))
+    axes = figure.add_subplot()
+    best = sorted(range(len(lines)), key=lambda number: -quality[number])[:MOST_COLOURS]
+    for number, (name, points) in enumerate(lines.items()):
+        if number not in best:
+            axes.plot(*zip(*points, strict=True), color=FAINT, linewidth=0.7, zorder=1, **style)
+            continue
+        at = number if is_narrow else best.index(number)
+        dashes = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
+        shown = {"color": COLOURS[at], "label": brief(name), "markersize": 3.2, "clip_on": False, **dashes}
+        axes.plot(*zip(*points, strict=True), **shown)
+    if not is_narrow:
+        axes.plot([], [], color=FAINT, linewidth=0.7, label=f"{len(lines) - MOST_COLOURS} others")
+    figure.legend(loc="outside lower center", ncols=columns, handlelength=3.2)
+    return figure
+
+
+def _steps(points: Points) -> Points:
+    """A curve as far as the axis goes."""
     shown = [(threshold, share) for threshold, share in points if threshold >= LOWEST]
-    xs, ys = zip(*shown, (LOWEST, shown[-1][1]), strict=True)
-    ends = [0, len(shown)] if is_marked else None
-    axes.plot(xs, ys, drawstyle="steps-post", clip_on=False, markevery=ends, **style)
+    return [*shown, (LOWEST, shown[-1][1])]
 
 
 def _threshold_axes(axes: Axes) -> None:
@@ -236,33 +208,25 @@ def _threshold_labels(axes: Axes) -> None:
     axes.set_ylabel("prompts that reach it")
 
 
-# --- rejection sampling
-
-
-def limits(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
-    """For each model and limit of retries, the share of prompts by threshold; None if none was checked."""
-    found = retries.checked(runs)
-    if not found:
-        return None
-    columns = {1: 1, 2: 2, 4: 2}.get(len(found), 3 if len(found) <= MOST_COLOURS else 5)
-    rows = math.ceil(len(found) / columns)
+def limits(curves: Mapping[str, Mapping[int, Points]]) -> Figure:
+    """For each model and limit of retries, the share of prompts by threshold."""
+    columns = {1: 1, 2: 2, 4: 2}.get(len(curves), 3 if len(curves) <= MOST_COLOURS else 5)
+    rows = math.ceil(len(curves) / columns)
     figure = new_figure(WIDE if columns > 1 else NARROW, 1.75 * rows + 0.55)
     all_axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     _threshold_axes(all_axes[0, 0])
-    for number, axes in enumerate(all_axes.flat):
-        if number >= len(found):
-            axes.set_visible(False)
-            continue
-        name, prompts = found[number]
-        for at, (limit, points) in enumerate(retries.curves(prompts).items()):
-            label = "no retry" if limit == 0 else f"{limit} retries"
-            _steps(
-                axes,
-                points,
-                color=look.ink if limit == 0 else look.colour(at - 1),
+    for axes in all_axes.flat[len(curves) :]:
+        axes.set_visible(False)
+    for axes, (name, of_limits) in zip(all_axes.flat, curves.items(), strict=False):
+        for at, (limit, points) in enumerate(of_limits.items()):
+            axes.plot(
+                *zip(*_steps(points), strict=True),
+                color=COLOURS[at - 1] if at else INK,
                 linestyle=DASHES[at % len(DASHES)],
-                linewidth=1.0 if limit == 0 else 1.3,
-                label=label if number == 0 else None,
+                linewidth=1.3 if at else 1.0,
+                label=f"{limit} retries" if limit else "no retry",
+                drawstyle="steps-post",
+                clip_on=False,
             )
         _threshold_labels(axes)
         axes.set_title(brief(name), loc="left")
@@ -272,43 +236,90 @@ def limits(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
     return figure
 
 
-def at_the_limit(runs: Sequence[JudgedRun], look: Look) -> Figure | None:
-    """The share of programs that the check accepts by number of retries; None if none was checked."""
-    found = retries.checked(runs)
-    if not found:
-        return None
-    columns = _legend_columns([name for name, _ in found])
-    width = NARROW if len(found) <= MOST_COLOURS else WIDE
-    figure = new_figure(width, 2.6 + 0.13 * math.ceil(len(found) / columns))
-    axes = figure.add_subplot()
-    shares = [(name, retries.accepted(prompts)) for name, prompts in found]
-    best = sorted(range(len(shares)), key=lambda i: (-shares[i][1][-1], i))[:MOST_COLOURS]
-    for number, (name, share) in enumerate(shares):
-        if number in best:
-            colour = number if len(shares) <= MOST_COLOURS else best.index(number)
-            axes.plot(
-                retries.STEPS,
-                share,
-                color=look.colour(colour),
-                linestyle=DASHES[colour % len(DASHES)],
-                marker=MARKERS[colour % len(MARKERS)],
-                markersize=3.2,
-                markevery=[*LIMITS],
-                label=brief(name),
-                clip_on=False,
-            )
-        else:
-            axes.plot(retries.STEPS, share, color=look.faint, linewidth=0.7, zorder=1)
-    if len(shares) > MOST_COLOURS:
-        axes.plot([], [], color=look.faint, linewidth=0.7, label=f"{len(shares) - MOST_COLOURS} others")
-    axes.set_xscale("symlog", linthresh=1)
-    axes.set_xlim(0, LIMITS[-1])
-    axes.set_xticks([*LIMITS], [str(limit) for limit in LIMITS])
-    axes.minorticks_off()
-    share_axis(axes)
-    axes.set_xlabel("retries at most")
-    axes.set_ylabel("programs that are accepted")
-    figure.legend(
-        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=columns, handlelength=3.2
-    )
+# --- tables of shares
+
+
+def heat(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) -> None:
+    """Draw a table of shares: the more, the more colour; with numbers where there is room for them.
+
+    Args:
+        axes: on which.
+        cells: by row; None where there is none.
+        rows: their names.
+        columns: their names.
+    """
+    shown = np.ma.masked_invalid(np.array(cells, dtype=float))
+    axes.pcolormesh(shown, cmap=shades(), vmin=0, vmax=1, edgecolors=PAPER, linewidth=0.6)
+    axes.invert_yaxis()
+    middles = [at + 0.5 for at in range(max(len(rows), len(columns)))]
+    axes.set_xticks(middles[: len(columns)], columns, rotation=38, ha="right", rotation_mode="anchor")
+    axes.set_yticks(middles[: len(rows)], rows)
+    axes.tick_params(length=0)
+    axes.spines[:].set_color(FAINT)
+    axes.spines[:].set_visible(True)
+    if len(columns) > MOST_NUMBERS:
+        return
+    for y, shares in zip(middles, cells, strict=False):
+        for x, share in zip(middles, shares, strict=False):
+            if share is not None:
+                colour = QUIET if share == 0 else INK if share < DARK_FROM else WHITE
+                axes.text(x, y, _percent(share), ha="center", va="center", color=colour, fontsize=6)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f}" if share == 0 or share >= 0.01 else "<1"  # noqa: PLR2004 - one in a hundred
+
+
+def causes(found: Sequence[tuple[str, Causes]]) -> Figure:
+    """How completions end, by class, and by the kinds of each class."""
+    kinds = {name: kinds_in_order([one for _, one in found], name) for name in CLASSES}
+    tallest = max(3, *map(len, kinds.values()))
+    many = len(found) > MOST_NUMBERS
+    longest = 0 if many else max(len(brief(name, 18)) for name, _ in found)
+    # Names of models stand aslant below the panels.
+    below = 0.95 + (0.13 * len(found) if many else 0.155 * tallest) + 0.04 * max(0, longest - 8)
+    heights = [1.05 + 0.2 * len(found), below]
+    figure = new_figure(WIDE, sum(heights))
+    upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
+    axes = upper.add_subplot()
+    _classes(axes, found)
+    upper.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=4, handlelength=1.4)
+    panels = lower.subplots(1, len(CLASSES), squeeze=False, sharey=many)[0]
+    for axes, letter, (name, one) in zip(panels, "bcdefgh", CLASSES.items(), strict=False):
+        axes.set_title(f"({letter}) {one.plural}", loc="left")
+        _kinds(axes, found, name, kinds[name], many=many)
     return figure
+
+
+def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
+    axes.set_title("(a) how completions end", loc="left")
+    left = np.zeros(len(found))
+    places = range(len(found))
+    colours = (FAINT, *(COLOURS[at] for at in (1, 0, 3)))
+    hatches = ("", "", "////", "\\\\\\\\")
+    for name, colour, hatch in zip((PASSED, *CLASSES), colours, hatches, strict=True):
+        shares = np.array([one.classes.get(name, 0.0) for _, one in found])
+        style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.4}
+        axes.barh(places, shares, 0.72, left=left, label=label_of(name), **style)
+        left = left + shares
+    axes.set_yticks(places, [brief(name, 34) for name, _ in found])
+    axes.set_ylim(len(found) - 0.5, -0.5)
+    axes.tick_params(axis="y", length=0)
+    share_axis(axes, along="x")
+
+
+def _kinds(
+    axes: Axes, found: Sequence[tuple[str, Causes]], of: str, kinds: Sequence[str], *, many: bool
+) -> None:
+    there = [(brief(name, 18), one.kinds.get(of, {})) for name, one in found if many or one.kinds.get(of)]
+    if not kinds:
+        axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        return
+    cells = [[shares.get(kind, 0.0) if shares else None for kind in kinds] for _, shares in there]
+    names, labels = [name for name, _ in there], [brief(kind, 24) for kind in kinds]
+    if many:
+        heat(axes, cells, names, labels)
+    else:
+        heat(axes, [*zip(*cells, strict=True)], labels, names)

@@ -11,9 +11,8 @@ from pathlib import Path
 
 from roboeval.analysis.cluster import Cluster
 from roboeval.evaluation.completions import name_of
-from roboeval.report.contents import Code, Part, Picture, Prose, Section
-from roboeval.report.failures import Failures, Shown
-from roboeval.report.sheets import Cell, Column, Sheet, told
+from roboeval.evaluation.failures import label_of
+from roboeval.report.sheets import Cell, Code, Column, Groups, Part, Picture, Prose, Section, Sheet, told
 
 WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
 LONG = 24  # rows from which a table is folded
@@ -82,8 +81,8 @@ def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
             return "".join(f"<p>{_text(words)}</p>\n" for words in paragraphs)
         case Code(text):
             return f"<pre>{_text(text)}</pre>\n"
-        case Failures():
-            return f'<div class="clusters">{"".join(map(_cluster, part.shown))}</div>\n'
+        case Groups(shown):
+            return f'<div class="clusters">{"".join(_cluster(*one) for one in shown)}</div>\n'
 
 
 # --- figures
@@ -111,7 +110,7 @@ def _data(svg: bytes) -> str:
 
 
 def _table(sheet: Sheet) -> str:
-    heads = "".join(f'<th scope="col" class="{c.kind}">{_text(c.head)}</th>' for c in sheet.columns)
+    heads = "".join(f'<th scope="col" class="{_css(c)}">{_text(c.head)}</th>' for c in sheet.columns)
     rows = "".join(_row(row, sheet.columns) for row in sheet.rows)
     title = f"{_text(sheet.title)}"
     about = f"<p>{_text(sheet.about)}</p>" if sheet.about else ""
@@ -133,6 +132,10 @@ BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")
 """Where a long name may go on in the next line."""
 
 
+def _css(column: Column) -> str:
+    return "text" if column.kind == "class" else column.kind
+
+
 def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
     cells = []
     for number, (cell, column) in enumerate(zip(row, columns, strict=True)):
@@ -141,23 +144,22 @@ def _row(row: Iterable[Cell], columns: Sequence[Column]) -> str:
         is_head = number == 0 and column.kind == "text"
         tag = 'th scope="row"' if is_head else "td"
         long = " long" if isinstance(cell, str) and len(cell) > LONG_TEXT else ""
-        cells.append(f'<{tag} class="{column.kind}{long}"{sort}>{words}</{"th" if is_head else "td"}>')
+        cells.append(f'<{tag} class="{_css(column)}{long}"{sort}>{words}</{"th" if is_head else "td"}>')
     return f"<tr>{''.join(cells)}</tr>"
 
 
 # --- groups of failures
 
 
-def _cluster(shown: Shown) -> str:
-    cluster = shown.cluster
-    kind = f"{cluster.failure['class']}: {cluster.failure['kind']}"
+def _cluster(model: str, cluster: Cluster) -> str:
+    kind = f"{label_of(cluster.failure['class'])}: {cluster.failure['kind']}"
     size = len(cluster.members)
-    data = {"model": shown.model, "task": cluster.task, "kind": kind, "size": str(size)}
+    data = {"model": model, "task": cluster.task, "kind": kind, "size": str(size)}
     attributes = "".join(f' data-{name}="{_text(value)}"' for name, value in data.items())
     check = cluster.failure["check"]
     why = f"{check}: {cluster.why}" if check else cluster.why
     return (
-        f'<details class="cluster"{attributes}><summary><b>{size:,}</b><span>{_text(shown.model)}, '
+        f'<details class="cluster"{attributes}><summary><b>{size:,}</b><span>{_text(model)}, '
         f'{_text(cluster.task)}, {_text(kind)}<br><span class="why">{_text(_cut(why, WORDS))}</span></span>'
         f'</summary><div class="inside">{_inside(cluster)}</div></details>\n'
     )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from roboeval.report.reading import JudgedRun
-from roboeval.suites.load import Suite
+from roboeval.analysis.summary import Causes
+from roboeval.report.runs import JudgedRun
+from roboeval.report.sheets import Cell, Sheet, sheet
 
 SUITE = "paper"
 NAMES: Mapping[str, tuple[str, ...]] = {
@@ -27,21 +28,6 @@ SHORT: Mapping[str, tuple[str, ...]] = {
     "StarCoder": ("starcoder",),
 }
 """What the paper calls them. Where a provider is named this may be another model, such as a smaller one."""
-
-CLASSES = {
-    "PythonError": ("Python Error", "python_error"),
-    "RobotExecutionError": ("Robot Execution Error", "execution_error"),
-    "TaskCompletionError": ("Task Completion Error", "completion_error"),
-}
-KINDS = {
-    "Manipulation at Location": "ManipulationAtLocation",
-    "Event Ordering": "EventOrdering",
-    "Correct Initial/Terminal": "InitialTerminal",
-    "Exhaustive Search": "ExhaustiveSearch",
-    "Ask Statement at Location": "AskAtLocation",
-    "Say Statement at Location": "SayAtLocation",
-    "Check Entity Statements at Location": "CheckEntityAtLocation",
-}
 
 OTHER_PHRASINGS = (
     "Published numbers are means over the authors' own five prompts of a task. The suite's instructions are "
@@ -84,12 +70,12 @@ def taken_for(runs: Iterable[JudgedRun]) -> list[str]:
     return [f"By their names, these are taken for models of the paper: {those}."] if named else []
 
 
-def is_of_authors_prompts(run: JudgedRun, suite: Suite) -> bool:
+def is_of_authors_prompts(run: JudgedRun) -> bool:
     """Whether completions were written for the authors' own prompts.
 
     They come from elsewhere, so that run.json names no settings, and none names an instruction of the suite.
     """
-    ours = {prompt for task in suite.tasks.values() for prompt in task.prompts}
+    ours = {prompt for task in run.suite.tasks.values() for prompt in task.prompts}
     return "settings" not in run.results.about and not ours & {*run.instructions.values()}
 
 
@@ -105,24 +91,39 @@ def task_mean(model: str, task: str) -> float | None:
     return None if rows is None else sum(row[_column(model)] for row in rows) / len(rows)
 
 
-def overall_mean(model: str, tasks: list[str]) -> float | None:
+def overall_mean(model: str, tasks: Sequence[str]) -> float | None:
     """The mean of the published pass@1 over the prompts of some tasks; None if one was not published."""
-    means = [task_mean(model, task) for task in tasks]
-    known = [mean for mean in means if mean is not None]
-    return sum(known) / len(known) if means and len(known) == len(means) else None
+    means = [mean for task in tasks if (mean := task_mean(model, task)) is not None]
+    return sum(means) / len(means) if means and len(means) == len(tasks) else None
 
 
-def class_share(model: str, failure_class: str | None) -> float:
-    """The published share of completions that succeed (None) or fail by a class."""
-    name = "Successful Completion" if failure_class is None else CLASSES[failure_class][0]
-    return float(published()["failure_breakdown_percent"]["overall_error"][name][_column(model)]) / 100
-
-
-def kind_shares(model: str, failure_class: str) -> dict[str, float]:
-    """The published shares of kinds among the failures of a class."""
-    kinds = published()["failure_breakdown_percent"][CLASSES[failure_class][1]]
-    return {KINDS.get(kind, kind): shares[_column(model)] / 100 for kind, shares in kinds.items()}
+def causes(model: str) -> Causes:
+    """How completions of a model ended, as published."""
+    at, classes, kinds = _column(model), published()["classes"], published()["kinds"]
+    return Causes(
+        {name: shares[at] / 100 for name, shares in classes.items()},
+        {name: {kind: n[at] / 100 for kind, n in of.items() if n[at]} for name, of in kinds.items()},
+        {},
+    )
 
 
 def _column(model: str) -> int:
     return int(published()["models"].index(model))
+
+
+def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
+    """Means of tasks beside the published ones, of runs that name a model of the paper."""
+    known = [(run, model) for run in runs if (model := model_of(run)) is not None]
+    rows: list[list[Cell]] = []
+    for run, model in known:
+        means = {score.task: score.pass_at(1).mean for score in run.scores}
+        here = sum(run.by_prompt.values()) / len(run.by_prompt)
+        pairs = [(task, mean, task_mean(model, task)) for task, mean in means.items()]
+        pairs.append(("all of these", here, overall_mean(model, [*means])))
+        rows += [
+            [task, run.name, ours, theirs, None if theirs is None else ours - theirs]
+            for task, ours, theirs in pairs
+        ]
+    are_theirs = all(is_of_authors_prompts(run) for run, _ in known)
+    notes = [*taken_for(runs), *([] if are_theirs else [OTHER_PHRASINGS]), TWO_SUMS]
+    return sheet("published", rows, notes=notes)

@@ -1,27 +1,32 @@
-"""Tables of a report: the same rows stand on the page and in a CSV file."""
+"""What the page of a report consists of: tables, which stand in CSV files as well, figures and texts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import count
 from pathlib import Path
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import polars as pl
+import yaml
+from matplotlib.figure import Figure
 
+from codebotler.badinput import Loader
+from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.export import write
+from roboeval.evaluation.failures import label_of
 
-Kind: TypeAlias = Literal["text", "share", "difference", "count", "number"]
+Kind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number"]
 Cell: TypeAlias = str | int | float | None
 
-TYPES: dict[Kind, type[pl.DataType]] = {
-    "text": pl.String,
-    "share": pl.Float64,
-    "difference": pl.Float64,
-    "count": pl.Int64,
-    "number": pl.Float64,
-}
+
+@cache
+def words() -> dict[str, dict[str, Any]]:
+    """What page.yaml says of sections, figures and tables, by their names."""
+    text = Path(__file__).with_name("page.yaml").read_text()
+    return yaml.load(text, Loader)  # type: ignore[no-any-return]  # noqa: S506 - a safe one
 
 
 class Column(NamedTuple):
@@ -29,7 +34,8 @@ class Column(NamedTuple):
 
     Args:
         head: its name, which may be that of a model.
-        kind: what stands in it: a text, a share from 0 to 1, a difference of shares, a whole number, or any.
+        kind: what stands in it: a text, a class of failures, a share from 0 to 1, a difference of shares, a
+            whole number, or any.
     """
 
     head: str
@@ -41,34 +47,114 @@ class Sheet:
     """A table.
 
     Args:
-        name: of its file, without the ending.
-        title: what it is called on the page.
+        name: of its file, without the ending, and in page.yaml.
         columns: at least one.
         rows: a cell for each column; None where there is nothing to say.
-        about: what the numbers are, in sentences.
         notes: what else a reader must know, such as where a published number does not fit.
     """
 
     name: str
-    title: str
-    columns: tuple[Column, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    about: str = ""
-    notes: tuple[str, ...] = ()
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Any]]
+    notes: Sequence[str] = ()
+
+    @property
+    def title(self) -> str:
+        """What it is called on the page."""
+        return str(words()["tables"][self.name]["title"])
+
+    @property
+    def about(self) -> str:
+        """What the numbers are, in sentences."""
+        return str(words()["tables"][self.name].get("about", ""))
 
 
 def sheet(
-    name: str,
-    title: str,
-    columns: Sequence[Column | str],
-    rows: Sequence[Sequence[Cell]],
-    *,
-    about: str = "",
-    notes: Sequence[str] = (),
+    name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """A table; a column that is only named holds text."""
-    named = tuple(Column(c) if isinstance(c, str) else c for c in columns)
-    return Sheet(name, title, named, tuple(map(tuple, rows)), about, tuple(notes))
+    """A table that page.yaml describes.
+
+    Args:
+        name: of the table.
+        rows: a cell for each column.
+        notes: what else a reader must know.
+        shares: the heads of further columns, such as the names of models.
+    """
+    kinds = words()["tables"][name]["columns"]
+    columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
+    return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure.
+
+    Args:
+        name: of its files, without the ending, and in page.yaml.
+        draw: draws it.
+    """
+
+    name: str
+    draw: Callable[[], Figure]
+
+    @property
+    def caption(self) -> str:
+        """What it shows, in sentences."""
+        return str(words()["figures"][self.name])
+
+
+@dataclass(frozen=True)
+class Prose:
+    """Paragraphs of plain text."""
+
+    paragraphs: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Code:
+    """A text whose lines and spaces count, such as a command."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Groups:
+    """Groups of failures, each with the name of its run."""
+
+    shown: Sequence[tuple[str, Cluster]]
+
+
+Part: TypeAlias = Sheet | Picture | Prose | Code | Groups
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the page.
+
+    Args:
+        name: by which links find it, and page.yaml its title.
+        parts: in their order.
+    """
+
+    name: str
+    parts: Sequence[Part]
+
+    @property
+    def title(self) -> str:
+        """Its heading."""
+        return str(words()["sections"][self.name])
+
+
+def section(name: str, *parts: Part) -> Section:
+    """A section of those parts that are not empty."""
+    return Section(name, [part for part in parts if not _is_empty(part)])
+
+
+def _is_empty(part: Part) -> bool:
+    match part:
+        case Sheet(rows=content) | Prose(content) | Groups(content):
+            return not content
+    return False
 
 
 def write_csv(table: Sheet, folder: Path) -> None:
@@ -77,38 +163,31 @@ def write_csv(table: Sheet, folder: Path) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    kinds = [TYPES[column.kind] for column in table.columns]
+    types = {"text": pl.String, "class": pl.String, "count": pl.Int64}
+    kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))
-    rows = [
-        [_plain(cell, column.kind) for cell, column in zip(row, table.columns, strict=True)]
-        for row in table.rows
-    ]
-    write(pl.DataFrame(rows, schema=schema, orient="row"), folder / f"{table.name}.csv", "csv")
+    rows = [list(map(_plain, row)) for row in table.rows]
+    write(pl.DataFrame(rows, schema=schema, orient="row", strict=False), folder / f"{table.name}.csv", "csv")
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:
     """The heads, with a number behind those that others have, such as that of a model named `task`."""
     heads: list[str] = []
     for column in columns:
-        plain = head = _head(column.head)
-        for number in count(2):
-            if head not in heads:
-                break
-            head = f"{plain} #{number}"
-        heads.append(head)
+        plain = _head(column.head)
+        others = (f"{plain} #{number}" for number in count(2))
+        heads.append(plain if plain not in heads else next(head for head in others if head not in heads))
     return heads
 
 
 def _head(head: str) -> str:
     """A head that no spreadsheet takes for a formula, as `write` does it for cells."""
-    plain = head.encode(errors="backslashreplace").decode()
+    plain = str(_plain(head))
     return f"'{plain}" if plain.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else plain
 
 
-def _plain(cell: Cell, kind: Kind) -> Cell:
-    if isinstance(cell, str):
-        return cell.encode(errors="backslashreplace").decode()
-    return float(cell) if cell is not None and kind not in {"text", "count"} else cell
+def _plain(cell: Cell) -> Cell:
+    return cell.encode(errors="backslashreplace").decode() if isinstance(cell, str) else cell
 
 
 def told(cell: Cell, kind: Kind) -> str:
@@ -116,7 +195,7 @@ def told(cell: Cell, kind: Kind) -> str:
     if cell is None:
         return "-"
     if isinstance(cell, str):
-        return cell
+        return label_of(cell) if kind == "class" else cell
     match kind:
         case "share":
             return f"{cell:.3f}"

@@ -1,28 +1,130 @@
-"""Writes a report: figures as PNG and PDF, tables as CSV, and the page."""
+"""Puts a report together, and writes it: figures as PNG and PDF, tables as CSV, and the page."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 from codebotler.badinput import BadInput
 from codebotler.files import write_whole
-from roboeval.report.contents import Picture, Section
-from roboeval.report.drawing import DARK, LIGHT, looking, written
+from roboeval.analysis.cost import Price
+from roboeval.evaluation.completions import how_many
+from roboeval.report import breakdown, cost, failures, scores
+from roboeval.report.drawing import darkened, styled, written
 from roboeval.report.page import GENERATOR, Drawn, page
-from roboeval.report.sheets import Sheet, write_csv
+from roboeval.report.runs import JudgedRun
+from roboeval.report.sheets import (
+    Cell,
+    Code,
+    Picture,
+    Prose,
+    Section,
+    Sheet,
+    section,
+    sheet,
+    words,
+    write_csv,
+)
 
 FORMATS = ("png", "pdf")
 PARTS = ("figures", "tables")
 PAGE = "index.html"
 UNFINISHED = ("This report is not finished; give the command again that writes it.",)
 HEAD = 4_000  # characters at the beginning of a page, in which it says what it is
-OPTIONAL = {
-    *("abilities", "accepted", "beside", "beside-tasks", "budget", "coming-back", "cost", "differences"),
-    *("failures", "published", "rejection-sampling", "rejection-sampling-curves", "reversals"),
-}
-"""Figures and tables that not every report has."""
+
+
+def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
+    """The title of a page, and the paragraphs below it.
+
+    Args:
+        runs: at least one.
+    """
+    title = runs[0].name if len(runs) == 1 else f"{len(runs)} models"
+    count = how_many(sum(run.completions.height for run in runs))
+    by_hand = [run.name for run in runs if (run.model or "").startswith("recorded:")]
+    suite = runs[0].suite
+    lead = [f"{count}, judged by the suite \u201c{suite.name}\u201d: {suite.about}."]
+    if by_hand:
+        lead.append(f"Programs of {', '.join(by_hand)} were written by hand, and stand for no model.")
+    return f"Robot programs by {title}", lead
+
+
+def sections(
+    runs: Sequence[JudgedRun],
+    *,
+    with_published: bool = False,
+    prices: Mapping[str, Price] = {},
+    command: str = "",
+) -> list[Section]:
+    """All sections of a report.
+
+    Args:
+        runs: judged by the same suite, named apart, at least one.
+        with_published: whether the published causes of failures stand beside ours.
+        prices: by model.
+        command: that makes the report.
+    """
+    found = [
+        scores.results(runs),
+        scores.differences(runs),
+        failures.beside(runs),
+        scores.thresholds(runs),
+        failures.why(runs, with_published=with_published),
+        failures.alike(runs),
+        breakdown.abilities(runs),
+        breakdown.phrasings(runs),
+        cost.rejection_sampling(runs),
+        cost.costs(runs, prices),
+        scores.prompts(runs),
+        origin(runs, command),
+    ]
+    return [section for section in found if section.parts]
+
+
+def origin(runs: Sequence[JudgedRun], command: str) -> Section:
+    """Where a report comes from: what was judged, by what, and the command that makes it again."""
+    parts = origin_sheet(runs), Prose(about_suite(runs)), Code(command)
+    return section("origin", *parts)
+
+
+def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
+    """How each run came about."""
+    rows: list[list[Cell]] = []
+    for run in runs:
+        about, head = run.results.about, run.results.head
+        asked = [
+            _settings(about.get("settings")),
+            *map(_text, (about.get("template"), about.get("codebotler"))),
+        ]
+        judged = [_text(head.get(name)) for name in ("codebotler", "python", "digest")]
+        rows.append([run.name, run.folder, run.completions.height, *asked, *judged])
+    return sheet("runs", rows)
+
+
+def _settings(settings: object) -> str:
+    if not isinstance(settings, dict):
+        return "not recorded"
+    return ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
+
+
+def _text(value: object) -> str:
+    return "not recorded" if value is None else str(value)
+
+
+def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
+    """By what was judged, in sentences."""
+    head = runs[0].results.head
+    version, digest = head.get("version"), head.get("digest")
+    return (
+        f'Judged by the suite "{runs[0].suite.name}", version {version}, content {digest}.',
+        f"Its rules: {json.dumps(head.get('rules'), ensure_ascii=False)}.",
+        "The same runs give the same bytes with the same versions of codebotler and matplotlib:",
+    )
+
+
+# --- files
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
@@ -56,13 +158,12 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
                 write_csv(part, out / "tables")
                 yield part.name
             case Picture():
-                found = _draw(part, out / "figures")
-                drawn |= {} if found is None else {part.name: found}
+                drawn[part.name] = _draw(part, out / "figures")
                 yield part.name
             case _:
                 pass
     write_whole(out / PAGE, page(title, lead, sections, drawn).encode())
-    _forget_others(out, {*drawn, *(part.name for part in parts if isinstance(part, Sheet))})
+    _forget_others(out, {part.name for part in parts if isinstance(part, Sheet | Picture)})
     yield "page"
 
 
@@ -93,7 +194,7 @@ def _is_report(page_file: Path) -> bool:
 
 def _forget_others(out: Path, names: AbstractSet[str]) -> None:
     """Remove what an earlier report wrote here that this one has not, such as rejection sampling."""
-    for name in OPTIONAL - names:
+    for name in {*words()["figures"], *words()["tables"]} - names:
         for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
             (out / file).unlink(missing_ok=True)
 
@@ -103,16 +204,11 @@ def pieces(sections: Sequence[Section]) -> int:
     return 1 + sum(isinstance(part, Sheet | Picture) for section in sections for part in section.parts)
 
 
-def _draw(picture: Picture, folder: Path) -> Drawn | None:
-    """Draw a figure, write it, and give it for the page; None if there is nothing to draw."""
-    with looking(LIGHT):
-        figure = picture.draw(LIGHT)
-        if figure is None:
-            return None
+def _draw(picture: Picture, folder: Path) -> Drawn:
+    """Draw a figure, write it, and give it for the page."""
+    with styled():
+        figure = picture.draw()
         for kind in FORMATS:
             write_whole(folder / f"{picture.name}.{kind}", written(figure, kind))
         light = written(figure, "svg")
-    with looking(DARK):
-        dark = picture.draw(DARK)
-        assert dark is not None
-        return light, written(dark, "svg")
+    return light, darkened(light)

@@ -23,31 +23,18 @@ class JudgedRun:
     """A run with its verdicts.
 
     Args:
+        results: by a suite that is at hand.
+        table: of the results; `accepted` is null where programs were not checked.
+        ablated: what is required by common sense only; None where that was not judged.
+        beside: as another suite judges it; None where that was not asked for.
         name: as figures and tables call it; no two runs of a report share it.
-        results: of the run, by a suite that is at hand.
-        table: of the results; `accepted` is null where rejection sampling is left out.
-        ablated: what is required by common sense only; None where nobody judged that.
-        beside: as another suite judges it; None where nobody asked for that.
     """
 
-    name: str
     results: Results
     table: pl.DataFrame
     ablated: Results | None = None
     beside: Results | None = None
-
-    @classmethod
-    def of(
-        cls,
-        results: Results,
-        *,
-        table: pl.DataFrame,
-        ablated: Results | None = None,
-        beside: Results | None = None,
-    ) -> JudgedRun:
-        """A run that is named by its model or, where there is no single one, by its folder."""
-        unnamed = cls("", results, table, ablated, beside)
-        return replace(unnamed, name=_readable(unnamed.model or unnamed.folder))
+    name: str = ""
 
     @property
     def suite(self) -> Suite:
@@ -60,16 +47,15 @@ class JudgedRun:
         """The name of its folder."""
         return self.results.run.path.resolve().name
 
-    @property
-    def model(self) -> str | None:
-        """Who wrote the completions; None where nobody recorded it, or several wrote them."""
-        models = self.completions["model"].unique()
-        return models[0] if len(models) == 1 else None
-
-    @property
+    @cached_property
     def is_mixed(self) -> bool:
         """Whether several models wrote the completions."""
-        return self.completions["model"].n_unique() > 1
+        return self.table["model"].n_unique() > 1
+
+    @property
+    def model(self) -> str | None:
+        """Who wrote the completions; None where that was not recorded, or several did."""
+        return None if self.is_mixed else self.table["model"][0]
 
     @cached_property
     def completions(self) -> pl.DataFrame:
@@ -91,14 +77,14 @@ class JudgedRun:
         """pass@1 of each prompt."""
         return {(p.task, p.prompt): p.pass_at(1) for score in self.scores for p in score.prompts}
 
-    @cached_property
+    @property
     def by_task(self) -> dict[str, list[float]]:
         """pass@1 of the prompts of each task."""
         return {score.task: [p.pass_at(1) for p in score.prompts] for score in self.scores}
 
     @cached_property
     def instructions(self) -> Mapping[tuple[str, int], str]:
-        """What the model was told for each prompt, where that was recorded."""
+        """The text that the model was given for each prompt, where that was recorded."""
         completions = self.results.completions.items()
         return {key[:2]: one.instruction for key, one in completions if one.instruction is not None}
 
@@ -108,18 +94,25 @@ class JudgedRun:
         return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
 
 
+def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
+    """The tasks of which some run has completions, in the order of the suite."""
+    there = {score.task for run in runs for score in run.scores}
+    return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(there)]) if task in there]
+
+
+def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
+    """The same runs, each named by its model or, where that does not tell it apart, by its folder too."""
+    plain = [_readable(run.model or run.folder) for run in runs]
+    names = _apart(plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)])
+    while len({*names}) < len(names):
+        names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
+    return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
+
+
 def _readable(name: str) -> str:
     """A name as text that a line holds: its beginning and its end, by which names are told apart."""
     name = visible(name)
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 30]}…{name[-29:]}"
-
-
-def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
-    """The same runs, named so that no two share a name: by folder too where the model does not tell."""
-    names = _apart([run.name for run in runs], [f"{run.name} ({run.folder})" for run in runs])
-    while len({*names}) < len(names):
-        names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
-    return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
 
 
 def _apart(names: Sequence[str], longer: Sequence[str]) -> list[str]:

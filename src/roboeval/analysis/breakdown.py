@@ -1,0 +1,140 @@
+"""What makes a difference to models: abilities that tasks take, coming back to report, and phrasing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import polars as pl
+
+from codebotler.simulator.robot import resolve_room
+from roboeval.analysis.metrics import Estimate, completions_of, prompt_scores, task_scores
+from roboeval.analysis.statistics import by_formula
+from roboeval.analysis.summary import failures
+from roboeval.evaluation.results import Results
+from roboeval.evaluation.rows import RowData
+from roboeval.suites.load import Suite
+
+REPORTS = "report-back"
+LOST = "GoToInvalidLocation"
+
+
+def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Estimate, Mapping[str, float]]]:
+    """How programs do, by the abilities that tasks take (paper, section V.B).
+
+    Args:
+        table: as `load_results` gives it.
+        suite: whose tasks say what they take.
+
+    Yields:
+        an ability, how many of the judged tasks take it, their pass@1 with its interval over tasks, and the
+        share of their completions that fail, by class.
+    """
+    for ability in dict.fromkeys(ability for task in suite.tasks.values() for ability in task.abilities):
+        tasks = [name for name, task in suite.tasks.items() if ability in task.abilities]
+        those = table.filter(pl.col("task").is_in(tasks))
+        if not those.is_empty():
+            scores = [[prompt.pass_at(1) for prompt in score.prompts] for score in task_scores(those, tasks)]
+            yield ability, len(scores), by_formula(scores), {one.name: one.share for one in failures(those)}
+
+
+def coming_back(results: Results) -> pl.DataFrame:
+    """How programs do in tasks with "come back and tell me", and in the others (paper, section V.B).
+
+    Args:
+        results: by a suite that is at hand.
+
+    Returns:
+        two rows, or one where all tasks are of one kind, or none where no task asks for a report: whether
+        the tasks end with `reports`, how many `completions` there are, their `pass@1`, how many `failed`,
+        and of these how many left the room where they started and `never_returned`, and how many went to a
+        room that does not exist (`lost`).
+    """
+    suite = results.suite
+    assert suite is not None, "its tasks say which ask for a report"
+    reports = pl.col("task").is_in([name for name, task in suite.tasks.items() if REPORTS in task.abilities])
+    table = results.table.with_columns(reports=reports)
+    scores = prompt_scores(table).group_by(reports=reports).agg("pass@1")
+    away = [key for key, row in results.failed.items() if never_returned(row, suite)]
+    keys = ["task", "prompt", "index"]
+    gone = pl.DataFrame(away, schema={name: table.schema[name] for name in keys}, orient="row")
+    found = (
+        completions_of(table)
+        .join(gone.with_columns(away=True), on=keys, how="left")
+        .group_by("reports")
+        .agg(
+            completions=pl.len(),
+            failed=(~pl.col("passed")).sum(),
+            never_returned=pl.col("away").sum(),
+            lost=(pl.col("failure_kind") == LOST).sum(),
+        )
+        .join(scores.with_columns(pl.col("pass@1").list.mean()), on="reports")
+        .sort("reports", descending=True)
+    )
+    return found.filter(pl.col("reports").any())
+
+
+def never_returned(row: RowData, suite: Suite) -> bool:
+    """Whether, in the world that decided, the robot left the room where it started and never went back.
+
+    Args:
+        row: of a completion that failed.
+        suite: whose worlds have the rooms; where it has the world no more, the answer is no, as it is where
+            the trace was too long to be kept.
+    """
+    task = suite.tasks.get(row["task"])
+    number = row["failure"]["world"]
+    scenarios = () if task is None else task.scenarios
+    if number >= len(scenarios) or "cut" in row["verdicts"][number]:
+        return False
+    world = scenarios[number].world
+    rooms = [room.name for room in world.rooms]
+    drives = [text for kind, text, *_ in row["verdicts"][number]["trace"] if kind == "goto"]
+    visited = [goal for text in drives if (goal := resolve_room(rooms, text)) is not None]
+    left = next((at for at, goal in enumerate(visited) if goal != world.robot), None)
+    return left is not None and world.robot not in visited[left:]
+
+
+def spread(table: pl.DataFrame) -> pl.DataFrame:
+    """How far the prompts of each task lie apart (paper, section V.A); tasks with one are left out.
+
+    Args:
+        table: as `load_results` gives it.
+
+    Returns:
+        `task`, `spread` of pass@1, `worst_prompt` with its pass@1 `worst`, `best_prompt` with its `best`; of
+        several prompts that do alike the first.
+    """
+    prompt, score = pl.col("prompt"), pl.col("pass@1")
+    return (
+        prompt_scores(table)
+        .sort("prompt", maintain_order=True)
+        .filter(pl.len().over("task") > 1)
+        .group_by("task", maintain_order=True)
+        .agg(
+            spread=score.max() - score.min(),
+            worst_prompt=prompt.get(score.arg_min()),
+            worst=score.min(),
+            best_prompt=prompt.get(score.arg_max()),
+            best=score.max(),
+        )
+    )
+
+
+def phrasing(scores: pl.DataFrame) -> pl.DataFrame:
+    """How each prompt does beside the others of its task (paper, section V.A).
+
+    Args:
+        scores: `model`, `task`, `prompt` and `pass@1` of one run or of several.
+
+    Returns:
+        `task`, `prompt`, by how much it does `better` than its task on average, how many of the `models` it
+        `hurts`; prompts that are alone in their task are left out.
+    """
+    several = scores.filter(pl.col("prompt").n_unique().over("task") > 1)
+    means = several.group_by("model", "task").agg("pass@1").with_columns(mean=pl.col("pass@1").list.mean())
+    better = pl.col("pass@1") - pl.col("mean")
+    return (
+        several.join(means.drop("pass@1"), on=["model", "task"], maintain_order="left")
+        .group_by("task", "prompt", maintain_order=True)
+        .agg(better=better.mean(), hurts=(better < 0).sum(), models=pl.len())
+    )

@@ -1,0 +1,122 @@
+"""What a program that passes costs: tokens, time and money, with and without rejection sampling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import polars as pl
+
+from roboeval.analysis.metrics import completions_of
+from roboeval.analysis.resample import LIMITS, CheckedPrompt, chances, trials_by_prompt
+
+MILLION = 1_000_000
+
+
+class Price(NamedTuple):
+    """What a million tokens of input and of output cost."""
+
+    input: float
+    output: float
+
+    def of_millions(self, input_tokens: float, output_tokens: float) -> float:
+        """What so many million tokens cost."""
+        return input_tokens * self.input + output_tokens * self.output
+
+
+class Spent(NamedTuple):
+    """What completions took, in all and for each that passes; None where it was not recorded of each."""
+
+    completions: int
+    passed: int
+    input_tokens: int | None
+    output_tokens: int | None
+    seconds: float | None
+    money: float | None
+    tokens_per_pass: float | None
+    seconds_per_pass: float | None
+    money_per_pass: float | None
+
+
+def spent(table: pl.DataFrame, price: Price | None = None) -> Spent:
+    """What the completions of a run took.
+
+    Args:
+        table: as `load_results` gives it.
+        price: of tokens.
+    """
+    took = completions_of(table)
+    passed = int(took["passed"].sum())
+    there, back = _tokens(took)
+    seconds = (not took["latency_s"].null_count() and math.fsum(took["latency_s"])) or None
+    tokens = None if there is None or back is None else there + back
+    money = (
+        None if price is None or there is None or back is None else price.of_millions(there, back) / MILLION
+    )
+    each = (_per(total, passed) for total in (tokens, seconds, money))
+    return Spent(took.height, passed, there, back, seconds, money, *each)
+
+
+def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
+    counts = completions.select("input_tokens", "output_tokens")
+    there, back = map(int, counts.sum().row(0))
+    return (None, None) if any(counts.null_count().row(0)) or not there + back else (there, back)
+
+
+class Budget(NamedTuple):
+    """What a budget gives where rejected programs are asked for again; None where that is not known.
+
+    Args:
+        retries: how often at most.
+        requests: that a program takes on average.
+        per_thousand_requests: how many programs that pass come of so many.
+        per_million_tokens: how many come of so many.
+        per_money: how many come of one unit of money.
+    """
+
+    retries: int
+    requests: float
+    per_thousand_requests: float
+    per_million_tokens: float | None
+    per_money: float | None
+
+
+def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LIMITS) -> Iterator[Budget]:
+    """What a budget gives, by limit of retries (paper, section VI).
+
+    Args:
+        table: as `load_results` gives it, of a run whose programs were all checked.
+        price: of tokens.
+        limits: of retries.
+    """
+    completions, prompts = completions_of(table), trials_by_prompt(table)
+    means = completions.group_by("task", "prompt").agg(pl.col("input_tokens", "output_tokens").mean())
+    tokens = {} if None in _tokens(completions) else {row[:2]: row[2:] for row in means.iter_rows()}
+    each = [tokens.get((prompt.task, prompt.prompt), (0.0, 0.0)) for prompt in prompts]
+    for retries in limits:
+        asked = [requests(prompt, retries) for prompt in prompts]
+        passed = sum(chances(prompt.trials, retries).passed for prompt in prompts)
+        there, back = (math.fsum(n * t[at] for n, t in zip(asked, each, strict=True)) for at in (0, 1))
+        yield Budget(
+            retries,
+            requests=sum(asked) / len(asked),
+            per_thousand_requests=1_000 * passed / sum(asked),
+            per_million_tokens=_per(MILLION * passed, there + back),
+            per_money=None if price is None else _per(MILLION * passed, price.of_millions(there, back)),
+        )
+
+
+def requests(prompt: CheckedPrompt, retries: int) -> float:
+    """How many requests a program of a prompt takes on average: until one is accepted, or none is left.
+
+    Args:
+        prompt: its completions, checked.
+        retries: how often a rejected one is asked for again.
+    """
+    rejected = sum(not trial.accepted for trial in prompt.trials) / len(prompt.trials)
+    return sum(rejected**n for n in range(retries + 1))
+
+
+def _per(total: float | None, count: float) -> float | None:
+    return None if total is None or not count else total / count

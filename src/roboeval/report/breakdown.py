@@ -1,0 +1,109 @@
+"""Which abilities models lack, whether their programs come back, and how much phrasing matters."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import polars as pl
+
+from roboeval.analysis.breakdown import by_ability, coming_back, phrasing, spread
+from roboeval.analysis.metrics import prompt_scores
+from roboeval.evaluation.failures import CLASSES
+from roboeval.report.runs import JudgedRun, tasks_of
+from roboeval.report.sheets import Cell, Prose, Section, Sheet, section, sheet
+
+NOT_RECORDED = "instruction not recorded"
+WITH_REPORT = "come back and report"
+MOST_WORDS = 12
+MOST_SENTENCES = 20
+
+
+def abilities(runs: Sequence[JudgedRun]) -> Section:
+    """What tasks take, and what programs lack (paper, section V.B)."""
+    back = coming_back_sheet(runs)
+    return section("abilities", ability_sheet(runs), Prose(coming_back_sentences(back)), back)
+
+
+def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
+    """pass@1 and causes by the abilities that tasks take."""
+    order: list[str] = [ability for task in runs[0].suite.tasks.values() for ability in task.abilities]
+    found = {(row[0], run.name): row[1:] for run in runs for row in by_ability(run.table, run.suite)}
+    rows: list[list[Cell]] = []
+    for ability, name in sorted(found, key=lambda key: order.index(key[0])):
+        tasks, at, failed = found[ability, name]
+        rows.append([ability, name, tasks, at.mean, at.low, at.high, *(failed[name] for name in CLASSES)])
+    return sheet("abilities", rows, shares=[one.plural for one in CLASSES.values()])
+
+
+def coming_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
+    """Tasks with a report against those without."""
+    rows: list[list[Cell]] = []
+    for run in runs:
+        for reports, completions, failed, away, lost, passed in coming_back(run.results).iter_rows():
+            shares = [n / failed if failed else None for n in (away, lost)]
+            tasks = WITH_REPORT if reports else "others"
+            rows.append([run.name, tasks, completions, passed, failed, away, shares[0], lost, shares[1]])
+    return sheet("coming-back", rows)
+
+
+def coming_back_sentences(table: Sheet) -> list[str]:
+    """The same in sentences, for tasks that end with a report."""
+    return [
+        f"Of {failed:,} failures of {name} in tasks that end with a report, {away:,} left and never came "
+        f"back, and {lost:,} went to a room that does not exist."
+        for name, tasks, _, _, failed, away, _, lost, _ in table.rows[:MOST_SENTENCES]
+        if tasks == WITH_REPORT and failed
+    ]
+
+
+# --- phrasing
+
+
+def phrasings(runs: Sequence[JudgedRun]) -> Section:
+    """How much the phrasing of an instruction matters (paper, section V.A)."""
+    return section("phrasing", spread_sheet(runs), phrasing_sheet(runs))
+
+
+def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
+    """For each task and run, how far its prompts lie apart, the widest first."""
+    order = tasks_of(runs)
+    found = [(run, row) for run in runs for row in spread(run.table).iter_rows()]
+    rows = []
+    for run, (task, width, *ends) in sorted(found, key=lambda pair: (-pair[1][1], order.index(pair[1][0]))):
+        texts = [run.instructions.get((task, prompt)) for prompt in (ends[0], ends[2])]
+        rows.append([task, run.name, width, *ends, *only(*texts)])
+    return sheet("spread", rows)
+
+
+def only(one: str | None, other: str | None) -> tuple[str, str]:
+    """The words that stand in one of two texts only, for both, in their order."""
+    if one is None or other is None:
+        return NOT_RECORDED, NOT_RECORDED
+    first, second = _words(one), _words(other)
+    return _listed([w for w in first if w not in second]), _listed([w for w in second if w not in first])
+
+
+def _words(text: str) -> list[str]:
+    """The different words of a text, in small letters."""
+    return list(dict.fromkeys(re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower())))
+
+
+def _listed(words: Sequence[str]) -> str:
+    more = len(words) - MOST_WORDS
+    return " ".join(words[:MOST_WORDS]) + (f" and {more} more" if more > 0 else "")
+
+
+def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
+    """For each prompt, how it does beside the others of its task, the one that hurts most first."""
+    order = tasks_of(runs)
+    scores = [prompt_scores(run.table).with_columns(model=pl.lit(at)) for at, run in enumerate(runs)]
+    found = phrasing(pl.concat(scores)).rows()
+    rows = sorted(found, key=lambda row: (row[2], order.index(row[0]), row[1]))
+    return sheet("phrasings", [[*row, _instructions(runs, row[:2])] for row in rows])
+
+
+def _instructions(runs: Sequence[JudgedRun], key: Any) -> str:  # noqa: ANN401 - of a table's row
+    found = {run.instructions.get(key) for run in runs} - {None}
+    return " / ".join(sorted(map(str, found))) or NOT_RECORDED
