@@ -372,7 +372,7 @@ def test_what_takes_too_long_to_judge_is_left_out_and_tried_again(
         "worlds: [{about: a, robot: hall, rooms: [hall], require: [speaks]}]\n"
     )
     suite = load_suite(str(tmp_path / "suite"))
-    slow, quick = (f"def task_program(): say({'a' * n!r})\n" for n in (18, 3))
+    slow, quick = (f"def task_program(): say({'a' * n!r})\n" for n in (22, 3))
     run = a_run(tmp_path / "run", [slow, quick, slow, quick], "Slow")
 
     monkeypatch.setattr("roboeval.evaluation.judge.BUDGET", 0.001)
