@@ -1,4 +1,4 @@
-"""Regexes, and functions that read texts, whose time grows faster than the text: found by measuring."""
+"""Regexes and functions whose time grows faster than the text they read: found by measuring."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
+from itertools import product, takewhile
 from random import Random
 from typing import Any
 
 from codebotler.rtl.pattern import compile_regex
-from codebotler.rtl.reasoning.regex_samples import inner_trees, parse_tree, spelled
+from codebotler.rtl.reasoning.regex_samples import Tree, inner_trees, parse_tree, spelled
 
 SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)
 """Lengths of the texts that are tried, in characters."""
@@ -53,12 +53,7 @@ class Attack:
 
 
 def is_superlinear(read: Callable[[str], object], attack: Attack) -> bool:
-    """Whether reading a text takes much more time where the text is longer.
-
-    Args:
-        read: what reads it.
-        attack: the text.
-    """
+    """Whether a function takes more than linear time to read a text as it grows."""
     for size in SIZES:
         spent = _seconds(read, attack.text(size))
         if spent < FLOOR:
@@ -82,31 +77,19 @@ def _seconds(read: Callable[[str], object], text: str) -> float:
 
 @cache
 def slow_text(pattern: str) -> Attack | None:
-    """A text on which finding a regex takes more than linear time; None where none was found.
-
-    Args:
-        pattern: the regex, as RTL understands it.
-    """
+    """A text on which finding a regex takes more than linear time; None if none was found."""
     find = compile_regex(pattern).findall
-    return next((attack for attack in drawn(pattern) if is_superlinear(find, attack)), None)
+    return next((attack for attack in sampled_attacks(pattern) if is_superlinear(find, attack)), None)
 
 
-def drawn(pattern: str) -> list[Attack]:
-    """Some of the texts that may take a regex long, the same ones each time.
-
-    Args:
-        pattern: the regex.
-    """
-    every = [*attacks(pattern)]
+def sampled_attacks(pattern: str) -> list[Attack]:
+    """Some texts that may take a regex long, the same ones each time."""
+    every = [*_attacks(pattern)]
     return Random(pattern).sample(every, min(MOST, len(every)))  # noqa: S311 - no secret
 
 
-def attacks(pattern: str) -> Iterator[Attack]:
-    """Texts that may take a regex long: near misses that repeat what it repeats; none if it repeats nothing.
-
-    Args:
-        pattern: the regex.
-    """
+def _attacks(pattern: str) -> Iterator[Attack]:
+    """Near misses that repeat what the regex repeats; none if it repeats nothing."""
     tree = parse_tree(pattern)
     repeats = [*_repeats(list(tree), ("",))]
     units = dict.fromkeys(unit for _, several in repeats for unit in several)
@@ -124,7 +107,7 @@ def attacks(pattern: str) -> Iterator[Attack]:
     yield from (Attack(*pair, SUFFIXES[-1], BLOCKS) for pair in pairs if pair[0])
 
 
-def _repeats(items: Sequence[Any], before: Sequence[str]) -> Iterator[tuple[Sequence[str], list[str]]]:
+def _repeats(items: Sequence[Tree], before: Sequence[str]) -> Iterator[tuple[Sequence[str], list[str]]]:
     """For each repeat without an end: texts that lead to it, and what may be repeated."""
     for at, (op, value) in enumerate(items):
         if (inner := _repeated(str(op), value)) is not None:
@@ -138,10 +121,8 @@ def _repeats(items: Sequence[Any], before: Sequence[str]) -> Iterator[tuple[Sequ
 
 
 def _until_next_repeat(items: Sequence[Any]) -> list[str]:
-    upto = next((n for n, (op, v) in enumerate(items) if _repeated(str(op), v) is not None), len(items))
-    return [
-        text for text in dict.fromkeys([*spelled(items[:upto])[:2], *spelled(items[:upto], " ")[:2]]) if text
-    ]
+    until = [*takewhile(lambda item: _repeated(str(item[0]), item[1]) is None, items)]
+    return [*dict.fromkeys(filter(None, (*spelled(until)[:2], *spelled(until, " ")[:2])))]
 
 
 def _denied(items: Sequence[Any]) -> Iterator[str]:
@@ -153,5 +134,5 @@ def _denied(items: Sequence[Any]) -> Iterator[str]:
             yield from _denied(part)
 
 
-def _repeated(op: str, value: Any) -> Any:  # noqa: ANN401 - the tree of a private module of Python's
+def _repeated(op: str, value: Any) -> Tree | None:  # noqa: ANN401 - as Python's parser made it
     return value[2] if op in ("MAX_REPEAT", "MIN_REPEAT") and value[1] >= MANY else None

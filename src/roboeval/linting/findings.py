@@ -1,4 +1,4 @@
-"""What the linter finds in tasks, and how it is told."""
+"""What the linter finds in tasks, and as which text it is shown."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class Finding:
         """By which a task file accepts it, such as `implied: comes_back`."""
         return f"{self.kind}: {self.subject}"
 
-    def told(self) -> str:
-        """As a line for a reader, with the path as seen from the current folder."""
+    def rendered(self) -> str:
+        """One line of text, with the path as seen from the current folder."""
         here = Path.cwd()
         path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
         what, why = ("warning", "") if self.accepted is None else ("accepted", f": {self.accepted}")
@@ -57,14 +57,14 @@ class Finding:
 
 
 def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
-    """Findings as lines for a reader, and that there is none.
+    """Findings as lines of text.
 
     Args:
         findings: what was found.
-        accepted: whether to tell also the accepted ones, with their reasons, rather than only count them.
+        accepted: whether to show the accepted ones, with their reasons, instead of only counting them.
     """
     every = [*findings]
-    lines = [one.told() for one in every if accepted or one.accepted is None]
+    lines = [one.rendered() for one in every if accepted or one.accepted is None]
     if hidden := len(every) - len(lines):
         number = "1 finding" if hidden == 1 else f"{hidden} findings"
         more = f"{number} more {'is' if hidden == 1 else 'are'} accepted by the task files"

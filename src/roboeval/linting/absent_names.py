@@ -1,4 +1,4 @@
-"""What requirements name: rooms, things and people, and whether a world has them."""
+"""Rooms, things and people that a requirement names, and that its world has not."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 from codebotler.rtl import Element, Regex
 from codebotler.rtl.reasoning.alphabet import elements
-from codebotler.rtl.reasoning.regex_samples import Tree, inner_trees, parse_tree, samples
+from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.robot import found_in
 from codebotler.syntaxtree import parse_expression
@@ -33,7 +33,7 @@ def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> It
         task: whose worlds tell what is the name of a person.
     """
     for what, name, known in _named(requirement, scenario.world.rooms, task):
-        if not is_among(name, known):
+        if not _is_among(name, known):
             yield what, name
 
 
@@ -49,7 +49,7 @@ def _named(requirement: Requirement, rooms: Sequence[Room], task: Task) -> Itera
     for element in elements(requirement.formula):
         if element.kind in sorts:
             what, known = sorts[element.kind]
-            found = (one for pattern in patterns(element.text) for one in alternatives(pattern))
+            found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
             yield from ((what, one, known) for one in found)
         else:
             yield from (("person", one, [*people, *_owners(rooms)]) for one in _mentioned(element, task))
@@ -59,13 +59,30 @@ def _named(requirement: Requirement, rooms: Sequence[Room], task: Task) -> Itera
             yield "person", argument, people
 
 
+def _is_among(pattern: str, labels: Iterable[str]) -> bool:
+    """Whether a regex may mean one of these labels; true also of one that means anything, or nothing."""
+    matches, texts = Regex(pattern).matches, samples(pattern)
+    return (
+        not texts
+        or matches("")
+        or any(matches(label) or any(found_in(label, text) for text in texts) for label in labels)
+    )
+
+
+# --- people
+
+
 def _mentioned(element: Element, task: Task) -> Iterator[str]:
     """The names, of people in some world of the task, that stand in what is said or asked."""
-    texts = [text for text in (element.text, element.options) if text is not None]
-    spelled = [part.lower() for text in texts for one in patterns(text) for part in spelled_out(one)]
+    texts = (text for text in (element.text, element.options) if text is not None)
+    plain = [_without_escapes(pattern).lower() for text in texts for pattern in patterns(text)]
     for name in sorted(_people(task)):
-        if any(re.search(rf"\b{re.escape(name)}\b", part) for part in spelled):
+        if any(re.search(rf"\b{re.escape(name)}\b", text) for text in plain):
             yield name
+
+
+def _without_escapes(pattern: str) -> str:
+    return re.sub(r"\\(.)", lambda escape: " " if escape[1].isalnum() else escape[1], pattern)
 
 
 def _people(task: Task) -> set[str]:
@@ -87,76 +104,34 @@ def _arguments(requirement: Requirement) -> list[str]:
     return [str(value.value) for value in values if isinstance(value, ast.Constant)]
 
 
-def alternatives(pattern: str) -> list[str]:
-    """A regex once for each of the words that it leaves the choice of, at its top or in a group.
+# --- regexes that leave a choice
 
-    Args:
-        pattern: the regex; alone in the answer where it leaves no choice, or refers back to a group.
-    """
-    if re.search(r"\\\d|\(\?P=|\(\?\(", pattern):
-        return [pattern]
-    branches = _branches(pattern)
-    return [one for branch in branches for one in _without_choice(branch)]
+_BACKREFERENCE = re.compile(r"\\\d|\(\?P=|\(\?\(")
+_PIECE = re.compile(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|.", re.DOTALL)
+_CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
+
+
+def _alternatives(pattern: str) -> Iterator[str]:
+    """A regex once for each word that it leaves the choice of; as it is if it leaves none, or refers back."""
+    if _BACKREFERENCE.search(pattern):
+        yield pattern
+        return
+    for branch in _branches(pattern):
+        choices = [*_CHOICE.finditer(branch)]
+        for choice in choices:
+            for word in choice[1].split("|"):
+                yield branch[: choice.start()] + word + branch[choice.end() :]
+        if not choices:
+            yield branch
 
 
 def _branches(pattern: str) -> list[str]:
     """What stands between the bars outside of groups and sets."""
-    pieces = re.findall(r"\\.|\[\^?\]?(?:\\.|[^\]\\])*\]|.", pattern, re.DOTALL)
     branches, depth = [""], 0
-    for piece in pieces:
+    for piece in _PIECE.findall(pattern):
         depth += (piece == "(") - (piece == ")")
         if piece == "|" and depth == 0:
             branches.append("")
         else:
             branches[-1] += piece
     return branches if all(branches) else [pattern]
-
-
-_CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
-
-
-def _without_choice(pattern: str) -> list[str]:
-    one_less = (
-        pattern[: group.start()] + word + pattern[group.end() :]
-        for group in _CHOICE.finditer(pattern)
-        for word in group[1].split("|")
-    )
-    return [*one_less] or [pattern]
-
-
-def spelled_out(pattern: str) -> Iterator[str]:
-    """The plain texts in a regex, such as names, as they stand there.
-
-    Args:
-        pattern: the regex.
-    """
-    yield from _literals(parse_tree(pattern))
-
-
-def _literals(items: Tree) -> Iterator[str]:
-    text = ""
-    for op, value in items:
-        if str(op) == "LITERAL":
-            text += chr(value)
-            continue
-        yield text
-        text = ""
-        for inner in inner_trees(str(op), value):
-            yield from _literals(inner)
-    yield text
-
-
-def is_among(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether something may be meant by a regex; true also of one that means anything, or nothing.
-
-    Args:
-        pattern: the regex.
-        labels: what things are called.
-    """
-    wanted = Regex(pattern)
-    texts = samples(pattern)
-    return (
-        not texts
-        or wanted.matches("")
-        or any(wanted.matches(label) or any(found_in(label, text) for text in texts) for label in labels)
-    )

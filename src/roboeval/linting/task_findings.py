@@ -1,0 +1,162 @@
+"""Findings about a task as a whole: its checks, facts and regexes, and how its solutions do."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from typing import NamedTuple
+
+from codebotler.badinput import YamlFile
+from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.simulator.robot import whole_words
+from codebotler.world import World
+from roboeval.evaluation.failures import failure
+from roboeval.linting.backtracking import slow_text
+from roboeval.linting.findings import Finding
+from roboeval.linting.trials import Verdicts
+from roboeval.linting.world_findings import judged_worlds
+from roboeval.suites.load import Requirement, Task
+from roboeval.suites.solutions import solutions
+
+
+def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
+    """All findings that are not about one world.
+
+    Args:
+        task: the task.
+        verdicts: on programs that are meant to be right or wrong.
+    """
+    yield from (*_unused(task), *_unsaid(task), *_slow(task))
+    yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
+
+
+def _required(task: Task) -> list[Requirement]:
+    return [requirement for world in judged_worlds(task) for requirement in world.require]
+
+
+def _unused(task: Task) -> Iterator[Finding]:
+    used = {requirement.check for requirement in _required(task)}
+    for check in task.checks:
+        if check.name not in used:
+            message = f'no world requires the check "{check.name}"; require it or remove it'
+            yield Finding("unused", check.name, message, task.path, check.line)
+
+
+def _unsaid(task: Task) -> Iterator[Finding]:
+    """Facts that a prompt does not tell the model, or tells it although they are to be common sense."""
+    if task.borrows:
+        return
+    file = YamlFile.read(task.path)
+    for number, fact in enumerate(task.facts):
+        for prompt, text in enumerate(task.prompts):
+            word = next((word for word in fact.words if re.search(word, text, re.IGNORECASE)), None)
+            if word is None and not fact.commonsense:
+                wrong = f'does not say "{fact.fact}", by none of its words; say it'
+            elif word is not None and fact.commonsense:
+                wrong = f'says "{fact.fact}" by "{word}", but that is to be common sense; leave it out'
+            else:
+                continue
+            line = file.line(("facts", number))
+            yield Finding("unsaid", fact.fact, f"prompt {prompt} {wrong}", task.path, line)
+
+
+# --- solutions
+
+
+def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
+    """Solutions that end otherwise than their file says."""
+    if task.borrows:  # programs that were written for other requirements
+        return
+    for solution, judged in zip(solutions(task), verdicts, strict=False):  # an ablation's come afterwards
+        failed = failure(judged)
+        if (None if failed is None else failed.kind) == solution.fails:
+            continue
+        said = "pass" if solution.fails is None else f"fail by {solution.fails}"
+        where = "" if failed is None else f' by {failed.kind} in the world "{judged[failed.world].world}"'
+        message = (
+            f'the solution "{solution.about}" is said to {said}, but it '
+            f"{'passes' if failed is None else 'fails'}{where}; mend it, what it is said to do, or a check"
+        )
+        yield Finding("misjudged", solution.about, message, task.path, 1)
+
+
+def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
+    """Checks, with or without `not`, by which no solution fails."""
+    wrong = [one for one in verdicts if not all(verdict.satisfied for verdict in one)]
+    if not wrong:
+        message = f'no wrong program is at hand to show that the checks of "{task.name}" can fail'
+        yield Finding("untripped", task.name, message, task.path, 1)
+        return
+    tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}
+    no_program = (
+        "the only wrong program of the task does not trip"
+        if len(wrong) == 1
+        else f"none of the {len(wrong)} wrong programs of the task trips"
+    )
+    lines = {check.name: check.line for check in task.checks}
+    sides = {_side(requirement): requirement for requirement in reversed(_required(task))}
+    for side, requirement in sides.items():
+        if side not in tripped:
+            meant = ' where it is required without "not"' if f"not {side}" in sides else ""
+            message = f'{no_program} "{side}"{meant}; add one that does'
+            yield Finding("untripped", side, message, task.path, lines[requirement.check])
+
+
+def _side(requirement: Requirement) -> str:
+    """The name of a check, with `not` where it is required not to hold."""
+    return f"not {requirement.check}" if requirement.text.strip().startswith("not ") else requirement.check
+
+
+# --- regexes that make the judge slow
+
+
+class SearchedRegex(NamedTuple):
+    """A regex as the judge looks for it, the requirement or the world that has it, and the line of that."""
+
+    pattern: str
+    where: str
+    line: int | None
+
+
+def _slow(task: Task) -> Iterator[Finding]:
+    for pattern, one in {one.pattern: one for one in reversed([*searched_regexes(task)])}.items():
+        if (text := slow_text(pattern)) is not None:
+            message = (
+                f"finding the regex {pattern!r} of {one.where} takes much longer the longer a text is, "
+                f"such as {text.prefix + text.unit!r} with {text.unit!r} many times more; let no two repeats "
+                "match the same text"
+            )
+            yield Finding("slow-regex", pattern, message, task.path, one.line)
+
+
+def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
+    """The regexes of a task: those of its requirements, and what its worlds call things and answer."""
+    lines = {check.name: check.line for check in task.checks}
+    for requirement in {one.text: one for one in _required(task)}.values():
+        for element in elements(requirement.formula):
+            texts = (text for text in (element.text, element.options, element.answer) if text is not None)
+            for pattern in chain.from_iterable(map(_compiled, texts)):
+                yield SearchedRegex(pattern, f'"{requirement.text}"', lines[requirement.check])
+    labels = {label: world for world in judged_worlds(task) for label in _labels(world.scenario.world)}
+    for label, world in labels.items():
+        yield SearchedRegex(whole_words(label), world.name, None if task.drawn else world.line)
+
+
+def _labels(world: World) -> Iterator[str]:
+    for room in world.rooms:
+        yield from (room.name, *room.objects)
+        for person in room.people:
+            answers = (*person.answers, *chain.from_iterable(person.topics))
+            yield from (text for text in (person.name, *answers) if isinstance(text, str))
+
+
+def _compiled(text: Text) -> Iterator[str]:
+    match text:
+        case Words(parts):
+            yield from chain.from_iterable(map(_compiled, parts))
+        case Number():
+            yield from (kind.pattern for kind in text.kinds)
+        case Regex() | Without() | Claim():
+            yield text.compiled.pattern

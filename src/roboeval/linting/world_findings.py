@@ -1,0 +1,182 @@
+"""Findings about the requirements of one world: what they allow together, and what their regexes match.
+
+Whether a requirement is `unsatisfiable` or `implied` follows from RTL alone (see `codebotler.rtl.reasoning`),
+first with visits that name one room of the world each, then with any.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from codebotler.badinput import YamlFile
+from codebotler.cachedproperty import cached_property
+from codebotler.english import listed
+from codebotler.rtl import Formula, Regex, Text
+from codebotler.rtl.reasoning import Reasoner, Undecided
+from codebotler.rtl.reasoning.alphabet import elements
+from codebotler.rtl.reasoning.regex_samples import samples
+from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
+from codebotler.simulator.robot import resolve_room
+from roboeval.linting.absent_names import absent_names
+from roboeval.linting.findings import Finding, Kind
+from roboeval.suites.load import Check, Requirement, Scenario, Task
+
+_PLAIN = ", as long as each visit names one room of the world"
+
+
+@dataclass(frozen=True)
+class JudgedWorld:
+    """A world of a task, or of its ablation, and what it requires.
+
+    Args:
+        task: the task.
+        number: of the world in the task, from 1.
+        scenario: the world and its requirements.
+        ablated: whether it is of the ablation.
+    """
+
+    task: Task
+    number: int
+    scenario: Scenario
+    ablated: bool = False
+
+    @property
+    def name(self) -> str:
+        """As messages call it."""
+        return f"{'the ablation of ' if self.ablated else ''}world {self.number}"
+
+    @property
+    def require(self) -> tuple[Requirement, ...]:
+        """What it requires."""
+        return self.scenario.require
+
+    @property
+    def line(self) -> int | None:
+        """Where the task file describes it."""
+        return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
+
+    def finding(self, kind: Kind, subject: str, message: str, line: int | None) -> Finding:
+        """A finding in the task's file."""
+        return Finding(kind, subject, message, self.task.path, line)
+
+    def findings(self) -> Iterator[Finding]:
+        """All findings about this world alone."""
+        for requirement in self.require:
+            yield from self.dead_regexes(requirement)
+            yield from self._absent(requirement)
+        yield from self.logic()
+
+    def _absent(self, requirement: Requirement) -> Iterator[Finding]:
+        for what, name in absent_names(requirement, self.scenario, self.task):
+            message = f'"{requirement.text}" is about the {what} "{name}", but {self.name} has none'
+            yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
+
+    # --- requirements together
+
+    def logic(self) -> Iterator[Finding]:
+        """Which requirements cannot hold, or follow from others."""
+        rest = [*self.require]
+        try:
+            while (conflict := self._conflict([r.formula for r in rest])) is not None:
+                involved = [r for r in rest if r.formula in conflict[0]]
+                yield self._unsatisfiable(involved, conflict[1])
+                rest = [r for r in rest if r not in involved]
+        except Undecided:
+            yield self._undecided(self.name, f"whether {self.name} can be satisfied", self.line)
+        for requirement in rest:
+            yield from self._implied(requirement, [r for r in rest if r is not requirement])
+
+    def _unsatisfiable(self, involved: Sequence[Requirement], condition: str) -> Finding:
+        subject = " and ".join(r.text for r in involved)
+        together = "" if len(involved) == 1 else " together"
+        message = f'no text was found with which "{subject}" can hold{together} in {self.name}{condition}'
+        line = involved[-1].line if condition or together else self._line_of_fault(involved[0])
+        return self.finding("unsatisfiable", subject, message, line)
+
+    def _implied(self, requirement: Requirement, others: Sequence[Requirement]) -> Iterator[Finding]:
+        subject, line = requirement.text, requirement.line
+        try:
+            conflict = self._conflict([r.formula for r in others], requirement.formula)
+        except Undecided:
+            yield self._undecided(subject, f'whether "{subject}" is implied in {self.name}', line)
+            return
+        if conflict is not None:
+            premises, condition = conflict
+            reasons = [f'"{r.text}"' for r in others if r.formula in premises]
+            unless = f" without breaking {'one of ' * (len(reasons) > 1)}{listed(reasons)}" if reasons else ""
+            message = (
+                f'no sequence of the texts that were tried breaks "{subject}" in {self.name}{unless}'
+                f"{condition}; it may never be the only one to fail"
+            )
+            fault = line if reasons or condition else self._line_of_fault(requirement)
+            yield self.finding("implied", subject, message, fault)
+
+    def _undecided(self, subject: str, what: str, line: int | None) -> Finding:
+        return self.finding("undecided", subject, f"{what} would take too long to find out", line)
+
+    def _line_of_fault(self, requirement: Requirement) -> int | None:
+        """Where to mend what is wrong in any world: the check, unless arguments may be to blame."""
+        check = self._check(requirement)
+        return requirement.line if check.parameters else check.line
+
+    def _check(self, requirement: Requirement) -> Check:
+        return next(check for check in self.task.checks if check.name == requirement.check)
+
+    def _conflict(
+        self, formulas: Sequence[Formula], denied: Formula | None = None
+    ) -> tuple[list[Formula], str] | None:
+        """Formulas that conflict, or imply the denied one, and the condition on which they do."""
+        conflict = self._plain_moves.conflict(formulas, denied)
+        if conflict is None:
+            return None
+        always = self._any_moves.conflict(formulas, denied)
+        return (conflict, _PLAIN) if always is None else (always, "")
+
+    @cached_property
+    def _any_moves(self) -> Reasoner:
+        return Reasoner(r.formula for r in self.require)
+
+    @cached_property
+    def _plain_moves(self) -> Reasoner:
+        moves = {request: resolve_room(self._rooms, request) or request for request in self._requests}
+        return Reasoner((r.formula for r in self.require), moves, self.scenario.world.robot)
+
+    @cached_property
+    def _requests(self) -> list[str]:
+        """For each room a request that leads there and, as far as possible, is no more than its name."""
+        rooms = self._rooms
+        return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
+
+    # --- regexes
+
+    @property
+    def _rooms(self) -> list[str]:
+        return [room.name for room in self.scenario.world.rooms]
+
+    def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
+        """Regexes of a requirement that match nothing, or visits that lead nowhere."""
+        line = self._check(requirement).line
+        for element in dict.fromkeys(elements(requirement.formula)):
+            for text in [element.text] if element.options is None else [element.text, element.options]:
+                subject = f"{text} in {requirement.check}"
+                if not can_match(text, outer=text is element.options):
+                    message = f'no text was found that matches {text}, for which "{requirement.check}" looks'
+                    yield self.finding("dead-regex", subject, message, line)
+                elif element.kind == "goto" and not self._leads_somewhere(text):
+                    there = f'in "{requirement.check}" and gets anywhere in {self.name}'
+                    message = f"no visit was found that matches {text} {there}"
+                    yield self.finding("dead-regex", subject, message, line)
+
+    def _leads_somewhere(self, text: Text) -> bool:
+        if any(map(text.matches, self._requests)):
+            return True
+        others = distinct_strings((text, *map(Regex, self._rooms)))
+        return any(text.matches(one) and resolve_room(self._rooms, one) for one in others)
+
+
+def judged_worlds(task: Task) -> Iterator[JudgedWorld]:
+    """The worlds of a task, and behind them those of its ablation."""
+    for ablated in (False, True):
+        for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
+            yield JudgedWorld(task, number, scenario, ablated)
