@@ -1,4 +1,4 @@
-"""Findings about a task as a whole: its checks, facts and regexes, and how its recorded programs do."""
+"""Findings about a task as a whole: its checks, facts and regexes, and how its solutions do."""
 
 from __future__ import annotations
 
@@ -19,9 +19,6 @@ from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import judged_worlds
 from roboeval.suites.load import Requirement, Task
 from roboeval.suites.solutions import solutions
-
-_SUBJECT = 60
-"""How much of an instruction names a finding, in characters."""
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
@@ -65,7 +62,7 @@ def _unsaid(task: Task) -> Iterator[Finding]:
             yield Finding("unsaid", fact.fact, f"prompt {prompt} {wrong}", task.path, line)
 
 
-# --- recorded programs
+# --- solutions
 
 
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
@@ -86,7 +83,7 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
 
 
 def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Checks, with or without `not`, by which no recorded program fails."""
+    """Checks, with or without `not`, by which no solution fails."""
     wrong = [one for one in verdicts if not all(verdict.satisfied for verdict in one)]
     if not wrong:
         message = f'no wrong program is at hand to show that the checks of "{task.name}" can fail'
@@ -103,7 +100,7 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     for side, requirement in sides.items():
         if side not in tripped:
             meant = ' where it is required without "not"' if f"not {side}" in sides else ""
-            message = f'{no_program} "{side}"{meant}; record one that does'
+            message = f'{no_program} "{side}"{meant}; add one that does'
             yield Finding("untripped", side, message, task.path, lines[requirement.check])
 
 
