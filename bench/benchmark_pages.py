@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from statistics import median
 
@@ -80,7 +81,7 @@ def chosen(page: Page) -> float:
 
     def choose() -> None:
         page.locator(".kind", has_text="SayAtLocation").click()
-        page.locator("h2", has_text="that failed by SayAtLocation").wait_for()
+        page.locator("h2", has_text="that failed with SayAtLocation").wait_for()
         page.locator(".completions-view .completion", has_text="SayAtLocation").first.wait_for()
 
     took = timed(choose)
@@ -97,11 +98,13 @@ def main() -> int:
         run = made_up(folder, 0, load_suite())
         size = sum(path.stat().st_size for path in run.path.rglob("*") if path.is_file())
         command = [sys.executable, "-m", "roboeval", "serve", str(folder), "--port", "0"]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tool:
+        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as tool, ExitStack() as stack:
+            stack.callback(tool.terminate)
             assert tool.stderr is not None
             link = next(line.strip() for line in tool.stderr if "token=" in line)
             browser = playwright.chromium.launch(
-                executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+                executable_path=shutil.which("chromium") or shutil.which("chromium-headless-shell"),
+                args=["--no-sandbox", "--disable-gpu"],
             )
             page = browser.new_page(viewport={"width": 1440, "height": 900})
             page.goto(link)
@@ -120,7 +123,6 @@ def main() -> int:
             page.evaluate(JUMP, 0.0)
             worst, empty, frames = page.evaluate(FRAMES)
             browser.close()
-            tool.terminate()
     print(f"a run of 4,000 completions, {size / 1e6:.0f} MB: its first opening took {first:.0f} ms")
     aim = f"aim, for the middle one: a page in {AIM:.0f}, a jump in {AIM_OF_A_JUMP:.0f}"
     print(f"worst of {OPENS} in ms ({aim})")

@@ -22,7 +22,7 @@ MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.simulator.robot.RobotError": (("PickInvalidObject", "there is no mug"), {}),
     "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),
-    "roboeval.web.followed.GoneError": (A_SENTENCE, {"file": "runs/a"}),
+    "roboeval.web.run_store.RunGoneError": (A_SENTENCE, {"file": "runs/a"}),
 }
 """What each exception takes; one sentence by default."""
 

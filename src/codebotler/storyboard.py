@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from typing import Any, Literal
 
-from rich.console import RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
@@ -61,7 +60,8 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: set[int | None]) -> T
     for shown, some in groupby(steps, key=is_shown):
         if shown:
             for step in some:
-                table.add_row(Text(str(step["step"]), "dim"), _step(step))
+                indent = 0 if step["kind"] == "goto" else 4
+                table.add_row(Text(str(step["step"]), "dim"), Padding(step_text(step), (0, 0, 0, indent)))
         else:
             hidden = list(some)
             table.add_row(Text(), Text(f"... {len(hidden):,} more{_repeating(steps, hidden)} ...", "dim"))
@@ -80,7 +80,12 @@ def _repeating(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str,
     return ""
 
 
-def _step(step: Mapping[str, Any]) -> RenderableType:
+def step_text(step: Mapping[str, Any]) -> Text:
+    """A step as one line.
+
+    Args:
+        step: as `steps_of` gives it.
+    """
     text = f'"{shortened(step["text"])}"'
     if step["kind"] == "goto":
         return _drive(step, text)
@@ -92,7 +97,7 @@ def _step(step: Mapping[str, Any]) -> RenderableType:
             told = f"asked {text} {_options(step['options'])} → {answer}"
         case kind:
             told = f"{DID.get(kind) or visible(kind)} {text}"
-    return Padding(Text(told), (0, 0, 0, 4))
+    return Text(told)
 
 
 def _drive(step: Mapping[str, Any], request: str) -> Text:

@@ -32,12 +32,12 @@ def serve(
     from codebotler.web.serving import serve as serve_page
     from roboeval.cli.output import note
     from roboeval.web.pages import pages
-    from roboeval.web.shelf import Shelf
+    from roboeval.web.run_store import RunStore
 
     place, access = entrance(host, port, name or (), token, no_token=no_token)
     if not runs.is_dir():
         raise BadInput("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
     suites = [load(each) for each in suite or ()]
-    if not Shelf(runs).names():
+    if not RunStore(runs).names():
         note(f"{runs} holds no run yet; those that come are shown, too")
     serve_page(None, place, access, (pages(suites),), runs)

@@ -15,6 +15,7 @@ from codebotler.world import World
 from roboeval.evaluation.completions import Completion
 from roboeval.suites.load import Scenario, Suite
 
+NOT_RECORDED = "instruction not recorded"
 GONE = "the program that was judged no longer stands in this run"
 CHANGED = "the suite has changed since this was judged"
 CUT = "the trace that was judged is too long to be kept, so this cannot be explained"

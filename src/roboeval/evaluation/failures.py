@@ -75,6 +75,11 @@ def label_of(name: str) -> str:
     return CLASSES[name].label if name in CLASSES else name
 
 
+def plural_of(name: str) -> str:
+    """What people read of several of a class; of one that is unknown its name."""
+    return CLASSES[name].plural if name in CLASSES else name
+
+
 @dataclass(frozen=True)
 class Verdict:
     """How a program did in one world.

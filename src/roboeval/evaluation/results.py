@@ -54,7 +54,7 @@ def load_results(
     known, folder = load_suite(suite), Run(Path(run))
     key = evaluation_key(known, ablated=ablation)
     expect_judged(folder, key)
-    results = read_results(folder, key, known)
+    results = read_results(folder, key, known, keep_failed=False)
     if price is None:
         return results.table
     return results.table.with_columns(
@@ -124,7 +124,8 @@ class Results:
         about: what run.json says: how the completions were asked for.
         completions: those that stand in the run now, in order.
         table: as `load_results` gives it.
-        failed: the rows of the completions that failed, without the traces of worlds that did not decide.
+        failed: the rows of the completions that failed, without the traces of worlds that did not decide;
+            empty where they were not kept.
         places: where the row of each completion lies in the file: its first byte, and how many.
         faults: what is wrong with lines of the files, if it was not raised.
     """
@@ -158,12 +159,15 @@ class Results:
     @property
     def passed(self) -> list[Key]:
         """The completions that passed."""
-        return [key for key in self.places if key not in self.failed]
+        return self._keys(pl.col("passed"))
 
     @property
     def stale(self) -> list[Key]:
         """The completions whose verdicts are on other programs than stand in the run now."""
-        rows = self.table.filter(pl.col("stale"), pl.col("world_number") == 0)
+        return self._keys(pl.col("stale"))
+
+    def _keys(self, condition: pl.Expr) -> list[Key]:
+        rows = self.table.filter(condition, pl.col("world_number") == 0)
         return [*rows.select("task", "prompt", "index").iter_rows()]
 
     @property
@@ -208,6 +212,7 @@ def read_results(
     key: str | None,
     suite: Suite | None = None,
     *,
+    keep_failed: bool = True,
     faults: list[BadInput] | None = None,
     see: Callable[[bytes], None] | None = None,
     watch: Callable[[Iterator[Line], int], Iterable[Line]] = lambda lines, _: lines,
@@ -218,6 +223,7 @@ def read_results(
         run: whose.
         key: the name of the evaluation's files; None where nothing has been judged.
         suite: by which it was judged, for the categories of failed checks; none are given without it.
+        keep_failed: whether to keep the rows of the completions that failed, which may take much memory.
         faults: gets what is wrong with files and lines, which are then left out, rather than that it is
             raised.
         see: sees each row's line.
@@ -234,14 +240,14 @@ def read_results(
         for completion in read_completions(run.completions, growing=True, faults=faults)
     }
     total = sum(tasks is None or task in tasks for task, _, _ in completions)
-    builder = TableBuilder(completions, _categories(suite), _accepted(run, key))
+    builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
     places: dict[Key, tuple[int, int]] = {}
     failed = FailedRows()
     lines = iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults)
     for line in watch(lines, total):
         builder.add(line.row)
         places[line.row.key] = line.at, line.size
-        if not line.row.passed:
+        if keep_failed and not line.row.passed:
             failed.add(line.row)
     return Results(
         run=run,
@@ -311,10 +317,17 @@ def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
     }
 
 
-def _accepted(run: Run, key: str | None) -> Mapping[tuple[str, str], bool]:
+def _accepted(run: Run, key: str | None, faults: list[BadInput] | None) -> Mapping[tuple[str, str], bool]:
     """Whether the check found no problem, by task and hash of the program, where it was asked."""
     path = run.checks((key or "").removesuffix(ABLATED))
+    accepted: dict[tuple[str, str], bool] = {}
     if not path.is_file():
-        return {}
-    rows = (row for _, row in read_rows(path, growing=True))
-    return {(row["task"], row["program_sha256"]): not row["problems"] for row in rows}
+        return accepted
+    try:
+        for _, row in read_rows(path, growing=True):
+            accepted[row["task"], row["program_sha256"]] = not row["problems"]
+    except BadInput as error:
+        if faults is None:
+            raise
+        faults.append(error)
+    return accepted

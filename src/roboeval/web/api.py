@@ -5,78 +5,61 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, TypeAlias
 
 from fastapi import APIRouter, Depends, HTTPException, Query
 from fastapi.responses import Response
 
 from codebotler.badinput import BadInput
-from roboeval.web.followed import FollowedRun, GoneError
-from roboeval.web.seen import Seen, Wanted
-from roboeval.web.shelf import Shelf
-from roboeval.web.telling import completion_told, entry_data, order_of, run_data, summary_data
+from roboeval.evaluation.completions import name_of
+from roboeval.web.run_store import RunGoneError, RunStore
+from roboeval.web.serializers import RunList, completion_details, entry_data, run_details
+from roboeval.web.snapshot import Filter
 
 MOST = 1_000
-"""Completions that are given at once."""
+"""Completions in one answer."""
 
-Evaluation = Annotated[
+Chosen: TypeAlias = Annotated[Filter, Depends()]
+Evaluation: TypeAlias = Annotated[
     str | None,
     Query(max_length=200, description="Which evaluation; by default the first that requires everything."),
 ]
 
 
-@dataclass(frozen=True)
-class Choice:
-    """Which completions somebody asks for, as the address says it."""
-
-    task: Annotated[str | None, Query(description="Only of this task.")] = None
-    prompt: Annotated[int | None, Query(ge=0, description="Only of this prompt, counted from 0.")] = None
-    passed: Annotated[bool | None, Query(description="Only those that passed, or those that failed.")] = None
-    failure: Annotated[str | None, Query(description="Only those that failed by this class.")] = None
-    kind: Annotated[str | None, Query(description="Only those that failed by this kind.")] = None
-
-    @property
-    def wanted(self) -> Wanted:
-        """The same as the rest calls it."""
-        return Wanted(self.task, self.prompt, self.passed, self.failure, self.kind)
-
-
-def router(shelf: Shelf) -> APIRouter:
+def router(store: RunStore) -> APIRouter:
     """The addresses of the API.
 
     Args:
-        shelf: whose runs.
+        store: whose runs.
     """
     api = APIRouter(prefix="/api/runs", tags=["runs"], default_response_class=Response)
+    all_runs = RunList(store)
 
     @api.get("")
     def list_runs() -> Response:
         """All runs: who wrote them, how far they have come, how many completions pass."""
         with _refusing():
-            return _json([_told(shelf, name) for name in shelf.names()])
+            return _json(all_runs.data())
 
     @api.get("/{run}")
     def show_run(run: str, evaluation: Evaluation = None) -> Response:
         """One run with every prompt and every kind of failure."""
         with _refusing():
-            _, seen = _opened(shelf, run, evaluation)
-            return _json(summary_data(seen, shelf.suite_of(seen), shelf.evaluations(run)))
+            return _json(run_details(store.open(run, evaluation)))
 
     @api.get("/{run}/completions")
     def list_completions(
         run: str,
-        choice: Annotated[Choice, Depends()],
+        chosen: Chosen,
         evaluation: Evaluation = None,
         offset: Annotated[int, Query(ge=0, description="How many are passed over.")] = 0,
         limit: Annotated[int, Query(ge=1, le=MOST, description="How many are given.")] = 100,
     ) -> Response:
         """Completions of a run, of a prompt, or those that failed in some way; in order, a part of them."""
         with _refusing():
-            _, seen = _opened(shelf, run, evaluation)
-            found = seen.chosen(choice.wanted, order_of(shelf.suite_of(seen)))
-        part = [entry_data(entry) for entry in found[offset : offset + limit]]
-        return _json({"total": len(found), "offset": offset, "completions": part})
+            found = store.open(run, evaluation).select(chosen)
+        part = [entry_data(row) for row in found[offset : offset + limit].iter_rows(named=True)]
+        return _json({"total": found.height, "offset": offset, "completions": part})
 
     @api.get("/{run}/completions/{task:path}/{prompt}/{index}")
     def show_completion(
@@ -84,27 +67,13 @@ def router(shelf: Shelf) -> APIRouter:
     ) -> Response:
         """One completion: its program, and in each world what the robot did, what failed there, and why."""
         with _refusing():
-            followed, seen = _opened(shelf, run, evaluation)
-            entry = seen.by_key.get((task, prompt, index))
-            if entry is None:
+            snapshot = store.open(run, evaluation)
+            row = snapshot.row(name_of((task, prompt, index)))
+            if row is None:
                 raise HTTPException(404, "this run has no such completion")
-            return _json(completion_told(followed, seen, entry, shelf.suite_of(seen)))
+            return _json(completion_details(snapshot, row))
 
     return api
-
-
-def _opened(shelf: Shelf, run: str, evaluation: str | None) -> tuple[FollowedRun, Seen]:
-    followed = shelf.open(run, evaluation)
-    return followed, followed.wait()
-
-
-def _told(shelf: Shelf, name: str) -> dict[str, Any]:
-    """A run in the list; of one that cannot be read, or that is just deleted, why."""
-    try:
-        _, seen = _opened(shelf, name, None)
-        return run_data(seen, shelf.suite_of(seen), shelf.evaluations(name))
-    except BadInput as error:
-        return {"run": name, "state": "not read", "notes": [str(error)]}
 
 
 def _json(data: object) -> Response:
@@ -116,7 +85,7 @@ def _json(data: object) -> Response:
 def _refusing() -> Iterator[None]:
     try:
         yield
-    except GoneError as error:
+    except RunGoneError as error:
         raise HTTPException(404, error.sentence) from None
     except BadInput as error:
         raise HTTPException(422, str(error).encode(errors="replace").decode()) from None

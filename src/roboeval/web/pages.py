@@ -10,8 +10,8 @@ from fastapi.staticfiles import StaticFiles
 
 from codebotler.web.further import Pages, Site
 from roboeval.suites.load import Suite
-from roboeval.web import api, oneprogram, onerun, overview, sidebyside
-from roboeval.web.shelf import Shelf
+from roboeval.web import api, comparison_page, completion_page, run_page, runs_page
+from roboeval.web.run_store import RunStore
 
 STATIC = Path(__file__).with_name("static")
 
@@ -24,11 +24,11 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
     """
 
     def add(site: Site) -> None:
-        shelf = Shelf(site.runs, suites)
-        site.app.include_router(api.router(shelf))
+        store = RunStore(site.runs, suites)
+        site.app.include_router(api.router(store))
         site.app.mount("/static/benchmark", StaticFiles(directory=STATIC))
-        for page in (overview, onerun, sidebyside, oneprogram):
-            page.add(shelf, site.frame)
+        for page in (runs_page, run_page, comparison_page, completion_page):
+            page.add(store, site.frame)
         if not site.frame.has_robot:
             site.app.get("/", include_in_schema=False)(lambda: RedirectResponse("/runs"))
 
@@ -36,4 +36,4 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
 
 
 PAGES = pages()
-"""What the entry point names."""
+"""Named by the entry point."""

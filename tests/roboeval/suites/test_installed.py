@@ -11,7 +11,7 @@ from command_line import ENVIRONMENT, roboeval
 from roboeval.suites.catalogue import new_task, other_suites
 from roboeval.suites.installed import installed_suites
 from roboeval.suites.load import load_suite
-from roboeval.web.shelf import Shelf
+from roboeval.web.run_store import RunStore
 
 Install = Callable[..., Path]
 
@@ -76,7 +76,13 @@ def test_the_pages_show_runs_that_were_judged_by_it(
 ) -> None:
     install()
     install("broken-suite", "broken", whole=False)
-    assert list(Shelf(Path("runs")).suites) == ["paper", "plus", "garden"]
+    store = RunStore(Path("runs"))
+    assert [store.suite(name) is not None for name in ("plus", "garden", "broken", "none")] == [
+        True,
+        True,
+        False,
+        False,
+    ]
     warning = capsys.readouterr().err
     assert "broken-suite 1.0" in warning
     assert '"broken"' in warning

@@ -17,9 +17,9 @@ from codebotler.terminal import visible
 from roboeval.analysis.summary import Failures, Missing, Summary, judged_count
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.completions import how_many
-from roboeval.evaluation.failures import CLASSES, label_of
+from roboeval.evaluation.explanation import NOT_RECORDED
+from roboeval.evaluation.failures import label_of, plural_of
 
-NOT_RECORDED = "instruction not recorded"
 ALL_GONE = "the programs that were judged no longer stand in this run"
 
 
@@ -113,7 +113,7 @@ def _failure_table(failures: Failures) -> Table:
 
 
 def _name(failures: Failures) -> str:
-    return CLASSES[failures.name].plural if failures.name in CLASSES else visible(failures.name)
+    return visible(plural_of(failures.name))
 
 
 def task_view(data: Mapping[str, Any]) -> RenderableType:

@@ -16,7 +16,7 @@ export default {
           <tr>
             <th scope="col" class="name">{{ corner }}</th>
             <template v-for="group in groups">
-              <th v-for="(column, at) in group.columns" scope="col" :class="{ first: at === 0 }" :title="column.told">
+              <th v-for="(column, at) in group.columns" scope="col" :class="{ first: at === 0 }" :title="column.title">
                 <a v-if="column.href" :href="column.href" dir="auto">{{ column.name }}</a>
                 <span v-else dir="auto">{{ column.name }}</span>
               </th>
@@ -26,8 +26,8 @@ export default {
         <tbody>
           <tr v-for="row in rows" :key="row.name">
             <th scope="row" class="name" dir="auto"><template v-for="piece in pieces(row.name)">{{ piece }}<wbr></template></th>
-            <td v-for="cell in row.cells" :class="cell.look">
-              <a v-if="cell.href" :href="cell.href" :title="cell.told" :aria-label="cell.told"
+            <td v-for="cell in row.cells" :class="cell.shade">
+              <a v-if="cell.href" :href="cell.href" :title="cell.title" :aria-label="cell.title"
                 :aria-current="cell.here ? 'true' : null" @click="choose($event, cell)">{{ cell.text }}</a>
               <span v-else>{{ cell.text }}</span>
             </td>

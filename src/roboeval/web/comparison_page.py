@@ -1,0 +1,131 @@
+"""The page of several runs side by side: how often each passes, prompt by prompt, and why not."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Annotated, Any
+
+from fastapi import Query
+from nicegui import html, ui
+
+from codebotler.badinput import BadInput
+from codebotler.terminal import shortened
+from codebotler.web.frame import PATIENCE, Frame
+from codebotler.web.words import Words
+from roboeval.web.heat_map import TaskCells, address, columns, failure_rows, models_of
+from roboeval.web.run_store import RunStore
+from roboeval.web.serializers import run_data
+from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.widgets import EVERY, HeatMap, count_text, draw_state, page, score_text
+
+MOST = 12
+"""Runs side by side; more are no comparison."""
+
+MOST_NAME = 60
+NOT_ALIKE = "These runs were judged by different suites or versions of a suite. Compare with care."
+Names = Annotated[list[str] | None, Query()]
+
+
+def add(store: RunStore, frame: Frame) -> None:
+    """Put the page at its address.
+
+    Args:
+        store: whose runs.
+        frame: what all pages have.
+    """
+
+    @ui.page("/side-by-side", response_timeout=PATIENCE)
+    async def compare_runs(run: Names = None) -> None:
+        names = list(dict.fromkeys(run or ()))
+        with page(frame, "Side by side"):
+            Words("h1", "Runs side by side")
+            if not names:
+                Words("p", "Tick runs in the list, then show them side by side.", "quiet")
+                html.a("All runs", href="/runs")
+                return
+            if len(names) > MOST:
+                Words("p", f"These are the first {MOST} of {len(names):,} runs.", "quiet")
+            comparison = _Comparison(store, names[:MOST])
+            await comparison.refresh()
+        ui.timer(EVERY, comparison.refresh, immediate=False)
+
+
+class _Comparison:
+    """Runs beside each other, kept up to date with their folders."""
+
+    def __init__(self, store: RunStore, names: Sequence[str]) -> None:
+        self._store, self._names = store, names
+        self._versions: list[Hashable] = []
+        self._troubles = ui.element("div").props("role=status")
+        self._list = ui.element("ul").classes("beside-list")
+        with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
+            Words("h2", "Where they pass").props("id=h-heat")
+            self._tasks = HeatMap("Tasks by prompts, run by run", "Task")
+            text = "Percent of the completions of each prompt; the first column of a run is their mean."
+            Words("p", text, "quiet")
+        with ui.element("section").classes("pane causes").props("aria-labelledby=h-kinds"):
+            Words("h2", "Why they fail").props("id=h-kinds")
+            self._kinds = HeatMap("Kinds of failures by run", "Kind of failure")
+            Words("p", "Percent of all completions of a run.", "quiet")
+
+    async def refresh(self) -> None:
+        """Show the runs as they are now."""
+        runs, troubles = await asyncio.to_thread(self._read)
+        versions: list[Hashable] = [*((run.name, run.version) for run in runs), *troubles]
+        if versions != self._versions:
+            self._versions = versions
+            self._show(runs, troubles)
+
+    def _read(self) -> tuple[list[Snapshot], list[str]]:
+        runs, troubles = [], []
+        for name in self._names:
+            try:
+                runs.append(self._store.open(name))
+            except BadInput as error:
+                troubles.append(error.sentence)
+        judged_by = {_judge_of(run.results.head) for run in runs if run.judged}
+        return runs, [*troubles, *[NOT_ALIKE] * (len(judged_by) > 1)]
+
+    def _show(self, runs: Sequence[Snapshot], troubles: Sequence[str]) -> None:
+        self._troubles.clear()
+        with self._troubles:
+            for sentence in troubles:
+                Words("p", sentence, "trouble")
+        self._list.clear()
+        with self._list:
+            for run in runs:
+                _draw_run(run)
+        cells = [TaskCells(run, Filter(), None) for run in runs]
+        groups = [
+            {**_head(run), "columns": columns(of_run.prompts)}
+            for run, of_run in zip(runs, cells, strict=True)
+        ]
+        rows = [
+            {
+                "name": shortened(task, MOST_NAME),
+                "cells": [cell for of_run in cells for cell in of_run.row(task)],
+            }
+            for task in dict.fromkeys(task for of_run in cells for task in of_run.tasks)
+        ]
+        self._tasks.show(groups, rows)
+        judged = [run for run in runs if run.judged]
+        self._kinds.show([{"name": "", "columns": [*map(_head, judged)]}], failure_rows(judged))
+
+
+def _judge_of(head: Mapping[str, Any]) -> tuple[str, ...]:
+    """By what a run was judged: runs of which it differs cannot be compared."""
+    return tuple(str(head.get(part)) for part in ("suite", "digest", "ablation"))
+
+
+def _head(run: Snapshot) -> dict[str, Any]:
+    return {"name": shortened(run.name, MOST_NAME), "title": models_of(run), "href": address(run.name)}
+
+
+def _draw_run(run: Snapshot) -> None:
+    data = run_data(run)
+    with ui.element("li"):
+        html.a(shortened(run.name, MOST_NAME), href=address(run.name)).props("dir=auto")
+        draw_state(data, Words("small"))
+        Words("b", score_text(data))
+        Words("span", f"{count_text(data)} completions, {models_of(run)}", "quiet")

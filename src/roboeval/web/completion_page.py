@@ -1,0 +1,187 @@
+"""The page of one completion: the program, and in each world what the robot did, what failed, and why."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import html, ui
+
+from codebotler.badinput import BadInput
+from codebotler.storyboard import step_text
+from codebotler.terminal import shortened
+from codebotler.web.floorplan import floorplan
+from codebotler.web.frame import PATIENCE, Frame
+from codebotler.web.sceneview import draw_scene
+from codebotler.web.strip import scenes
+from codebotler.web.words import Words
+from codebotler.world import World
+from roboeval.analysis.tasks import by_hand
+from roboeval.evaluation.completions import Key, name_of
+from roboeval.evaluation.explanation import NOT_RECORDED, cut_told
+from roboeval.evaluation.failures import label_of
+from roboeval.suites.catalogue import person_told
+from roboeval.web.api import Chosen, Evaluation
+from roboeval.web.heat_map import address
+from roboeval.web.run_store import RunStore
+from roboeval.web.serializers import completion_details
+from roboeval.web.snapshot import Filter, Snapshot
+from roboeval.web.widgets import Code, page
+
+MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION = 80, 2_000, 5_000
+CHANGED = "The program was changed or removed after it was judged; the verdicts are on the earlier one."
+
+
+def add(store: RunStore, frame: Frame) -> None:
+    """Put the page at its address.
+
+    Args:
+        store: whose runs.
+        frame: what all pages have.
+    """
+
+    @ui.page("/runs/{run}/{name:path}", response_timeout=PATIENCE)
+    async def show_completion(run: str, name: str, chosen: Chosen, evaluation: Evaluation = None) -> None:
+        with page(frame, shortened(name, MOST_NAME)):
+            snapshot, data = await asyncio.to_thread(_read, store, run, name, evaluation)
+            _draw_head(snapshot, data, chosen, chosen.query(evaluation))
+            with ui.element("div").classes("one-program"):
+                _draw_program(data)
+                _draw_worlds(data["worlds"], _worlds(snapshot, data["task"]))
+
+
+def _read(store: RunStore, run: str, name: str, evaluation: str | None) -> tuple[Snapshot, dict[str, Any]]:
+    snapshot = store.open(run, evaluation)
+    row = snapshot.row(name)
+    if row is None:
+        raise BadInput(f'this run has no completion "{shortened(name, MOST_NAME)}"')
+    return snapshot, completion_details(snapshot, row)
+
+
+def _worlds(run: Snapshot, task: str) -> dict[str, World]:
+    """The worlds in which a task was judged, by what they are about; none if the suite is not at hand."""
+    if run.suite is None or task not in run.suite.tasks:
+        return {}
+    scenarios = run.suite.tasks[task].judged_in(ablated=run.results.is_ablated)
+    return {scenario.world.about: scenario.world for scenario in scenarios}
+
+
+def _draw_head(run: Snapshot, data: Mapping[str, Any], chosen: Filter, query: str) -> None:
+    key: Key = data["task"], data["prompt"], data["index"]
+    with ui.element("nav").classes("trail").props('aria-label="Where this is"'):
+        html.a(shortened(run.name, MOST_NAME), href=f"{address(run.name)}{query}#completions").props(
+            "dir=auto"
+        )
+        for text, other in zip(("Previous", "Next"), run.neighbours(key, chosen), strict=True):
+            if other is not None:
+                task, prompt, index = other
+                href = f"{address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
+                html.a(text, href=href).classes("beside")
+    Words("h1", shortened(name_of(key), MOST_NAME))
+    with ui.element("p").classes("facts"):
+        why, state = data["failure"], {None: "waits", True: "done", False: "failed"}[data["passed"]]
+        verdict = "not judged yet" if data["passed"] is None else "passed"
+        if why is not None:
+            verdict = shortened(f"{label_of(why['class'])}: {why['kind']}")
+        Words("small", verdict, f"state state-{state}")
+        if data["model"] is not None:
+            Words("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
+    if data["stale"]:
+        Words("p", CHANGED, "trouble")
+    instruction = data["instruction"]
+    text = NOT_RECORDED if instruction is None else shortened(instruction, MOST_INSTRUCTION)
+    Words("p", text, "instruction")
+
+
+def _draw_program(data: Mapping[str, Any]) -> None:
+    with ui.element("section").classes("pane").props("aria-labelledby=h-program"):
+        Words("h2", "Program").props("id=h-program")
+        if data["program"] is None:
+            Words("p", "It is no longer in this run.", "quiet")
+            return
+        lines = (world["line"] for world in data["worlds"] if not world["satisfied"])
+        code = Code(data["program"], (line for line in lines if line is not None))
+        if code.left_out:
+            Words("p", f"{code.left_out:,} more lines; all are in completions.jsonl.", "quiet")
+
+
+def _draw_worlds(judged: Sequence[Mapping[str, Any]], worlds: Mapping[str, World]) -> None:
+    with ui.element("div").classes("worlds-of"):
+        if not judged:
+            Words("p", "It has not been judged yet.", "quiet")
+        for number, data in enumerate(judged, 1):
+            with ui.element("article").classes("pane world-of").props(f"aria-labelledby=h-world-{number}"):
+                with ui.element("div").classes("head"):
+                    title = f"World {number} of {len(judged)}: {shortened(data['world'], 300)}"
+                    Words("h2", title).props(f"id=h-world-{number}")
+                    state = ("satisfied", "done") if data["satisfied"] else ("not satisfied", "failed")
+                    Words("small", state[0], f"state state-{state[1]}")
+                _draw_world(data, worlds.get(data["world"]))
+
+
+def _draw_world(data: Mapping[str, Any], world: World | None) -> None:
+    steps, cut = data["steps"], data.get("cut")
+    wrong = {check["step"] for check in data["failed_checks"]} - {None}
+    if data["error"] is not None:
+        Words("p", _error_text(data), "quiet" if data["satisfied"] else "trouble")
+    with ui.element("ul").classes("failed-checks"):
+        for check in data["failed_checks"]:
+            _draw_check(check)
+    if not steps and cut is None:
+        Words("p", "The robot did nothing.", "quiet")
+    elif steps and "place" in steps[0]:
+        with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
+            for scene in scenes(steps, steps[0]["place"], wrong):
+                draw_scene(scene, wrong)
+    if cut is not None:
+        Words("p", f"{cut_told(cut)}.", "quiet")
+    if steps:
+        kept = "Every step" if cut is None else "Every step that was kept"
+        _draw_folded(f"{kept}, {len(steps):,} in all", lambda: _draw_steps(steps))
+    if world is not None:
+        _draw_folded("The world", lambda: _draw_rooms(world))
+
+
+def _error_text(data: Mapping[str, Any]) -> str:
+    error, line = data["error"], "" if data["line"] is None else f"line {data['line']}: "
+    allowed = " A program may wait for ever in this world, so this is allowed." if data["satisfied"] else ""
+    return f"{shortened(error['kind'])}: {line}{shortened(error['message'])}{allowed}"
+
+
+def _draw_check(check: Mapping[str, Any]) -> None:
+    with ui.element("li").classes("failed-check"):
+        Words("code", shortened(check["check"]))
+        if check["explanation"] is not None:
+            Words("span", shortened(check["explanation"], MOST_SENTENCE))
+        if check["step"] is not None:
+            Words("small", f"step {check['step']}", "quiet")
+
+
+def _draw_folded(title: str, draw: Callable[[], None]) -> None:
+    """Something that is drawn when it is unfolded for the first time."""
+    with html.details() as details:
+        Words("summary", title)
+        inside = ui.element("div").classes("unfolded")
+
+    def unfold() -> None:
+        if not inside.default_slot.children:
+            with inside:
+                draw()
+
+    details.on("toggle", unfold, args=[])
+
+
+def _draw_steps(steps: Sequence[Mapping[str, Any]]) -> None:
+    lines = (f"{step['step']:>4}  {step_text(step).plain}" for step in steps)
+    Words("pre", "\n".join(lines), "source").props('tabindex=0 aria-label="Every step"')
+
+
+def _draw_rooms(world: World) -> None:
+    ui.html(floorplan(world, None, world.robot), sanitize=False).classes("map")
+    with ui.element("dl").classes("rooms"):
+        for room in world.rooms:
+            inside = ", ".join([*map(person_told, room.people), *room.objects])
+            Words("dt", shortened(room.name, 200))
+            Words("dd", shortened(inside, 500) if inside else "nobody and nothing")

@@ -1,0 +1,231 @@
+"""The folder of runs: each run is found by its name, and read again when one of its files has changed."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import stat
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeAlias
+
+from codebotler.badinput import BadInput
+from codebotler.terminal import note, shortened
+from roboeval.evaluation.results import Results, read_results
+from roboeval.evaluation.run import Run
+from roboeval.suites.installed import installed_suites
+from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
+from roboeval.web.snapshot import Snapshot
+
+MOST_HELD = 16
+"""Evaluations that stay in memory."""
+
+REST = 10
+"""A growing run is not read again before so many times as long has passed as reading it took."""
+
+
+Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
+
+
+class RunGoneError(BadInput):
+    """A run that is not there any more."""
+
+
+class RunStore:
+    """The runs in a folder, for any thread.
+
+    Args:
+        folder: in which they lie, or one that is a run itself; it need not exist yet.
+        suites: by which runs may have been judged, besides those that ship or are installed.
+    """
+
+    def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
+        self.folder = folder
+        self._suites: dict[str, Suite | None] = {suite.name: suite for suite in suites}
+        self._readers: OrderedDict[tuple[str, str | None], _Reader] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def names(self) -> list[str]:
+        """The names of the runs, sorted.
+
+        Raises:
+            BadInput: the folder cannot be read.
+        """
+        if self._is_run:
+            return [self.folder.resolve().name]
+        return sorted(name for name in _entries(self.folder) if _is_run(self.folder / name))
+
+    def open(self, name: str, key: str | None = None) -> Snapshot:
+        """A run as it is now, or was a moment ago.
+
+        Args:
+            name: of the run.
+            key: of the evaluation; by default the first that requires everything, or none if there is none.
+
+        Raises:
+            BadInput: there is no such run or evaluation, or one of its files cannot be read.
+        """
+        return self._reader(name, key).read()
+
+    def version(self, name: str) -> Hashable:
+        """What differs whenever something in a run has changed, without reading it.
+
+        Raises:
+            BadInput: as `open` does.
+        """
+        return self._reader(name, None).version()
+
+    def suite(self, name: str) -> Suite | None:
+        """A suite that ships, is installed or was named; None if it is not at hand."""
+        if name not in self._suites:
+            known = {*shipped_suites(), *(brought.name for brought in installed_suites())}
+            try:
+                self._suites[name] = load_suite(name) if name in known else None
+            except BadInput as error:
+                note(f"a suite is left out: {error}")
+                self._suites[name] = None
+        return self._suites[name]
+
+    @property
+    def _is_run(self) -> bool:
+        return Run(self.folder).completions.is_file()
+
+    def _run(self, name: str) -> Run:
+        """By a name that stands in the folder, letter by letter; so none leads anywhere else."""
+        path = self.folder.resolve() if self._is_run else self.folder / name
+        if name not in ([path.name] if self._is_run else _entries(self.folder)) or not _is_run(path):
+            raise RunGoneError(f'there is no run "{shortened(name)}" in this folder; perhaps it was deleted')
+        if not path.resolve().is_relative_to(self.folder.resolve()):
+            raise BadInput(f'"{shortened(name)}" leads out of the folder of runs, where nothing is read')
+        return Run(path)
+
+    def _reader(self, name: str, key: str | None) -> _Reader:
+        run = self._run(name)
+        keys = (path.stem for path in run.rows("").parent.glob("*.jsonl"))
+        known = tuple(sorted(keys, key=lambda one: (one.endswith(ABLATED), one)))
+        if key is None:
+            key = known[0] if known else None
+        elif key not in known:
+            raise BadInput(f'"{shortened(name)}" has no evaluation "{shortened(key)}"')
+        with self._lock:
+            reader = self._readers.setdefault((name, key), _Reader(self, run, key))
+            self._readers.move_to_end((name, key))
+            while len(self._readers) > MOST_HELD:
+                self._readers.popitem(last=False)
+        reader.evaluations = known
+        return reader
+
+
+class _Reader:
+    """One evaluation of a run, read again when one of its files has changed."""
+
+    def __init__(self, store: RunStore, run: Run, key: str | None) -> None:
+        self._store, self._run, self._key = store, run, key
+        self.evaluations: tuple[str, ...] = ()
+        self._lock = threading.Lock()
+        self._results: Results | None = None
+        self._stamps: Stamps = ()
+        self._rests_until = 0.0
+        self._snapshot: Snapshot | None = None
+
+    def read(self) -> Snapshot:
+        """It as it is now, or was a moment ago."""
+        with self._lock:
+            stamps = self._stamps_now()
+            is_new = stamps != self._stamps and time.monotonic() >= self._rests_until
+            if self._results is None or is_new:
+                self._results, self._stamps = self._timed(stamps), stamps
+            version = self._version(self._stamps)
+            if self._snapshot is None or self._snapshot.version != version:
+                self._snapshot = Snapshot(self._results, self.evaluations, self._is_written, version)
+            return self._snapshot
+
+    def version(self) -> Hashable:
+        """The version of what would be read now."""
+        return self._version(self._stamps_now())
+
+    def _version(self, stamps: Stamps) -> Hashable:
+        return self._key, self.evaluations, self._is_written, stamps
+
+    def _stamps_now(self) -> Stamps:
+        """What tells one state of its files from another."""
+        run, key = self._run, self._key or ""
+        paths = (
+            run.completions,
+            run.about,
+            run.rows(key),
+            run.head(key),
+            run.checks(key.removesuffix(ABLATED)),
+        )
+        within = self._store.folder.resolve()
+        return tuple(_stamp(path, within) for path in paths)
+
+    @property
+    def _is_written(self) -> bool:
+        return _is_locked(self._run.path / ".lock")
+
+    def _timed(self, stamps: Stamps) -> Results:
+        began = time.monotonic()
+        results = self._read_files()
+        ended = time.monotonic()
+        changed = bool(results.faults) and self._stamps_now() != stamps  # faults of a mixture of two states
+        self._rests_until = ended if changed else ended + REST * (ended - began)
+        return results
+
+    def _read_files(self) -> Results:
+        faults: list[BadInput] = []
+        results = read_results(self._run, self._key, keep_failed=False, faults=faults)
+        there = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
+        name = results.head.get("suite") or results.about.get("suite")
+        suite = self._store.suite(name if isinstance(name, str) else "paper")
+        return replace(results, suite=suite, faults=there)
+
+
+def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
+    """What changes when a file does; None if there is none."""
+    try:
+        found = path.resolve(strict=True)
+        status = found.stat()
+    except OSError:
+        return None
+    if not found.is_relative_to(within):
+        raise BadInput("leads out of the folder of runs, where nothing is read", file=path.name)
+    if not stat.S_ISREG(status.st_mode):
+        raise BadInput("is no file", file=path.name)
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def _is_locked(path: Path) -> bool:
+    """Whether a process writes the run. Our hold lasts a moment, for which a writer has patience."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(descriptor)
+    return False
+
+
+def _entries(folder: Path) -> list[str]:
+    try:
+        return [path.name for path in folder.iterdir()]
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        raise BadInput(f"cannot be read ({error.strerror})", file=folder) from None
+
+
+def _is_run(path: Path) -> bool:
+    """Whether a folder looks like a run; also while its first completion is waited for."""
+    if path.name.startswith(".") or not path.name.isprintable():
+        return False
+    run = Run(path)
+    return run.completions.exists() or run.about.exists()

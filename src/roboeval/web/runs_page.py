@@ -1,0 +1,160 @@
+"""The page of all runs: who wrote each, how far it has come, and how often its programs pass."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from nicegui import html, ui
+
+from codebotler.badinput import BadInput
+from codebotler.pasted import runnable
+from codebotler.terminal import shortened
+from codebotler.web.frame import PATIENCE, Frame
+from codebotler.web.words import Press, Words
+from roboeval.web.heat_map import NONE, address
+from roboeval.web.run_store import RunStore
+from roboeval.web.serializers import RunList
+from roboeval.web.widgets import EVERY, count_text, draw_state, page
+
+READ_FOR = 0.5
+"""Seconds after which the page is shown, whether all runs were read or not."""
+
+ORDERS: Mapping[str, tuple[str, Callable[[Mapping[str, Any]], tuple[float, str]]]] = {
+    "Run": ("ascending", lambda run: (0, str(run["run"]).lower())),
+    "pass@1": ("descending", lambda run: (-(run.get("pass@1") or {"mean": -1})["mean"], str(run["run"]))),
+    "Completions": ("descending", lambda run: (-run.get("completions", 0), str(run["run"]))),
+}
+COLUMNS = ("Run", "Suite", "State", "Completions", "pass@1")
+NOTHING = "There is no run here yet. The first one, without a key or a network:"
+FIRST = "run --model recorded:hasty --num-completions 3"
+MOST_NAME = 80
+
+
+def add(store: RunStore, frame: Frame) -> None:
+    """Put the page at its address.
+
+    Args:
+        store: whose runs.
+        frame: what all pages have.
+    """
+    runs = RunList(store)
+
+    @ui.page("/runs", response_timeout=PATIENCE)
+    async def list_runs() -> None:
+        with page(frame, "Runs"):
+            Words("h1", "Runs")
+            Words("p", f"In {shortened(str(store.folder.resolve()), 200)}", "quiet")
+            table = _Table(runs)
+        await table.refresh()
+        ui.timer(EVERY, table.refresh, immediate=False)
+
+
+class _Table:
+    """The runs as rows of a table."""
+
+    def __init__(self, runs: RunList) -> None:
+        self._runs = runs
+        self._order = "Run"
+        self._heads: dict[str, ui.element] = {}
+        self._data: list[dict[str, Any]] = []
+        self._rows: list[_Row] = []
+        self._trouble = Words("p", "", "trouble").props("role=alert")
+        self._trouble.say("")
+        self._empty = ui.element("div").classes("first-run")
+        with self._empty:
+            Words("p", NOTHING, "quiet")
+            Words("pre", f"{runnable('roboeval')} {FIRST}", "source").props("tabindex=0")
+        self._form = ui.element("form").props("action=/side-by-side method=get")
+        with self._form:
+            region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Runs"')
+            with region, html.table().classes("runs"):
+                with html.thead(), html.tr():
+                    with html.th().props("scope=col").classes("tick"):
+                        Words("span", "Side by side", "unseen")
+                    for name in COLUMNS:
+                        self._draw_head(name)
+                self._body = html.tbody()
+            html.button("Show side by side", type="submit").classes("plain")
+
+    def _draw_head(self, name: str) -> None:
+        with html.th().props("scope=col") as cell:
+            if name in ORDERS:
+                Press(name, lambda: self._sort(name), "sort")
+                self._heads[name] = cell
+            else:
+                Words("span", name)
+
+    def _sort(self, name: str) -> None:
+        self._order = name
+        self._show(self._data)
+
+    async def refresh(self) -> None:
+        """Show the runs as they are now."""
+        try:
+            data = await asyncio.to_thread(self._runs.data, READ_FOR)
+        except BadInput as error:
+            self._trouble.say(str(error))
+            return
+        self._trouble.say("")
+        self._show(data)
+
+    def _show(self, data: Sequence[dict[str, Any]]) -> None:
+        self._data = sorted(data, key=ORDERS[self._order][1])
+        for name, head in self._heads.items():
+            head.props(f"aria-sort={ORDERS[name][0] if name == self._order else 'none'}")
+        self._empty.set_visibility(not data)
+        self._form.set_visibility(bool(data))
+        if [row.name for row in self._rows] != [run["run"] for run in self._data]:
+            self._body.clear()
+            with self._body:
+                self._rows = [_Row(run["run"]) for run in self._data]
+        for row, run in zip(self._rows, self._data, strict=True):
+            row.show(run)
+
+
+class _Row:
+    """A run as a row of the table."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        with html.tr():
+            with html.td().classes("tick"):
+                box = ui.element("input").props("type=checkbox name=run")
+                box.props["value"] = name
+                box.props["aria-label"] = f"Show {shortened(name, MOST_NAME)} side by side with others"
+            with html.th().props("scope=row"):
+                with html.a(href=address(name)):
+                    Words("b", shortened(name, MOST_NAME))
+                self._models = Words("span", "", "quiet")
+                self._notes = Words("span", "", "bad note")
+            with html.td():
+                self._suite = Words("span", "")
+            with html.td():
+                self._state = Words("small", "")
+                self._bar = html.progress(max="1")
+            with html.td().classes("count"):
+                self._count = Words("span", "")
+            with html.td().classes("score"):
+                self._score = Words("b", "")
+                self._interval = Words("span", "", "quiet")
+                self._meter = ui.element("span").classes("meter").props("aria-hidden=true")
+
+    def show(self, run: Mapping[str, Any]) -> None:
+        """Show its numbers.
+
+        Args:
+            run: as `run_data` gives it.
+        """
+        by_hand = ", programs written by hand" if run.get("by_hand") else ""
+        self._models.say(shortened(", ".join(run.get("models", ())), 160) + by_hand)
+        self._notes.say(" ".join(run["notes"][:1]))
+        self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or NONE), MOST_NAME))
+        draw_state(run, self._state, self._bar)
+        self._count.say(count_text(run))
+        mean = run.get("pass@1")
+        self._score.say(NONE if mean is None else f"{mean['mean']:.3f}")
+        self._interval.say("" if mean is None else f"{mean['low']:.2f} to {mean['high']:.2f}")
+        self._meter.set_visibility(mean is not None)
+        self._meter.style(f"--share: {0 if mean is None else mean['mean']:.3f}")

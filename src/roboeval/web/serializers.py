@@ -1,0 +1,228 @@
+"""Runs and completions as plain data, for the API and the pages."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Hashable, Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from codebotler.badinput import BadInput
+from codebotler.terminal import shortened
+from roboeval.analysis.tasks import by_hand
+from roboeval.evaluation.completions import Key, how_many, name_of
+from roboeval.evaluation.explanation import GONE, completion_data
+from roboeval.suites.load import Suite
+from roboeval.web.run_store import RunStore
+from roboeval.web.snapshot import KEY, Cell, Filter, Snapshot
+
+MOST_FAULTS = 5
+MOST_NAME, MOST_REASON = 120, 300
+
+
+class State(StrEnum):
+    """How far a run has come."""
+
+    READING = "being read"
+    GENERATING = "being generated"
+    JUDGING = "being judged"
+    UNFINISHED = "unfinished"
+    NOT_JUDGED = "not judged"
+    JUDGED = "judged"
+    EMPTY = "empty"
+    DAMAGED = "damaged"
+    UNREADABLE = "not read"
+
+
+def state_of(run: Snapshot, wanted: int | None) -> State:
+    """How far a run has come.
+
+    Args:
+        run: as it was last read.
+        wanted: how many completions it shall have; None where nobody recorded that.
+    """
+    lacks = wanted is not None and run.written < wanted
+    unjudged = run.judged < run.to_judge
+    stages = (
+        (State.GENERATING, run.is_written and (lacks or not run.written)),
+        (State.JUDGING, run.is_written and unjudged),
+        (State.DAMAGED, bool(run.results.faults)),
+        (State.EMPTY, run.completions.is_empty()),
+        (State.NOT_JUDGED, not lacks and not run.judged),
+        (State.UNFINISHED, lacks or unjudged),
+    )
+    return next((state for state, holds in stages if holds), State.JUDGED)
+
+
+def wanted_count(about: Mapping[str, Any], suite: Suite | None) -> int | None:
+    """How many completions a run shall have, as its run.json says; None where nobody recorded that."""
+    each, tasks = about.get("num_completions"), about.get("tasks")
+    if not isinstance(each, int) or suite is None:
+        return None
+    selected = suite.tasks if not isinstance(tasks, list) else [name for name in tasks if name in suite.tasks]
+    return each * sum(len(suite.tasks[name].prompts) for name in selected)
+
+
+def run_data(run: Snapshot) -> dict[str, Any]:
+    """A run in short."""
+    results, mean = run.results, run.pass_at_1
+    wanted = wanted_count(results.about, run.suite)
+    return {
+        "run": run.name,
+        "models": run.models,
+        "by_hand": bool(by_hand(run.models)),
+        "suite": (results.head if results.key else results.about).get("suite"),
+        "evaluation": results.key,
+        "evaluations": list(run.evaluations),
+        "state": state_of(run, wanted),
+        "read": 1.0,
+        "completions": run.written,
+        "wanted": wanted,
+        "judged": run.judged,
+        "to_judge": run.to_judge,
+        "passed": run.passed,
+        "pass@1": None if mean is None else {"mean": mean.mean, "low": mean.low, "high": mean.high},
+        "notes": notes(run),
+    }
+
+
+class RunList:
+    """All runs in short, each of them read only when something in it has changed.
+
+    Args:
+        store: whose runs.
+    """
+
+    def __init__(self, store: RunStore) -> None:
+        self._store = store
+        self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
+
+    def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
+        """What is known of all runs; of one that cannot be read, why.
+
+        Args:
+            seconds: after which no further run is read.
+
+        Raises:
+            BadInput: the folder cannot be read.
+        """
+        until = time.monotonic() + seconds
+        return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
+
+    def _run_data(self, name: str, *, may_read: bool) -> dict[str, Any]:
+        try:
+            known = self._known.get(name)
+            if known is not None and (not may_read or known[0] == self._store.version(name)):
+                return known[1]
+            if not may_read:
+                return {"run": name, "state": State.READING, "notes": []}
+            run = self._store.open(name)
+            self._known[name] = run.version, run_data(run)
+            return self._known[name][1]
+        except BadInput as error:
+            return {"run": name, "state": State.UNREADABLE, "notes": [str(error)]}
+
+
+def notes(run: Snapshot) -> list[str]:
+    """What is wrong with a run, in sentences."""
+    faults, results = run.results.faults, run.results
+    found = [
+        str(BadInput(f.sentence, file=Path(str(f.file)).name, line=f.line)) for f in faults[:MOST_FAULTS]
+    ]
+    if len(faults) > MOST_FAULTS:
+        found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
+    if faults:
+        found.append("The other rows are shown.")
+    if run.stale:
+        changed = f"{how_many(run.stale)} changed since the verdict"
+        found.append(f"{changed}; `roboeval evaluate` with --redo judges anew.")
+    if run.judged and run.suite is None:
+        name = shortened(str(results.head.get("suite")), MOST_NAME)
+        found.append(
+            f'The suite "{name}" was not found, so failed checks cannot be explained; '
+            "`roboeval serve --suite FOLDER` names it."
+        )
+    elif run.judged and run.suite is not None and results.head.get("digest") != run.suite.digest:
+        found.append("The suite has changed since this run was judged; explanations may be missing.")
+    return found
+
+
+def run_details(run: Snapshot) -> dict[str, Any]:
+    """A run with its tasks, prompts and kinds of failures."""
+    means = {score.task: score.pass_at(1).mean for score in run.scores}
+    tasks: dict[str, list[dict[str, Any]]] = {}
+    for cell in run.cells(Filter(passed=True)):
+        tasks.setdefault(cell.task, []).append(_prompt_data(cell, run.suite))
+    kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
+    kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
+    return {
+        **run_data(run),
+        "tasks": [
+            {"task": task, "pass@1": means.get(task), "prompts": prompts} for task, prompts in tasks.items()
+        ],
+        "failures": [
+            {"class": name, "kind": kind.name, "count": kind.count, "share": kind.share}
+            for name, kind in kinds
+        ],
+    }
+
+
+def _prompt_data(cell: Cell, suite: Suite | None) -> dict[str, Any]:
+    task = suite.tasks.get(cell.task) if suite is not None else None
+    prompts = () if task is None else task.prompts
+    return {
+        "prompt": cell.prompt,
+        "instruction": prompts[cell.prompt] if cell.prompt < len(prompts) else None,
+        "completions": cell.written,
+        "judged": cell.judged,
+        "passed": cell.counted,
+        "pass@1": cell.share,
+    }
+
+
+def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A completion in short.
+
+    Args:
+        row: of `Snapshot.completions`.
+    """
+    failure = {name: row[f"failure_{name}"] for name in ("class", "kind", "world", "check")}
+    return {
+        **{name: row[name] for name in (*KEY, "passed")},
+        "failure": None if row["failure_class"] is None else failure,
+        "why": shortened(row["why"], MOST_REASON),
+        "worlds": row["worlds"],
+        "stale": row["stale"],
+    }
+
+
+def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
+    """A completion with its program, and with each world's steps, failed checks and explanations.
+
+    Args:
+        run: in which it is.
+        row: of `Snapshot.completions`.
+
+    Raises:
+        BadInput: its row in the file is damaged, or does not stand there any more.
+    """
+    results = run.results
+    key: Key = row["task"], row["prompt"], row["index"]
+    completion = results.completions.get(key)
+    more = {"evaluation": results.key, "stale": row["stale"], "note": GONE if row["stale"] else None}
+    if row["passed"] is None:
+        known = {name: getattr(completion, name, None) for name in ("model", "instruction", "program")}
+        return {**entry_data(row), **known, **more, "worlds": []}
+    judged = results.row(key)
+    try:
+        data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
+    except (BadInput, KeyError, TypeError, IndexError, AttributeError, ValueError):
+        what = f"the row of {shortened(name_of(key), MOST_NAME)} is damaged; --redo judges it again"
+        raise BadInput(what, file=results.run.rows(results.key or "").name) from None
+    if run.suite is None:
+        for world in data["worlds"]:
+            for check in world["failed_checks"]:
+                check["explanation"] = None
+    return {**data, **more}

@@ -1,0 +1,228 @@
+"""A run as it was last read: a row for each completion, judged or not, and what is counted of them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import asdict, dataclass, replace
+from typing import Annotated, Any, Self
+from urllib.parse import urlencode
+
+import polars as pl
+from fastapi import Query
+
+from codebotler.cachedproperty import cached_property
+from roboeval.analysis.metrics import Estimate, TaskScore, overall, task_scores
+from roboeval.analysis.summary import Failures, failures
+from roboeval.evaluation.completions import Key
+from roboeval.evaluation.results import Results
+from roboeval.evaluation.table import storable
+from roboeval.suites.load import Suite
+
+KEY = ("task", "prompt", "index")
+SIGN = (
+    pl.when("satisfied")
+    .then(pl.lit("+"))
+    .when((pl.col("status") == "finished") | pl.col("error_kind").is_null())
+    .then(pl.lit("-"))
+    .otherwise(pl.lit("!"))
+)
+"""How a program did in a world: + satisfied, - not, ! ended by an error."""
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Which completions are meant, as addresses of the pages and of the API name them."""
+
+    task: Annotated[str | None, Query(description="Only of this task.")] = None
+    prompt: Annotated[
+        int | None, Query(ge=0, lt=2**63, description="Only of this prompt, counted from 0.")
+    ] = None
+    passed: Annotated[bool | None, Query(description="Only those that passed, or those that failed.")] = None
+    failure: Annotated[str | None, Query(description="Only those that failed by this class.")] = None
+    kind: Annotated[str | None, Query(description="Only those that failed by this kind.")] = None
+
+    @property
+    def condition(self) -> pl.Expr:
+        """It as a condition on `Snapshot.completions`."""
+        columns = ("task", "prompt", "passed", "failure_class", "failure_kind")
+        values = (self.task, self.prompt, self.passed, self.failure, self.kind)
+        wanted = [
+            pl.col(name) == value for name, value in zip(columns, values, strict=True) if value is not None
+        ]
+        return pl.all_horizontal(pl.lit(value=True), *wanted)
+
+    def query(self, evaluation: str | None) -> str:
+        """It as the query of an address; empty if it means all completions of the usual evaluation."""
+        values = {"evaluation": evaluation, **asdict(self)}
+        if self.passed is not None:
+            values["passed"] = str(self.passed).lower()
+        query = urlencode({name: v for name, v in values.items() if v is not None}, errors="replace")
+        return f"?{query}" if query else ""
+
+    @property
+    def verdict(self) -> Self:
+        """The same in all tasks and prompts."""
+        return replace(self, task=None, prompt=None)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The completions of a prompt.
+
+    Args:
+        task: its task.
+        prompt: counted from 0.
+        written: how many there are.
+        judged: how many of them were judged.
+        counted: how many of those meet a condition.
+    """
+
+    task: str
+    prompt: int
+    written: int
+    judged: int
+    counted: int
+
+    @property
+    def share(self) -> float | None:
+        """Of the judged ones, those that are counted; None where none is judged."""
+        return self.counted / self.judged if self.judged else None
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """One evaluation of a run as it was last read.
+
+    Args:
+        results: the verdicts; lines that could not be read are among its faults.
+        evaluations: the names of all evaluations of the run.
+        is_written: whether a process is writing the run.
+        version: differs whenever something has changed.
+    """
+
+    results: Results
+    evaluations: tuple[str, ...]
+    is_written: bool
+    version: Hashable
+
+    @property
+    def name(self) -> str:
+        """The name of the run."""
+        return self.results.run.path.name
+
+    @property
+    def suite(self) -> Suite | None:
+        """The suite by which it was judged, or is to be; None if it is not at hand."""
+        return self.results.suite
+
+    @cached_property
+    def completions(self) -> pl.DataFrame:
+        """A row for each completion, in the suite's order, also for those of which only the verdict is there.
+
+        `passed` is null where nothing was judged; `worlds` has a sign for each world, and `why` the check or
+        the error that decided.
+        """
+        judged = self.results.table.group_by(KEY, maintain_order=True).agg(
+            pl.col("passed", "^failure_.*$", "stale").first(),
+            SIGN.str.join("").alias("worlds"),
+            pl.coalesce("failure_check", "error_message")
+            .filter(pl.col("world_number") == pl.col("failure_world"))
+            .first()
+            .alias("why"),
+        )
+        keys = [(storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
+        schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64, "written": pl.Boolean}
+        written = pl.DataFrame(keys, schema=schema, orient="row")
+        tasks = () if self.suite is None else tuple(self.suite.tasks)
+        place = pl.col("task").replace_strict(
+            tasks, range(len(tasks)), default=len(tasks), return_dtype=pl.Int64
+        )
+        return (
+            judged.join(written, on=KEY, how="full", coalesce=True)
+            .with_columns(
+                pl.col("stale", "written").fill_null(value=False), pl.col("worlds", "why").fill_null("")
+            )
+            .sort(place, *KEY)
+        )
+
+    def row(self, name: str) -> dict[str, Any] | None:
+        """The row of a completion, by its name; None if there is none."""
+        found = self.completions.filter(pl.format("{}/{}/{}", *KEY) == name)
+        return found.row(0, named=True) if found.height else None
+
+    def select(self, filter: Filter) -> pl.DataFrame:  # noqa: A002 - what it is
+        """The completions that a filter means, in order."""
+        return self.completions.filter(filter.condition)
+
+    def neighbours(self, key: Key, filter: Filter) -> tuple[Key | None, Key | None]:  # noqa: A002
+        """The completions before and after one, among those that a filter means; None at an end."""
+        keys = [None, *self.select(filter).select(KEY).iter_rows(), None]
+        at = keys.index(key) if key in keys else None
+        return (None, None) if at is None else (keys[at - 1], keys[at + 1])
+
+    def cells(self, counted: Filter) -> list[Cell]:
+        """All prompts, in order, and how many of their completions a filter means in each."""
+        cells = self.completions.group_by("task", "prompt", maintain_order=True).agg(
+            written=pl.col("written").sum(),
+            judged=pl.col("passed").count(),
+            counted=counted.verdict.condition.sum(),
+        )
+        return [Cell(*cell) for cell in cells.iter_rows()]
+
+    @cached_property
+    def written(self) -> int:
+        """How many completions there are."""
+        return len(self.results.completions)
+
+    @cached_property
+    def judged(self) -> int:
+        """How many completions were judged."""
+        return self.completions["passed"].count()
+
+    @cached_property
+    def passed(self) -> int:
+        """How many completions passed."""
+        return int(self.completions["passed"].sum())
+
+    @cached_property
+    def to_judge(self) -> int:
+        """How many of the completions were to be judged."""
+        return self.results.scope.total
+
+    @cached_property
+    def stale(self) -> int:
+        """How many verdicts are on other programs than stand in the run now."""
+        return len(self.results.stale)
+
+    @cached_property
+    def models(self) -> list[str]:
+        """The models that wrote the completions, as far as that was recorded."""
+        return sorted({c.model for c in self.results.completions.values() if c.model is not None})
+
+    @cached_property
+    def scores(self) -> tuple[TaskScore, ...]:
+        """How often completions passed, by task and prompt."""
+        return task_scores(self.results.table)
+
+    @cached_property
+    def pass_at_1(self) -> Estimate | None:
+        """pass@1 over all prompts; None where nothing was judged."""
+        return overall(self.scores, 1) if self.scores else None
+
+    @cached_property
+    def failures(self) -> list[Failures]:
+        """The classes of failures that there are, each with its kinds, the most frequent first."""
+        classes = failures(self.results.table) if self.judged else ()
+        return [
+            replace(each, kinds=tuple(sorted(filter(_occurs, each.kinds), key=_frequency)))
+            for each in classes
+            if _occurs(each)
+        ]
+
+
+def _occurs(failures: Failures) -> bool:
+    return failures.count > 0
+
+
+def _frequency(failures: Failures) -> tuple[int, str]:
+    return -failures.count, failures.name

@@ -1,0 +1,182 @@
+"""Runs are found by name and read again when they change, and nothing leads out of their folder."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from codebotler.badinput import BadInput
+from roboeval.evaluation.run import Run
+from roboeval.suites.load import load_suite
+from roboeval.web import run_store
+from roboeval.web.run_store import MOST_HELD, RunGoneError, RunStore
+from seals import unseal
+
+
+def test_runs_are_listed_by_name(runs: Path) -> None:
+    (runs / "no-run").mkdir()
+    (runs / "file").write_text("")
+    (runs / "begun").mkdir()
+    (runs / "begun" / "run.json").write_text("{}")
+    shutil.copytree(runs / "hasty", runs / ".hidden")
+    assert RunStore(runs).names() == ["begun", "hasty"]
+    assert RunStore(runs / "nothing").names() == []
+
+
+def test_a_run_that_has_only_begun_is_not_damaged(runs: Path) -> None:
+    (runs / "begun").mkdir()
+    (runs / "begun" / "run.json").write_text("{}")
+    begun = RunStore(runs).open("begun")
+    assert (begun.written, begun.results.key, begun.results.faults) == (0, None, ())
+
+
+def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(runs / "hasty", runs / "other")
+    monkeypatch.chdir(runs / "hasty")
+    for folder in (runs / "hasty", Path()):
+        store = RunStore(folder)
+        assert store.names() == ["hasty"]
+        assert store.open("hasty").name == "hasty"
+        for name in ("other", "..", "../other"):
+            with pytest.raises(BadInput, match="no run"):
+                store.open(name)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["..", ".", "", "/etc", "../secret", "hasty/../../secret", "hasty/", "hasty\0", "HASTY", "x" * 300],
+)
+def test_no_name_leads_out(runs: Path, name: str) -> None:
+    shutil.copytree(runs / "hasty", runs.parent / "secret")
+    with pytest.raises(BadInput, match="no run"):
+        RunStore(runs).open(name)
+
+
+@pytest.mark.parametrize(
+    "path", ["", "completions.jsonl", "run.json", "evaluations", "evaluations/paper.jsonl", "checks"]
+)
+def test_no_link_leads_out(runs: Path, path: str) -> None:
+    secret = runs.parent / "secret"
+    shutil.copytree(runs / "hasty", secret)
+    link = runs / "hasty" / path
+    if link.is_dir():
+        shutil.rmtree(link)
+    link.unlink(missing_ok=True)
+    link.symlink_to(secret / path)
+    with pytest.raises(BadInput, match="leads out"):
+        RunStore(runs).open("hasty")
+
+
+def test_a_link_within_the_folder_is_a_run(runs: Path) -> None:
+    (runs / "again").symlink_to("hasty")
+    assert RunStore(runs).open("again").judged == 45
+
+
+def test_the_folder_itself_may_be_a_link(runs: Path) -> None:
+    link = runs.parent / "link"
+    link.symlink_to(runs)
+    assert RunStore(link).open("hasty").judged == 45
+
+
+def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(runs: Path) -> None:
+    rows = Run(runs / "hasty").rows("paper")
+    rows.unlink()
+    os.mkfifo(rows)
+    with pytest.raises(BadInput, match="no file") as error:
+        RunStore(runs).open("hasty")
+    assert error.value.file == "paper.jsonl"
+
+
+def test_evaluations_are_found_by_name(runs: Path) -> None:
+    run = Run(runs / "hasty")
+    shutil.copy(run.rows("paper"), run.rows("paper-ablation"))
+    shutil.copy(run.rows("paper"), run.rows("another"))
+    store = RunStore(runs)
+    assert store.open("hasty").evaluations == ("another", "paper", "paper-ablation")
+    assert store.open("hasty").results.key == "another"
+    assert store.open("hasty", "paper-ablation").results.key == "paper-ablation"
+    for key in ("../../secret", "none", ""):
+        with pytest.raises(BadInput, match="has no evaluation"):
+            store.open("hasty", key)
+
+
+def test_a_run_is_read_again_only_when_it_has_changed(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_store, "REST", 0)
+    store, run = RunStore(runs), Run(runs / "hasty")
+    first = store.open("hasty")
+    assert store.open("hasty") is first
+    assert store.version("hasty") == first.version
+    unseal(run.path)
+    lines = run.rows("paper").read_bytes().splitlines(keepends=True)
+    for content, judged in ((lines[:20], 20), ([*lines[:20], lines[20][:9]], 20), (lines[:30], 30)):
+        run.rows("paper").write_bytes(b"".join(content))
+        assert store.version("hasty") != first.version
+        again = store.open("hasty")
+        assert (again.judged, again.results.faults) == (judged, ())
+        assert again.version != first.version
+        first = again
+    run.rows("paper").unlink()
+    assert store.open("hasty").judged == 0
+
+
+def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_store, "REST", 1e9)
+    store, run = RunStore(runs), Run(runs / "hasty")
+    first = store.open("hasty")
+    completions = run.completions.read_bytes().splitlines(keepends=True)
+    run.completions.write_bytes(b"".join(completions[:20]))
+    assert store.open("hasty") is first
+    assert store.version("hasty") != first.version
+    with run.writing():
+        now = store.open("hasty")
+    assert (now.is_written, now.written) == (True, 45)
+
+
+def test_a_row_that_was_written_anew_is_not_shown_for_another(runs: Path) -> None:
+    run, rows = RunStore(runs).open("hasty"), Run(runs / "hasty").rows("paper")
+    assert run.results.row(("LunchBreak", 2, 1))["index"] == 1
+    rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[1:]))
+    with pytest.raises(BadInput, match="anew"):
+        run.results.row(("LunchBreak", 2, 1))
+
+
+def test_a_run_that_is_deleted_is_gone(runs: Path) -> None:
+    store = RunStore(runs)
+    store.open("hasty")
+    shutil.rmtree(runs / "hasty")
+    with pytest.raises(RunGoneError):
+        store.open("hasty")
+
+
+def test_a_writer_is_seen_and_not_disturbed(runs: Path) -> None:
+    run, store = Run(runs / "hasty"), RunStore(runs)
+    for _ in range(50):  # a hold of ours that outlived a look would refuse the next writer
+        assert not store.open("hasty").is_written
+        with run.writing():
+            assert store.open("hasty").is_written
+    with (run.path / ".lock").open() as file:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def test_the_oldest_are_forgotten(runs: Path) -> None:
+    for number in range(MOST_HELD):
+        (runs / f"run-{number}").mkdir()
+        (runs / f"run-{number}" / "run.json").write_text("{}")
+    store = RunStore(runs)
+    first = store.open("hasty")
+    for number in range(MOST_HELD):
+        store.open(f"run-{number}")
+    assert store.open("hasty") is not first
+
+
+def test_suites_are_those_that_ship_and_those_that_are_named(runs: Path) -> None:
+    run = Run(runs / "hasty")
+    assert RunStore(runs).open("hasty").suite == load_suite("paper")
+    run.head("paper").write_text('{"suite": "../../my-suite"}')
+    assert RunStore(runs).open("hasty").suite is None
+    run.head("paper").write_text('{"suite": ["paper"]}')
+    assert RunStore(runs).open("hasty").suite == load_suite("paper")

@@ -1,0 +1,62 @@
+"""Runs in short: each is read only when it changed, and what is wrong with one is said."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from roboeval.evaluation.results import Results, read_results
+from roboeval.evaluation.run import Run
+from roboeval.web.run_store import MOST_HELD, RunStore
+from roboeval.web.serializers import RunList, State, notes
+
+
+def test_many_damaged_lines_are_counted(runs: Path) -> None:
+    completions = Run(runs / "hasty").completions
+    again = completions.read_bytes().splitlines(keepends=True)[0]
+    completions.write_bytes(b"nothing\n" * 12 + completions.read_bytes() + again)
+    run = RunStore(runs).open("hasty")
+    assert len(run.results.faults) == 13
+    said = notes(run)
+    places = [note.partition(":")[0] for note in said[:5]]
+    assert places == [f"completions.jsonl, line {n}" for n in range(1, 6)]
+    assert said[5].startswith("8 more lines")
+    assert run.written == 45
+
+
+def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(
+    runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(MOST_HELD + 2):
+        shutil.copytree(runs / "hasty", runs / f"run-{number}")
+    (runs / "run-0" / "run.json").write_text("[]")
+    reads: list[Path] = []
+
+    def counted(run: Run, key: str | None, **others: Any) -> Results:  # noqa: ANN401 - as it is called
+        reads.append(run.path)
+        return read_results(run, key, **others)
+
+    monkeypatch.setattr("roboeval.web.run_store.read_results", counted)
+    all_runs = RunList(RunStore(runs))
+    assert {run["state"] for run in all_runs.data(0)} == {State.READING}
+    assert reads == []
+    first = all_runs.data()
+    assert len(reads) == len(first) == MOST_HELD + 3
+    assert {run["judged"] for run in first} == {45}
+    assert [run["run"] for run in first if run["state"] == State.DAMAGED] == ["run-0"]
+    assert all_runs.data(0) == all_runs.data() == first
+    assert len(reads) == len(first)
+    rows = Run(runs / "run-3").rows("paper")
+    rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:9]))
+    shutil.rmtree(runs / "run-4")
+    (runs / "run-5" / "completions.jsonl").unlink()
+    (runs / "run-5" / "completions.jsonl").symlink_to("/etc/hosts")
+    changed = {run["run"]: run for run in all_runs.data()}
+    assert changed["run-3"]["judged"] == 9
+    assert "run-4" not in changed
+    assert changed["run-5"]["state"] == State.UNREADABLE
+    assert json.dumps(changed)

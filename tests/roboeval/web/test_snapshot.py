@@ -1,0 +1,143 @@
+"""A run as it was last read: all of its completions, filtered and counted, and how far it has come."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from codebotler.files import to_line
+from roboeval.evaluation.run import Run
+from roboeval.web.run_store import RunStore
+from roboeval.web.serializers import State, state_of
+from roboeval.web.snapshot import Filter, Snapshot
+
+
+def opened(folder: Path) -> Snapshot:
+    return RunStore(folder.parent).open(folder.name)
+
+
+def lines_of(path: Path) -> list[bytes]:
+    return path.read_bytes().splitlines(keepends=True)
+
+
+def keys(frame: Any) -> list[Any]:  # noqa: ANN401 - a table
+    return frame.select("task", "prompt", "index").rows()  # type: ignore[no-any-return]
+
+
+def test_a_row_for_each_completion(runs: Path) -> None:
+    run = opened(runs / "hasty")
+    rows = [json.loads(line) for line in lines_of(Run(runs / "hasty").rows("paper"))]
+    assert run.completions.height == len(rows) == 45
+    assert run.written == run.to_judge == run.judged == 45
+    assert (run.stale, run.results.faults, run.models) == (0, (), ["recorded:hasty"])
+    assert state_of(run, 45) is State.JUDGED
+    for row in rows:
+        shown = run.row(f"{row['task']}/{row['prompt']}/{row['index']}")
+        assert shown is not None
+        assert shown["passed"] is row["passed"]
+        assert [sign == "+" for sign in shown["worlds"]] == [v["satisfied"] for v in row["verdicts"]]
+        if row["failure"]:
+            assert (shown["failure_class"], shown["failure_kind"]) == (
+                row["failure"]["class"],
+                row["failure"]["kind"],
+            )
+            error = row["verdicts"][row["failure"]["world"]]["error"]
+            assert shown["why"] == (row["failure"]["check"] or error["message"])
+    assert sum(each.count for each in run.failures) == sum(not row["passed"] for row in rows)
+    assert run.row("LunchBreak/0/99") is None
+
+
+def test_what_is_not_judged_yet_or_judged_and_gone_is_there_too(runs: Path) -> None:
+    run = Run(runs / "hasty")
+    completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
+    run.completions.write_bytes(b"".join(completions[5:]))
+    run.rows("paper").write_bytes(b"".join(rows[:40]))
+    seen = opened(run.path)
+    assert (seen.written, seen.judged, seen.stale, seen.completions.height) == (40, 40, 5, 45)
+    waiting = seen.completions.filter(seen.completions["passed"].is_null())
+    assert sorted(keys(waiting)) == sorted(_key(line) for line in completions[40:])
+    gone = seen.completions.filter(~seen.completions["written"])
+    assert sorted(keys(gone)) == sorted(_key(line) for line in completions[:5])
+
+
+def _key(line: bytes) -> tuple[str, int, int]:
+    row = json.loads(line)
+    return row["task"], row["prompt"], row["index"]
+
+
+def test_a_program_that_changed_since_it_was_judged_is_stale(runs: Path) -> None:
+    completions = Run(runs / "hasty").completions
+    lines = lines_of(completions)
+    row = json.loads(lines[7])
+    completions.write_bytes(b"".join([*lines[:7], to_line({**row, "program": "x = 1\n"}), *lines[8:]]))
+    run = opened(runs / "hasty")
+    assert keys(run.completions.filter("stale")) == [_key(lines[7])]
+
+
+def test_filters_cells_and_neighbours(runs: Path) -> None:
+    run = opened(runs / "hasty")
+    cells = run.cells(Filter(passed=True))
+    assert [cell.task for cell in cells] == ["LunchBreak"] * 5 + ["SayGoodDay"] * 5 + ["StaplerSupply"] * 5
+    assert all((cell.written, cell.judged) == (3, 3) for cell in cells)
+    assert sum(cell.counted for cell in cells) == run.passed
+    assert keys(run.select(Filter())) == keys(run.completions)
+    assert {task for task, _, _ in keys(run.select(Filter("LunchBreak")))} == {"LunchBreak"}
+    kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
+    for chosen, count in (
+        (Filter("LunchBreak", 2), 3),
+        (Filter(passed=False), 45 - run.passed),
+        *((Filter(failure=name, kind=kind.name), kind.count) for name, kind in kinds),
+    ):
+        found = keys(run.select(chosen))
+        assert len(found) == count > 0
+        for before, key, after in zip([None, *found], found, [*found[1:], None], strict=False):
+            assert run.neighbours(key, chosen) == (before, after)
+    assert run.neighbours(("LunchBreak", 9, 9), Filter()) == (None, None)
+
+
+def test_how_far_a_run_has_come(runs: Path) -> None:
+    run = Run(runs / "hasty")
+    completions, rows = lines_of(run.completions), lines_of(run.rows("paper"))
+    cases: list[tuple[int, int, bool, int | None, State]] = [
+        (45, 0, True, 50, State.GENERATING),
+        (0, 0, True, None, State.GENERATING),
+        (45, 40, True, 45, State.JUDGING),
+        (45, 45, True, 45, State.JUDGED),
+        (0, 0, False, 45, State.EMPTY),
+        (45, 0, False, 50, State.UNFINISHED),
+        (45, 0, False, 45, State.NOT_JUDGED),
+        (45, 40, False, 45, State.UNFINISHED),
+        (45, 45, False, None, State.JUDGED),
+    ]
+    head = json.loads(run.head("paper").read_text())
+    run.head("paper").write_text(json.dumps({k: v for k, v in head.items() if k not in {"rows", "sha256"}}))
+    for written, judged, is_written, wanted, state in cases:
+        run.completions.write_bytes(b"".join(completions[:written]))
+        run.rows("paper").write_bytes(b"".join(rows[:judged]))
+        seen = opened(run.path)
+        seen = Snapshot(seen.results, seen.evaluations, is_written, None)
+        assert state_of(seen, wanted) is state, state
+
+
+@pytest.mark.parametrize("content", [b"{broken\n", b"[1]\n", b'{"task": "LunchBreak"}\n', b"\xff\n"])
+def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: bytes) -> None:
+    rows = Run(runs / "hasty").rows("paper")
+    lines = lines_of(rows)
+    rows.write_bytes(b"".join([*lines[:10], content, *lines[11:]]))
+    run = opened(runs / "hasty")
+    (fault,) = run.results.faults
+    assert (fault.file, fault.line) == (rows, 11)
+    assert (run.judged, run.stale) == (44, 0)
+    assert state_of(run, 45) is State.DAMAGED
+
+
+def test_half_a_character_in_a_name_of_a_task_breaks_nothing(runs: Path) -> None:
+    completions = Run(runs / "hasty").completions
+    odd = {**json.loads(lines_of(completions)[0]), "task": "half \ud800"}
+    completions.write_bytes(completions.read_bytes() + to_line(odd))
+    run = opened(runs / "hasty")
+    assert (run.written, run.judged) == (46, 45)
+    assert keys(run.completions)[-1] == ("half \\ud800", odd["prompt"], odd["index"])
