@@ -104,7 +104,7 @@ class TableBuilder:
                 row.task,
                 row.prompt,
                 row.index,
-                None if written is None else _storable(written.model),
+                None if written is None or written.model is None else storable(written.model),
                 row.program_sha256,
                 row.passed,
                 *why,
@@ -159,6 +159,6 @@ def _number(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401
     return value if is_number and 0 <= value <= MOST else None
 
 
-def _storable(text: str | None) -> str | None:
+def storable(text: str) -> str:
     """A text that UTF-8 can hold; half of a surrogate pair is written out as an escape."""
-    return None if text is None else text.encode(errors="backslashreplace").decode()
+    return text.encode(errors="backslashreplace").decode()

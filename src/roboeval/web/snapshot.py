@@ -15,6 +15,7 @@ from roboeval.analysis.metrics import Estimate, TaskScore, overall, task_scores
 from roboeval.analysis.summary import Failures, failures
 from roboeval.evaluation.completions import Key
 from roboeval.evaluation.results import Results
+from roboeval.evaluation.table import storable
 from roboeval.suites.load import Suite
 
 KEY = ("task", "prompt", "index")
@@ -129,7 +130,7 @@ class Snapshot:
             .first()
             .alias("why"),
         )
-        keys = [(_storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
+        keys = [(storable(task), prompt, index, True) for task, prompt, index in self.results.completions]
         schema = {"task": pl.String, "prompt": pl.Int64, "index": pl.Int64, "written": pl.Boolean}
         written = pl.DataFrame(keys, schema=schema, orient="row")
         tasks = () if self.suite is None else tuple(self.suite.tasks)
@@ -225,8 +226,3 @@ def _occurs(failures: Failures) -> bool:
 
 def _frequency(failures: Failures) -> tuple[int, str]:
     return -failures.count, failures.name
-
-
-def _storable(text: str) -> str:
-    """A text that UTF-8 can hold, as the rows of an evaluation have it."""
-    return text.encode(errors="backslashreplace").decode()
