@@ -6,7 +6,6 @@ checking is `roboeval resample`'s, and is done once for a run. It prints the sha
 with a minute, 1 GB, and 5 MB of the page.
 """
 
-import hashlib
 import os
 import resource
 import tempfile
@@ -16,16 +15,16 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
+import polars as pl
+
 from codebotler.files import to_line, to_text
-from roboeval.analysis.resample import Trial, by_prompt
-from roboeval.evaluation.completions import Completion, Row, recorded_completions
-from roboeval.evaluation.evaluation import Evaluation
+from roboeval.evaluation.completions import Completion, recorded_completions
 from roboeval.evaluation.judge import evaluate, head
+from roboeval.evaluation.results import read_results
+from roboeval.evaluation.rows import Row
 from roboeval.evaluation.run import Run
-from roboeval.evaluation.tables import key_of
-from roboeval.report.contents import Wishes, headline, sections
-from roboeval.report.reading import JudgedRun, named_apart, read_run
-from roboeval.report.writing import write_report
+from roboeval.report.runs import JudgedRun, named_apart
+from roboeval.report.writing import headline, sections, write_report
 from roboeval.suites.load import Suite, load_suite
 
 MODELS = int(os.environ.get("MODELS", "5"))
@@ -65,34 +64,26 @@ def made_up(folder: Path, number: int, suite: Suite) -> Run:
     about = {"model": f"model-{number}", "settings": {"temperature": 0.2}, "codebotler": "0.1.0"}
     run.about.write_bytes(to_text(about))
     run.head("paper").write_bytes(to_text({**head(suite), "ablation": False, "tasks": None}))
-    with (
-        run.completions.open("wb") as completions,
-        run.rows("paper").open("wb") as judged,
-        run.programs("paper").open("w") as hashes,
-    ):
+    with run.completions.open("wb") as completions, run.rows("paper").open("wb") as judged:
         for (task, prompt), those in by_prompt.items():
             for index in range(COMPLETIONS):
                 at = those[(index * (number + 1)) % len(those)]
                 text = index if index % 5 else 0
                 program = f"{recorded()[at].program}    # {text}\n    note{text % 7} = {text}\n"
                 usage = {"input_tokens": 1_500, "output_tokens": 120 + index}
-                written = {"task": task, "prompt": prompt, "index": index, "model": f"model-{number}"}
-                written |= {"program": program, "instruction": recorded()[at].instruction}
-                completions.write(to_line({**written, "usage": usage, "latency_s": 1.5}))
-                judged.write(to_line({**rows[at], "index": index}))
-                hashes.write(hashlib.sha256(program.encode()).hexdigest() + "\n")
+                key = {"task": task, "prompt": prompt, "index": index}
+                more = {"instruction": recorded()[at].instruction, "usage": usage, "latency_s": 1.5}
+                written = Completion.of({**key, "model": f"model-{number}", "program": program, **more})
+                completions.write(to_line(written.row))
+                judged.write(to_line({**rows[at], **key, "program_sha256": written.program_sha256}))
     return run
 
 
 def read(run: Run, suite: Suite) -> JudgedRun:
     """A run as the command reads it, with a check that rejects what ends in an error."""
-    evaluation = Evaluation(run, "paper")
-    judged = read_run(evaluation, evaluation.rows(), suite)
-    trials = (
-        (key_of(row), Trial(ok := row["failure"] is None or bool(row["failure"]["check"]), ok, row["passed"]))
-        for row in judged.rows
-    )
-    return JudgedRun(**{**judged.__dict__, "trials": by_prompt(trials)})
+    results = read_results(run, "paper", suite)
+    accepted = pl.col("failure_check").is_not_null() | pl.col("passed")
+    return JudgedRun(results, results.table.with_columns(accepted=accepted))
 
 
 def main() -> None:
@@ -105,8 +96,8 @@ def main() -> None:
         with timed("reading", spent):
             judged = named_apart([read(run, suite) for run in runs])
         with timed("putting together", spent):
-            parts = sections(judged, suite, Wishes(command="bench"))
-        written = write_report(*headline(judged, suite), parts, folder / "report")
+            parts = sections(judged, command="bench")
+        written = write_report(*headline(judged), parts, folder / "report")
         before = time.perf_counter()
         for piece in written:
             kind = "drawing" if (folder / "report" / "figures" / f"{piece}.png").exists() else "writing"
@@ -114,7 +105,7 @@ def main() -> None:
             before = time.perf_counter()
         size = (folder / "report" / "index.html").stat().st_size
     total = sum(spent.values())
-    count = sum(len(run.rows) for run in judged)
+    count = sum(run.completions.height for run in judged)
     for step, seconds in spent.items():
         print(f"{step}: {seconds:.1f} s, {seconds / total:.0%}")
     largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

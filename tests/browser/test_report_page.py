@@ -12,11 +12,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from made_up_runs import HOSTILE, SUITE, made_up
-from roboeval.report.contents import Wishes, sections
+from made_up_runs import HOSTILE, made_up
 from roboeval.report.page import SCRIPT
-from roboeval.report.reading import Written
-from roboeval.report.writing import write_report
+from roboeval.report.writing import sections, write_report
 from viewing import chromium
 
 CLICKS = """
@@ -72,15 +70,16 @@ def found_chromium() -> str:
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     program = f"</pre><img src=x onerror='window.hacked=1'><script>window.hacked=1</script>{HOSTILE}"
+    passes = {
+        "strong": {"Visit": (9, 8), "CountMugs": (10, 3)},
+        "weak": {"Visit": (0, 2), "CountMugs": (1, 0)},
+        HOSTILE: {"Visit": (4, 5)},  # and nothing else, so that some cells are empty
+    }
     runs = [
-        made_up("strong", {"Visit": (9, 8), "CountMugs": (10, 3)}),
-        made_up("weak", {"Visit": (0, 2), "CountMugs": (1, 0)}),
-        made_up(HOSTILE, {"Visit": (4, 5)}),  # and nothing else, so that some cells are empty
+        made_up(name, those, written=lambda _, index: {"program": program} if index > 6 else {})
+        for name, those in passes.items()
     ]
-    for run in runs:
-        assert isinstance(run.written, dict)
-        run.written.update({key: Written(program) for key in run.written if key[2] > 6})
-    list(write_report("t", ["about it"], sections(runs, SUITE, Wishes(command="c")), folder))
+    list(write_report("t", ["about it"], sections(runs, command="c"), folder))
     return folder / "index.html"
 
 

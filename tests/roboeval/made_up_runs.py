@@ -15,7 +15,6 @@ from codebotler.files import to_line
 from codebotler.simulator.rules import Rules
 from made_results import VERDICT, results_of
 from roboeval.evaluation.completions import Completion
-from roboeval.evaluation.rows import RowData
 from roboeval.evaluation.run import Run
 from roboeval.report.runs import JudgedRun
 from roboeval.suites.load import Suite
@@ -55,7 +54,7 @@ def made_up(
     suite: Suite = SUITE,
     ablated: tuple[str, ...] = (),
     accepted: pl.Expr = RUNS,
-    written: Callable[[int, int], Mapping[str, Any]] = lambda prompt, index: {},
+    written: Callable[[int, int], Mapping[str, Any]] = lambda *_: {},
     **about: Any,  # noqa: ANN401 - `folder`, and any field of results
 ) -> JudgedRun:
     """A run of which so many completions pass, by task and prompt; the others fail by all kinds in turn.
@@ -86,7 +85,7 @@ def judged(
     suite: Suite = SUITE,
     ablated: tuple[str, ...] = (),
     accepted: pl.Expr = RUNS,
-    written: Callable[[int, int], Mapping[str, Any]] = lambda prompt, index: {},
+    written: Callable[[int, int], Mapping[str, Any]] = lambda *_: {},
     folder: str = "",
     model: str | None = "",
     **fields: Any,  # noqa: ANN401 - of results
@@ -174,7 +173,7 @@ def cases() -> dict[str, list[JudgedRun]]:
 
 def unfinished(run: JudgedRun, total: int) -> JudgedRun:
     """The same run where there are so many completions to judge."""
-    (task, prompt, _), last = next(reversed(run.results.completions.items()))
+    (task, prompt, _), last = list(run.results.completions.items())[-1]
     more = {(task, prompt, index): replace(last, index=index) for index in range(1_000, total + 990)}
     completions = {**run.results.completions, **more}
     return replace(run, results=replace(run.results, completions=completions))

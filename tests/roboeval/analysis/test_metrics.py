@@ -15,8 +15,10 @@ from roboeval.analysis.metrics import (
     clustered_interval,
     overall,
     pass_at_k,
+    share_at_least,
     t_quantile,
     task_scores,
+    threshold_curve,
 )
 
 COUNTS = st.integers(1, 60).flatmap(
@@ -208,3 +210,10 @@ def test_a_prompt_with_too_few_completions_is_named() -> None:
         overall([a, b], 3)
     with pytest.raises(ValueError, match="no prompts"):
         overall([], 1)
+
+
+def test_the_curve_by_hand() -> None:
+    assert threshold_curve([1.0, 0.5, 0.5, 0.0]) == [(1.0, 0.25), (0.5, 0.75)]
+    assert threshold_curve([0.0]) == [(1.0, 0.0)]
+    assert share_at_least([0.1 + 0.2, 0.3, 0.29], 0.3) == pytest.approx(2 / 3)
+    assert share_at_least([1 - 1e-12], 1.0) == 1

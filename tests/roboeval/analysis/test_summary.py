@@ -13,7 +13,8 @@ import pytest
 
 from codebotler.badinput import BadInput
 from made_results import table_of
-from roboeval.analysis.summary import Summary, summary_data
+from roboeval.analysis.summary import ALL, Summary, kinds_in_order, summary_data
+from roboeval.analysis.summary import causes as causes_of
 from roboeval.analysis.summary import summary as summary_of
 from roboeval.cli.views.results import summary_view
 from roboeval.evaluation.failures import CLASSES
@@ -160,3 +161,23 @@ def test_an_ablation_is_named_and_misses_no_task() -> None:
     text = printed(summary_view(summary(ROWS, SUITE, ablated=True), title="x"))
     assert "x (ablation" in text
     assert "Wait" not in text
+
+
+def test_causes_are_shares_of_classes_and_of_their_kinds() -> None:
+    rows = [
+        row(0, 0),
+        *(row(0, n, ("PythonError", kind)) for n, kind in enumerate(("X", "NameError", "X"), 1)),
+    ]
+    found = causes_of(table_of([*rows, row(0, 4, ("TaskCompletionError", "Location"))]))
+    assert found.classes == {
+        "passed": pytest.approx(0.2),
+        "PythonError": pytest.approx(0.6),
+        "RobotExecutionError": 0,
+        "TaskCompletionError": pytest.approx(0.2),
+    }
+    assert found.kinds["PythonError"] == {"NameError": pytest.approx(1 / 3), "X": pytest.approx(2 / 3)}
+    assert found.kinds["RobotExecutionError"] == {}
+    assert found.counts["PythonError", "X"] == 2
+    assert found.counts["PythonError", ALL] == 3
+    other = causes_of(table_of([row(0, 0, ("PythonError", "TypeError"))]))
+    assert kinds_in_order([found, other], "PythonError") == ["NameError", "TypeError", "X"]

@@ -137,14 +137,14 @@ def test_numbers_stand_out_from_their_shades() -> None:
         figure.draw_without_rendering()
         cells = np.asarray(axes.collections[0].get_facecolor())
     for text, cell in zip(axes.texts, cells, strict=True):
-        pair = text.get_color(), to_hex(cell)
+        pair = to_hex(text.get_color()), to_hex(cell)
         for ink, shade in (pair, [in_the_dark(colour) for colour in pair]):
             one, other = sorted((light(to_rgb(ink)), light(to_rgb(shade))))
             assert (other + 0.05) / (one + 0.05) > 4, (text.get_text(), ink, shade)
 
 
 def in_the_dark(colour: str) -> str:
-    return darkened(to_hex(colour).encode()).decode()
+    return darkened(colour.lower().encode()).decode()
 
 
 def test_each_colour_has_one_meaning() -> None:
