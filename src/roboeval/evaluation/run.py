@@ -160,6 +160,23 @@ class Run:
         finally:
             os.close(descriptor)
 
+    @property
+    def is_being_written(self) -> bool:
+        """Whether a process writes it. Our hold lasts a moment, for which a writer has patience."""
+        try:
+            descriptor = os.open(
+                self.path / ".lock", os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+            )
+        except OSError:
+            return False
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            return True
+        finally:
+            os.close(descriptor)
+        return False
+
     def _expect_no_others(self) -> None:
         """Refuse a folder that holds something, and is no run."""
         if self.completions.exists() or self.about.exists() or not self.path.is_dir():

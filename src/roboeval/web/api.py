@@ -26,14 +26,9 @@ Evaluation: TypeAlias = Annotated[
 ]
 
 
-def router(store: RunStore) -> APIRouter:
-    """The addresses of the API.
-
-    Args:
-        store: whose runs.
-    """
+def router(store: RunStore, all_runs: RunList) -> APIRouter:
+    """The addresses of the API."""
     api = APIRouter(prefix="/api/runs", tags=["runs"], default_response_class=Response)
-    all_runs = RunList(store)
 
     @api.get("")
     def list_runs() -> Response:

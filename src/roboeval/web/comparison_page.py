@@ -3,52 +3,37 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Hashable, Mapping, Sequence
-from typing import Annotated, Any
+from collections.abc import Hashable, Sequence
+from typing import Any
 
-from fastapi import Query
 from nicegui import html, ui
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
-from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Words
-from roboeval.web.heat_map import TaskCells, address, columns, failure_rows, models_of
+from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
 from roboeval.web.snapshot import Filter, Snapshot
-from roboeval.web.widgets import EVERY, HeatMap, count_text, draw_state, page, score_text
+from roboeval.web.widgets import EVERY, HeatMap, count_text, score_text, show_state
 
-MOST = 12
-"""Runs side by side; more are no comparison."""
-
+MOST = 12  # runs side by side; more are no comparison
 MOST_NAME = 60
 NOT_ALIKE = "These runs were judged by different suites or versions of a suite. Compare with care."
-Names = Annotated[list[str] | None, Query()]
 
 
-def add(store: RunStore, frame: Frame) -> None:
-    """Put the page at its address.
-
-    Args:
-        store: whose runs.
-        frame: what all pages have.
-    """
-
-    @ui.page("/side-by-side", response_timeout=PATIENCE)
-    async def compare_runs(run: Names = None) -> None:
-        names = list(dict.fromkeys(run or ()))
-        with page(frame, "Side by side"):
-            Words("h1", "Runs side by side")
-            if not names:
-                Words("p", "Tick runs in the list, then show them side by side.", "quiet")
-                html.a("All runs", href="/runs")
-                return
-            if len(names) > MOST:
-                Words("p", f"These are the first {MOST} of {len(names):,} runs.", "quiet")
-            comparison = _Comparison(store, names[:MOST])
-            await comparison.refresh()
-        ui.timer(EVERY, comparison.refresh, immediate=False)
+async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
+    """Draw the runs of these names."""
+    Words("h1", "Runs side by side")
+    if not names:
+        Words("p", "Tick runs in the list, then show them side by side.", "quiet")
+        html.a("All runs", href="/runs")
+        return
+    if len(names) > MOST:
+        Words("p", f"These are the first {MOST} of {len(names):,} runs.", "quiet")
+    comparison = _Comparison(store, names[:MOST])
+    await comparison.refresh()
+    ui.timer(EVERY, comparison.refresh, immediate=False)
 
 
 class _Comparison:
@@ -84,7 +69,8 @@ class _Comparison:
                 runs.append(self._store.open(name))
             except BadInput as error:
                 troubles.append(error.sentence)
-        judged_by = {_judge_of(run.results.head) for run in runs if run.judged}
+        heads = [run.results.head for run in runs if run.judged]
+        judged_by = {tuple(str(head.get(part)) for part in ("suite", "digest", "ablation")) for head in heads}
         return runs, [*troubles, *[NOT_ALIKE] * (len(judged_by) > 1)]
 
     def _show(self, runs: Sequence[Snapshot], troubles: Sequence[str]) -> None:
@@ -96,26 +82,17 @@ class _Comparison:
         with self._list:
             for run in runs:
                 _draw_run(run)
-        cells = [TaskCells(run, Filter(), None) for run in runs]
-        groups = [
-            {**_head(run), "columns": columns(of_run.prompts)}
-            for run, of_run in zip(runs, cells, strict=True)
-        ]
+        cells = [TaskCells(run, Filter()) for run in runs]
+        groups = [{**_head(run), "columns": of.columns} for run, of in zip(runs, cells, strict=True)]
+        tasks = dict.fromkeys(task for of in cells for task in of.tasks)
         rows = [
-            {
-                "name": shortened(task, MOST_NAME),
-                "cells": [cell for of_run in cells for cell in of_run.row(task)],
-            }
-            for task in dict.fromkeys(task for of_run in cells for task in of_run.tasks)
+            {"name": shortened(task, MOST_NAME), "cells": [cell for of in cells for cell in of.row(task)]}
+            for task in tasks
         ]
-        self._tasks.show(groups, rows)
+        self._tasks.show(groups=groups, rows=rows)
         judged = [run for run in runs if run.judged]
-        self._kinds.show([{"name": "", "columns": [*map(_head, judged)]}], failure_rows(judged))
-
-
-def _judge_of(head: Mapping[str, Any]) -> tuple[str, ...]:
-    """By what a run was judged: runs of which it differs cannot be compared."""
-    return tuple(str(head.get(part)) for part in ("suite", "digest", "ablation"))
+        columns = [_head(run) for run in judged]
+        self._kinds.show(groups=[{"name": "", "columns": columns}], rows=failure_rows(judged))
 
 
 def _head(run: Snapshot) -> dict[str, Any]:
@@ -126,6 +103,6 @@ def _draw_run(run: Snapshot) -> None:
     data = run_data(run)
     with ui.element("li"):
         html.a(shortened(run.name, MOST_NAME), href=address(run.name)).props("dir=auto")
-        draw_state(data, Words("small"))
+        show_state(data, Words("small"))
         Words("b", score_text(data))
         Words("span", f"{count_text(data)} completions, {models_of(run)}", "quiet")

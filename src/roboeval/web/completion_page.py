@@ -13,7 +13,6 @@ from codebotler.badinput import BadInput
 from codebotler.storyboard import step_text
 from codebotler.terminal import shortened
 from codebotler.web.floorplan import floorplan
-from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import scenes
 from codebotler.web.words import Words
@@ -23,33 +22,25 @@ from roboeval.evaluation.completions import Key, name_of
 from roboeval.evaluation.explanation import NOT_RECORDED, cut_told
 from roboeval.evaluation.failures import label_of
 from roboeval.suites.catalogue import person_told
-from roboeval.web.api import Chosen, Evaluation
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import Filter, Snapshot
-from roboeval.web.widgets import Code, page
+from roboeval.web.widgets import Code
 
 MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION = 80, 2_000, 5_000
 CHANGED = "The program was changed or removed after it was judged; the verdicts are on the earlier one."
 
 
-def add(store: RunStore, frame: Frame) -> None:
-    """Put the page at its address.
-
-    Args:
-        store: whose runs.
-        frame: what all pages have.
-    """
-
-    @ui.page("/runs/{run}/{name:path}", response_timeout=PATIENCE)
-    async def show_completion(run: str, name: str, chosen: Chosen, evaluation: Evaluation = None) -> None:
-        with page(frame, shortened(name, MOST_NAME)):
-            snapshot, data = await asyncio.to_thread(_read, store, run, name, evaluation)
-            _draw_head(snapshot, data, chosen, chosen.query(evaluation))
-            with ui.element("div").classes("one-program"):
-                _draw_program(data)
-                _draw_worlds(data["worlds"], _worlds(snapshot, data["task"]))
+async def draw_completion(
+    store: RunStore, run: str, name: str, chosen: Filter, evaluation: str | None
+) -> None:
+    """Draw a completion, with links to its neighbours among those that were chosen."""
+    snapshot, data = await asyncio.to_thread(_read, store, run, name, evaluation)
+    _draw_head(snapshot, data, chosen, chosen.query(evaluation))
+    with ui.element("div").classes("one-program"):
+        _draw_program(data)
+        _draw_worlds(data["worlds"], _worlds(snapshot, data["task"]))
 
 
 def _read(store: RunStore, run: str, name: str, evaluation: str | None) -> tuple[Snapshot, dict[str, Any]]:

@@ -11,12 +11,11 @@ from codebotler.terminal import shortened
 from roboeval.analysis.summary import Failures
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.failures import label_of
-from roboeval.web.snapshot import Cell, Filter, Snapshot
+from roboeval.web.snapshot import Filter, Snapshot
 
 STEPS = 10
 NONE = "-"
 MOST_NAME, MOST_MODELS = 60, 200
-PASSED = Filter(passed=True)
 EMPTY = {"text": "", "shade": "none"}
 
 
@@ -28,12 +27,7 @@ def percent(share: float) -> str:
 
 
 def shade(share: float | None, *, bad: bool) -> str:
-    """The CSS class of a cell.
-
-    Args:
-        share: from 0 to 1; None where there is none.
-        bad: whether it is a share of failures.
-    """
+    """The CSS class of a cell with a share from 0 to 1; None where there is none."""
     if share is None:
         return "waits"
     step = 0 if share == 0 else STEPS if share == 1 else max(1, min(STEPS - 1, round(share * STEPS)))
@@ -52,17 +46,11 @@ def models_of(run: Snapshot) -> str:
     return shortened(", ".join(run.models), MOST_MODELS) + by_hand(run.models)
 
 
-def failure_text(filter: Filter) -> str | None:  # noqa: A002
+def failure_text(filter: Filter) -> str | None:  # noqa: A002 - what it is
     """The kind or class of failures that a filter means, as text; None if it means others, too."""
     if filter.kind is not None:
         return shortened(filter.kind, MOST_NAME)
     return None if filter.failure is None else f"a {shortened(label_of(filter.failure), MOST_NAME)}"
-
-
-def columns(prompts: int) -> list[dict[str, Any]]:
-    """The columns of a run: the mean, and one for each prompt."""
-    numbers = [{"name": str(n), "title": f"prompt {n}"} for n in range(prompts)]
-    return [{"name": "all", "title": "mean over the prompts"}, *numbers]
 
 
 class TaskCells:
@@ -70,53 +58,50 @@ class TaskCells:
 
     Args:
         run: as it was last read.
-        filter: what is counted, and which cell is marked.
+        filter: what is counted, by default what passed, and which cell is marked.
         evaluation: as addresses are to name it.
     """
 
-    def __init__(self, run: Snapshot, filter: Filter, evaluation: str | None) -> None:  # noqa: A002
+    def __init__(self, run: Snapshot, filter: Filter, evaluation: str | None = None) -> None:  # noqa: A002
         self._run, self._filter, self._evaluation = run, filter, evaluation
-        self._counted = PASSED if filter.verdict == Filter() else filter
-        self.tasks: dict[str, dict[int, Cell]] = {}
-        for cell in run.cells(self._counted):
-            self.tasks.setdefault(cell.task, {})[cell.prompt] = cell
-        self.prompts = 1 + max((prompt for cells in self.tasks.values() for prompt in cells), default=-1)
-
-    def row(self, task: str) -> list[dict[str, Any]]:
-        """The cells of a task: the mean over its prompts, and one for each prompt."""
-        cells = self.tasks.get(task)
-        if cells is None:
-            return [EMPTY] * (self.prompts + 1)
-        shares = [cell.share for cell in cells.values() if cell.share is not None]
-        mean = sum(shares) / len(shares) if shares else None
-        each = (self._cell(cells[n]) if n in cells else EMPTY for n in range(self.prompts))
-        return [self._mean(task, mean), *each]
-
-    def _mean(self, task: str, mean: float | None) -> dict[str, Any]:
-        look = f"mean {shade(mean, bad=not self._counted.passed)}"
-        if mean is None:
-            return self._linked(task, None, NONE, look, "nothing is judged yet")
-        return self._linked(task, None, percent(mean), look, f"{percent(mean)} % {self._verb}")
-
-    def _cell(self, cell: Cell) -> dict[str, Any]:
-        if cell.share is None:
-            title = f"{cell.written} written, none judged yet"
-            return self._linked(cell.task, cell.prompt, f"({cell.written})", "waits", title)
-        text = percent(cell.share)
-        title = f"{text} % {self._verb}, {cell.counted} of {cell.judged}"
-        return self._linked(
-            cell.task, cell.prompt, text, shade(cell.share, bad=not self._counted.passed), title
-        )
+        counted = Filter(passed=True) if filter.verdict == Filter() else filter
+        self._bad = not counted.passed
+        by = failure_text(counted)
+        self._verb = "passed" if counted.passed else "failed" if by is None else f"failed with {by}"
+        self.tasks: dict[str, dict[int, dict[str, Any]]] = {}
+        for prompt in run.prompts(counted):
+            self.tasks.setdefault(prompt["task"], {})[prompt["prompt"]] = prompt
+        self._prompts = 1 + max((prompt for of in self.tasks.values() for prompt in of), default=-1)
 
     @property
-    def _verb(self) -> str:
-        by = failure_text(self._counted)
-        return "failed with " + by if by is not None else "passed" if self._counted.passed else "failed"
+    def columns(self) -> list[dict[str, Any]]:
+        """The mean over the prompts, and a column for each prompt."""
+        numbers = [{"name": str(n), "title": f"prompt {n}"} for n in range(self._prompts)]
+        return [{"name": "all", "title": "mean over the prompts"}, *numbers]
+
+    def row(self, task: str) -> list[dict[str, Any]]:
+        """The cells of a task."""
+        prompts = self.tasks.get(task, {})
+        shares = [each["share"] for each in prompts.values() if each["share"] is not None]
+        mean = self._mean(task, sum(shares) / len(shares) if shares else None) if prompts else EMPTY
+        return [mean, *(self._cell(prompts[n]) if n in prompts else EMPTY for n in range(self._prompts))]
+
+    def _mean(self, task: str, mean: float | None) -> dict[str, Any]:
+        text = NONE if mean is None else percent(mean)
+        title = "nothing is judged yet" if mean is None else f"{text} % {self._verb}"
+        return self._linked(task, None, text, f"mean {shade(mean, bad=self._bad)}", title)
+
+    def _cell(self, of: Mapping[str, Any]) -> dict[str, Any]:
+        share = of["share"]
+        text = f"({of['written']})" if share is None else percent(share)
+        title = f"{text} % {self._verb}, {of['counted']} of {of['judged']}"
+        if share is None:
+            title = f"{of['written']} written, none judged yet"
+        return self._linked(of["task"], of["prompt"], text, shade(share, bad=self._bad), title)
 
     def _linked(self, task: str, prompt: int | None, text: str, look: str, title: str) -> dict[str, Any]:
         here = (self._filter.task, self._filter.prompt) == (task, prompt)
-        name = shortened(task, MOST_NAME)
-        which = name if prompt is None else f"{name}, prompt {prompt}"
+        which = shortened(task, MOST_NAME) + ("" if prompt is None else f", prompt {prompt}")
         query = replace(self._filter, task=task, prompt=prompt).query(self._evaluation)
         return {
             "text": text,
@@ -128,26 +113,21 @@ class TaskCells:
         }
 
 
-def failure_rows(runs: Sequence[Snapshot]) -> list[Mapping[str, Any]]:
-    """Kinds of failures by run: how much of all that was judged failed by each; the most frequent first.
-
-    Args:
-        runs: of which something was judged.
-    """
+def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
+    """Kinds of failures by run, of which something was judged; the most frequent first."""
     found = [{(of.name, kind.name): kind for of in run.failures for kind in of.kinds} for run in runs]
     most: dict[tuple[str, str], float] = {}
     for kinds in found:
-        for key, kind in kinds.items():
-            most[key] = max(kind.share, most.get(key, 0.0))
+        most |= {key: max(kind.share, most.get(key, 0.0)) for key, kind in kinds.items()}
     return [
         {
-            "name": f"{shortened(label_of(key[0]), MOST_NAME)}: {shortened(key[1], MOST_NAME)}",
+            "name": f"{shortened(label_of(failure), MOST_NAME)}: {shortened(kind, MOST_NAME)}",
             "cells": [
-                _failure_cell(run, Filter(failure=key[0], kind=key[1]), kinds.get(key))
+                _failure_cell(run, Filter(failure=failure, kind=kind), kinds.get((failure, kind)))
                 for run, kinds in zip(runs, found, strict=True)
             ],
         }
-        for key in sorted(most, key=lambda key: -most[key])
+        for failure, kind in sorted(most, key=lambda key: -most[key])
     ]
 
 

@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated
 
+from fastapi import Query
 from fastapi.responses import RedirectResponse
 from fastapi.staticfiles import StaticFiles
+from nicegui import ui
 
+from codebotler.web.frame import PATIENCE
 from codebotler.web.further import Pages, Site
 from roboeval.suites.load import Suite
-from roboeval.web import api, comparison_page, completion_page, run_page, runs_page
+from roboeval.web.api import Chosen, Evaluation, router
+from roboeval.web.comparison_page import draw_comparison
+from roboeval.web.completion_page import draw_completion
+from roboeval.web.run_page import draw_run
 from roboeval.web.run_store import RunStore
+from roboeval.web.runs_page import draw_runs
+from roboeval.web.serializers import RunList
+from roboeval.web.widgets import page_of
 
 STATIC = Path(__file__).with_name("static")
 
@@ -25,12 +35,31 @@ def pages(suites: Sequence[Suite] = ()) -> Pages:
 
     def add(site: Site) -> None:
         store = RunStore(site.runs, suites)
-        site.app.include_router(api.router(store))
+        all_runs = RunList(store)
+        site.app.include_router(router(store, all_runs))
         site.app.mount("/static/benchmark", StaticFiles(directory=STATIC))
-        for page in (runs_page, run_page, comparison_page, completion_page):
-            page.add(store, site.frame)
         if not site.frame.has_robot:
             site.app.get("/", include_in_schema=False)(lambda: RedirectResponse("/runs"))
+
+        @ui.page("/runs", response_timeout=PATIENCE)
+        async def show_runs() -> None:
+            with page_of(site.frame, "Runs"):
+                await draw_runs(store.folder, all_runs)
+
+        @ui.page("/runs/{run}", response_timeout=PATIENCE)
+        async def show_run(run: str, chosen: Chosen, evaluation: Evaluation = None) -> None:
+            with page_of(site.frame, run):
+                await draw_run(store, run, chosen, evaluation)
+
+        @ui.page("/runs/{run}/{name:path}", response_timeout=PATIENCE)
+        async def show_completion(run: str, name: str, chosen: Chosen, evaluation: Evaluation = None) -> None:
+            with page_of(site.frame, name):
+                await draw_completion(store, run, name, chosen, evaluation)
+
+        @ui.page("/side-by-side", response_timeout=PATIENCE)
+        async def compare_runs(run: Annotated[list[str] | None, Query()] = None) -> None:
+            with page_of(site.frame, "Side by side"):
+                await draw_comparison(store, list(dict.fromkeys(run or ())))
 
     return Pages("Benchmark", "RoboEval", "/runs", add)
 

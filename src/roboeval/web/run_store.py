@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import stat
 import threading
 import time
@@ -21,12 +19,9 @@ from roboeval.suites.installed import installed_suites
 from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
 from roboeval.web.snapshot import Snapshot
 
-MOST_HELD = 16
-"""Evaluations that stay in memory."""
-
-REST = 10
-"""A growing run is not read again before so many times as long has passed as reading it took."""
-
+MOST_HELD = 16  # evaluations that stay in memory
+REST = 10  # times as long as reading a run took, it is not read again
+OUTSIDE = "leads out of the folder of runs, where nothing is read"
 
 Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
@@ -55,9 +50,7 @@ class RunStore:
         Raises:
             BadInput: the folder cannot be read.
         """
-        if self._is_run:
-            return [self.folder.resolve().name]
-        return sorted(name for name in _entries(self.folder) if _is_run(self.folder / name))
+        return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
         """A run as it is now, or was a moment ago.
@@ -72,7 +65,7 @@ class RunStore:
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
-        """What differs whenever something in a run has changed, without reading it.
+        """The version that a run would have if it was opened now; it is not read.
 
         Raises:
             BadInput: as `open` does.
@@ -90,27 +83,29 @@ class RunStore:
                 self._suites[name] = None
         return self._suites[name]
 
-    @property
-    def _is_run(self) -> bool:
-        return Run(self.folder).completions.is_file()
-
-    def _run(self, name: str) -> Run:
-        """By a name that stands in the folder, letter by letter; so none leads anywhere else."""
-        path = self.folder.resolve() if self._is_run else self.folder / name
-        if name not in ([path.name] if self._is_run else _entries(self.folder)) or not _is_run(path):
-            raise RunGoneError(f'there is no run "{shortened(name)}" in this folder; perhaps it was deleted')
-        if not path.resolve().is_relative_to(self.folder.resolve()):
-            raise BadInput(f'"{shortened(name)}" leads out of the folder of runs, where nothing is read')
-        return Run(path)
+    def _folders(self) -> dict[str, Path]:
+        """The folder if it is a run itself, else what lies in it, by name."""
+        if Run(self.folder).completions.is_file():
+            return {self.folder.resolve().name: self.folder.resolve()}
+        try:
+            return {path.name: path for path in self.folder.iterdir()}
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            raise BadInput(f"cannot be read ({error.strerror})", file=self.folder) from None
 
     def _reader(self, name: str, key: str | None) -> _Reader:
-        run = self._run(name)
+        path = self._folders().get(name)  # letter by letter, so that no name leads anywhere else
+        if path is None or not _is_run(path):
+            raise RunGoneError(f'there is no run "{shortened(name)}" in this folder; perhaps it was deleted')
+        if not path.resolve().is_relative_to(self.folder.resolve()):
+            raise BadInput(f'"{shortened(name)}" {OUTSIDE}')
+        run = Run(path)
         keys = (path.stem for path in run.rows("").parent.glob("*.jsonl"))
         known = tuple(sorted(keys, key=lambda one: (one.endswith(ABLATED), one)))
-        if key is None:
-            key = known[0] if known else None
-        elif key not in known:
+        if key is not None and key not in known:
             raise BadInput(f'"{shortened(name)}" has no evaluation "{shortened(key)}"')
+        key = key or next(iter(known), None)
         with self._lock:
             reader = self._readers.setdefault((name, key), _Reader(self, run, key))
             self._readers.move_to_end((name, key))
@@ -133,7 +128,6 @@ class _Reader:
         self._snapshot: Snapshot | None = None
 
     def read(self) -> Snapshot:
-        """It as it is now, or was a moment ago."""
         with self._lock:
             stamps = self._stamps_now()
             is_new = stamps != self._stamps and time.monotonic() >= self._rests_until
@@ -141,39 +135,33 @@ class _Reader:
                 self._results, self._stamps = self._timed(stamps), stamps
             version = self._version(self._stamps)
             if self._snapshot is None or self._snapshot.version != version:
-                self._snapshot = Snapshot(self._results, self.evaluations, self._is_written, version)
+                self._snapshot = Snapshot(
+                    self._results, self.evaluations, self._run.is_being_written, version
+                )
             return self._snapshot
 
     def version(self) -> Hashable:
-        """The version of what would be read now."""
         return self._version(self._stamps_now())
 
     def _version(self, stamps: Stamps) -> Hashable:
-        return self._key, self.evaluations, self._is_written, stamps
+        return self._key, self.evaluations, self._run.is_being_written, stamps
 
     def _stamps_now(self) -> Stamps:
         """What tells one state of its files from another."""
         run, key = self._run, self._key or ""
-        paths = (
-            run.completions,
-            run.about,
-            run.rows(key),
-            run.head(key),
-            run.checks(key.removesuffix(ABLATED)),
-        )
+        checks = run.checks(key.removesuffix(ABLATED))
         within = self._store.folder.resolve()
+        paths = (run.completions, run.about, run.rows(key), run.head(key), checks)
         return tuple(_stamp(path, within) for path in paths)
-
-    @property
-    def _is_written(self) -> bool:
-        return _is_locked(self._run.path / ".lock")
 
     def _timed(self, stamps: Stamps) -> Results:
         began = time.monotonic()
         results = self._read_files()
         ended = time.monotonic()
-        changed = bool(results.faults) and self._stamps_now() != stamps  # faults of a mixture of two states
-        self._rests_until = ended if changed else ended + REST * (ended - began)
+        mixed = (
+            bool(results.faults) and self._stamps_now() != stamps
+        )  # its files changed while they were read
+        self._rests_until = ended + (0 if mixed else REST * (ended - began))
         return results
 
     def _read_files(self) -> Results:
@@ -193,39 +181,14 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
     except OSError:
         return None
     if not found.is_relative_to(within):
-        raise BadInput("leads out of the folder of runs, where nothing is read", file=path.name)
+        raise BadInput(OUTSIDE, file=path.name)
     if not stat.S_ISREG(status.st_mode):
         raise BadInput("is no file", file=path.name)
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
-def _is_locked(path: Path) -> bool:
-    """Whether a process writes the run. Our hold lasts a moment, for which a writer has patience."""
-    try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except OSError:
-        return False
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
-
-
-def _entries(folder: Path) -> list[str]:
-    try:
-        return [path.name for path in folder.iterdir()]
-    except FileNotFoundError:
-        return []
-    except OSError as error:
-        raise BadInput(f"cannot be read ({error.strerror})", file=folder) from None
-
-
 def _is_run(path: Path) -> bool:
     """Whether a folder looks like a run; also while its first completion is waited for."""
-    if path.name.startswith(".") or not path.name.isprintable():
-        return False
     run = Run(path)
-    return run.completions.exists() or run.about.exists()
+    is_named = path.name.isprintable() and not path.name.startswith(".")
+    return is_named and (run.completions.exists() or run.about.exists())

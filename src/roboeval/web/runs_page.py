@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
 
 from nicegui import html, ui
 
 from codebotler.badinput import BadInput
 from codebotler.pasted import runnable
 from codebotler.terminal import shortened
-from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.words import Press, Words
 from roboeval.web.heat_map import NONE, address
-from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import RunList
-from roboeval.web.widgets import EVERY, count_text, draw_state, page
+from roboeval.web.widgets import EVERY, count_text, show_state
 
-READ_FOR = 0.5
-"""Seconds after which the page is shown, whether all runs were read or not."""
+READ_FOR = 0.5  # seconds after which runs are shown that were not read yet
 
-ORDERS: Mapping[str, tuple[str, Callable[[Mapping[str, Any]], tuple[float, str]]]] = {
-    "Run": ("ascending", lambda run: (0, str(run["run"]).lower())),
-    "pass@1": ("descending", lambda run: (-(run.get("pass@1") or {"mean": -1})["mean"], str(run["run"]))),
-    "Completions": ("descending", lambda run: (-run.get("completions", 0), str(run["run"]))),
+Order: TypeAlias = Callable[[Mapping[str, Any]], tuple[float, str]]
+ORDERS: Mapping[str, tuple[str, Order]] = {
+    "Run": ("ascending", lambda run: (0, run["run"].lower())),
+    "pass@1": ("descending", lambda run: (-(run.get("pass@1") or {"mean": -1})["mean"], run["run"])),
+    "Completions": ("descending", lambda run: (-run.get("completions", 0), run["run"])),
 }
 COLUMNS = ("Run", "Suite", "State", "Completions", "pass@1")
 NOTHING = "There is no run here yet. The first one, without a key or a network:"
@@ -32,23 +31,13 @@ FIRST = "run --model recorded:hasty --num-completions 3"
 MOST_NAME = 80
 
 
-def add(store: RunStore, frame: Frame) -> None:
-    """Put the page at its address.
-
-    Args:
-        store: whose runs.
-        frame: what all pages have.
-    """
-    runs = RunList(store)
-
-    @ui.page("/runs", response_timeout=PATIENCE)
-    async def list_runs() -> None:
-        with page(frame, "Runs"):
-            Words("h1", "Runs")
-            Words("p", f"In {shortened(str(store.folder.resolve()), 200)}", "quiet")
-            table = _Table(runs)
-        await table.refresh()
-        ui.timer(EVERY, table.refresh, immediate=False)
+async def draw_runs(folder: Path, runs: RunList) -> None:
+    """Draw the runs in a folder."""
+    Words("h1", "Runs")
+    Words("p", f"In {shortened(str(await asyncio.to_thread(folder.resolve)), 200)}", "quiet")
+    table = _Table(runs)
+    await table.refresh()
+    ui.timer(EVERY, table.refresh, immediate=False)
 
 
 class _Table:
@@ -61,7 +50,6 @@ class _Table:
         self._data: list[dict[str, Any]] = []
         self._rows: list[_Row] = []
         self._trouble = Words("p", "", "trouble").props("role=alert")
-        self._trouble.say("")
         self._empty = ui.element("div").classes("first-run")
         with self._empty:
             Words("p", NOTHING, "quiet")
@@ -79,16 +67,12 @@ class _Table:
             html.button("Show side by side", type="submit").classes("plain")
 
     def _draw_head(self, name: str) -> None:
-        with html.th().props("scope=col") as cell:
+        with html.th().props("scope=col") as head:
             if name in ORDERS:
-                Press(name, lambda: self._sort(name), "sort")
-                self._heads[name] = cell
+                Press(name, lambda: self._show(self._data, name), "sort")
+                self._heads[name] = head
             else:
                 Words("span", name)
-
-    def _sort(self, name: str) -> None:
-        self._order = name
-        self._show(self._data)
 
     async def refresh(self) -> None:
         """Show the runs as they are now."""
@@ -96,14 +80,14 @@ class _Table:
             data = await asyncio.to_thread(self._runs.data, READ_FOR)
         except BadInput as error:
             self._trouble.say(str(error))
-            return
-        self._trouble.say("")
-        self._show(data)
+        else:
+            self._trouble.say("")
+            self._show(data, self._order)
 
-    def _show(self, data: Sequence[dict[str, Any]]) -> None:
-        self._data = sorted(data, key=ORDERS[self._order][1])
+    def _show(self, data: list[dict[str, Any]], order: str) -> None:
+        self._data, self._order = sorted(data, key=ORDERS[order][1]), order
         for name, head in self._heads.items():
-            head.props(f"aria-sort={ORDERS[name][0] if name == self._order else 'none'}")
+            head.props(f"aria-sort={ORDERS[name][0] if name == order else 'none'}")
         self._empty.set_visibility(not data)
         self._form.set_visibility(bool(data))
         if [row.name for row in self._rows] != [run["run"] for run in self._data]:
@@ -130,28 +114,24 @@ class _Row:
                 self._models = Words("span", "", "quiet")
                 self._notes = Words("span", "", "bad note")
             with html.td():
-                self._suite = Words("span", "")
+                self._suite = Words("span")
             with html.td():
-                self._state = Words("small", "")
+                self._state = Words("small")
                 self._bar = html.progress(max="1")
             with html.td().classes("count"):
-                self._count = Words("span", "")
+                self._count = Words("span")
             with html.td().classes("score"):
-                self._score = Words("b", "")
+                self._score = Words("b")
                 self._interval = Words("span", "", "quiet")
                 self._meter = ui.element("span").classes("meter").props("aria-hidden=true")
 
     def show(self, run: Mapping[str, Any]) -> None:
-        """Show its numbers.
-
-        Args:
-            run: as `run_data` gives it.
-        """
+        """Show its numbers, as `run_data` gives them."""
         by_hand = ", programs written by hand" if run.get("by_hand") else ""
         self._models.say(shortened(", ".join(run.get("models", ())), 160) + by_hand)
         self._notes.say(" ".join(run["notes"][:1]))
         self._suite.say(shortened(str(run.get("evaluation") or run.get("suite") or NONE), MOST_NAME))
-        draw_state(run, self._state, self._bar)
+        show_state(run, self._state, self._bar)
         self._count.say(count_text(run))
         mean = run.get("pass@1")
         self._score.say(NONE if mean is None else f"{mean['mean']:.3f}")

@@ -16,10 +16,9 @@ from roboeval.evaluation.completions import Key, how_many, name_of
 from roboeval.evaluation.explanation import GONE, completion_data
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
-from roboeval.web.snapshot import KEY, Cell, Filter, Snapshot
+from roboeval.web.snapshot import KEY, Filter, Snapshot
 
-MOST_FAULTS = 5
-MOST_NAME, MOST_REASON = 120, 300
+MOST_FAULTS, MOST_NAME, MOST_REASON = 5, 120, 300
 
 
 class State(StrEnum):
@@ -37,16 +36,12 @@ class State(StrEnum):
 
 
 def state_of(run: Snapshot, wanted: int | None) -> State:
-    """How far a run has come.
-
-    Args:
-        run: as it was last read.
-        wanted: how many completions it shall have; None where nobody recorded that.
-    """
-    lacks = wanted is not None and run.written < wanted
-    unjudged = run.judged < run.to_judge
+    """How far a run has come that shall have so many completions; None where nobody recorded that."""
+    written = len(run.results.completions)
+    lacks = wanted is not None and written < wanted
+    unjudged = run.judged < run.results.scope.total
     stages = (
-        (State.GENERATING, run.is_written and (lacks or not run.written)),
+        (State.GENERATING, run.is_written and (lacks or not written)),
         (State.JUDGING, run.is_written and unjudged),
         (State.DAMAGED, bool(run.results.faults)),
         (State.EMPTY, run.completions.is_empty()),
@@ -56,19 +51,10 @@ def state_of(run: Snapshot, wanted: int | None) -> State:
     return next((state for state, holds in stages if holds), State.JUDGED)
 
 
-def wanted_count(about: Mapping[str, Any], suite: Suite | None) -> int | None:
-    """How many completions a run shall have, as its run.json says; None where nobody recorded that."""
-    each, tasks = about.get("num_completions"), about.get("tasks")
-    if not isinstance(each, int) or suite is None:
-        return None
-    selected = suite.tasks if not isinstance(tasks, list) else [name for name in tasks if name in suite.tasks]
-    return each * sum(len(suite.tasks[name].prompts) for name in selected)
-
-
 def run_data(run: Snapshot) -> dict[str, Any]:
     """A run in short."""
     results, mean = run.results, run.pass_at_1
-    wanted = wanted_count(results.about, run.suite)
+    wanted = _wanted(results.about, run.suite)
     return {
         "run": run.name,
         "models": run.models,
@@ -78,22 +64,51 @@ def run_data(run: Snapshot) -> dict[str, Any]:
         "evaluations": list(run.evaluations),
         "state": state_of(run, wanted),
         "read": 1.0,
-        "completions": run.written,
+        "completions": len(results.completions),
         "wanted": wanted,
         "judged": run.judged,
-        "to_judge": run.to_judge,
+        "to_judge": results.scope.total,
         "passed": run.passed,
         "pass@1": None if mean is None else {"mean": mean.mean, "low": mean.low, "high": mean.high},
         "notes": notes(run),
     }
 
 
-class RunList:
-    """All runs in short, each of them read only when something in it has changed.
+def _wanted(about: Mapping[str, Any], suite: Suite | None) -> int | None:
+    """How many completions a run shall have, as its run.json says; None where nobody recorded that."""
+    each, tasks = about.get("num_completions"), about.get("tasks")
+    if not isinstance(each, int) or suite is None:
+        return None
+    selected = [name for name in tasks if name in suite.tasks] if isinstance(tasks, list) else suite.tasks
+    return each * sum(len(suite.tasks[name].prompts) for name in selected)
 
-    Args:
-        store: whose runs.
-    """
+
+def notes(run: Snapshot) -> list[str]:
+    """What is wrong with a run, in sentences."""
+    results, stale = run.results, len(run.results.stale)
+    faults = [BadInput(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
+    found = [str(fault) for fault in faults[:MOST_FAULTS]]
+    if len(faults) > MOST_FAULTS:
+        found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
+    if faults:
+        found.append("The other rows are shown.")
+    if stale:
+        found.append(
+            f"{how_many(stale)} changed since the verdict; `roboeval evaluate` with --redo judges anew."
+        )
+    if run.judged and run.suite is None:
+        name = shortened(str(results.head.get("suite")), MOST_NAME)
+        found.append(
+            f'The suite "{name}" was not found, so failed checks cannot be explained; '
+            "`roboeval serve --suite FOLDER` names it."
+        )
+    elif run.judged and run.suite is not None and results.head.get("digest") != run.suite.digest:
+        found.append("The suite has changed since this run was judged; explanations may be missing.")
+    return found
+
+
+class RunList:
+    """The runs of a store in short, each of them read only when something in it has changed."""
 
     def __init__(self, store: RunStore) -> None:
         self._store = store
@@ -112,56 +127,29 @@ class RunList:
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 
     def _run_data(self, name: str, *, may_read: bool) -> dict[str, Any]:
+        unread = {"run": name, "state": State.READING, "notes": []}
+        version, data = self._known.get(name, (None, unread))
         try:
-            known = self._known.get(name)
-            if known is not None and (not may_read or known[0] == self._store.version(name)):
-                return known[1]
-            if not may_read:
-                return {"run": name, "state": State.READING, "notes": []}
-            run = self._store.open(name)
-            self._known[name] = run.version, run_data(run)
-            return self._known[name][1]
+            if may_read and version != self._store.version(name):
+                run = self._store.open(name)
+                data = run_data(run)
+                self._known[name] = run.version, data
         except BadInput as error:
-            return {"run": name, "state": State.UNREADABLE, "notes": [str(error)]}
-
-
-def notes(run: Snapshot) -> list[str]:
-    """What is wrong with a run, in sentences."""
-    faults, results = run.results.faults, run.results
-    found = [
-        str(BadInput(f.sentence, file=Path(str(f.file)).name, line=f.line)) for f in faults[:MOST_FAULTS]
-    ]
-    if len(faults) > MOST_FAULTS:
-        found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
-    if faults:
-        found.append("The other rows are shown.")
-    if run.stale:
-        changed = f"{how_many(run.stale)} changed since the verdict"
-        found.append(f"{changed}; `roboeval evaluate` with --redo judges anew.")
-    if run.judged and run.suite is None:
-        name = shortened(str(results.head.get("suite")), MOST_NAME)
-        found.append(
-            f'The suite "{name}" was not found, so failed checks cannot be explained; '
-            "`roboeval serve --suite FOLDER` names it."
-        )
-    elif run.judged and run.suite is not None and results.head.get("digest") != run.suite.digest:
-        found.append("The suite has changed since this run was judged; explanations may be missing.")
-    return found
+            return {**unread, "state": State.UNREADABLE, "notes": [str(error)]}
+        return data
 
 
 def run_details(run: Snapshot) -> dict[str, Any]:
     """A run with its tasks, prompts and kinds of failures."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
     tasks: dict[str, list[dict[str, Any]]] = {}
-    for cell in run.cells(Filter(passed=True)):
-        tasks.setdefault(cell.task, []).append(_prompt_data(cell, run.suite))
+    for prompt in run.prompts(Filter(passed=True)):
+        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite))
     kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
         **run_data(run),
-        "tasks": [
-            {"task": task, "pass@1": means.get(task), "prompts": prompts} for task, prompts in tasks.items()
-        ],
+        "tasks": [{"task": task, "pass@1": means.get(task), "prompts": of} for task, of in tasks.items()],
         "failures": [
             {"class": name, "kind": kind.name, "count": kind.count, "share": kind.share}
             for name, kind in kinds
@@ -169,16 +157,16 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     }
 
 
-def _prompt_data(cell: Cell, suite: Suite | None) -> dict[str, Any]:
-    task = suite.tasks.get(cell.task) if suite is not None else None
-    prompts = () if task is None else task.prompts
+def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, Any]:
+    task = None if suite is None else suite.tasks.get(prompt["task"])
+    instructions = dict(enumerate(task.prompts)) if task is not None else {}
     return {
-        "prompt": cell.prompt,
-        "instruction": prompts[cell.prompt] if cell.prompt < len(prompts) else None,
-        "completions": cell.written,
-        "judged": cell.judged,
-        "passed": cell.counted,
-        "pass@1": cell.share,
+        "prompt": prompt["prompt"],
+        "instruction": instructions.get(prompt["prompt"]),
+        "completions": prompt["written"],
+        "judged": prompt["judged"],
+        "passed": prompt["counted"],
+        "pass@1": prompt["share"],
     }
 
 

@@ -28,6 +28,8 @@ SIGN = (
 )
 """How a program did in a world: + satisfied, - not, ! ended by an error."""
 
+MOST = 2**63
+
 
 @dataclass(frozen=True)
 class Filter:
@@ -35,7 +37,7 @@ class Filter:
 
     task: Annotated[str | None, Query(description="Only of this task.")] = None
     prompt: Annotated[
-        int | None, Query(ge=0, lt=2**63, description="Only of this prompt, counted from 0.")
+        int | None, Query(ge=0, lt=MOST, description="Only of this prompt, counted from 0.")
     ] = None
     passed: Annotated[bool | None, Query(description="Only those that passed, or those that failed.")] = None
     failure: Annotated[str | None, Query(description="Only those that failed by this class.")] = None
@@ -45,11 +47,14 @@ class Filter:
     def condition(self) -> pl.Expr:
         """It as a condition on `Snapshot.completions`."""
         columns = ("task", "prompt", "passed", "failure_class", "failure_kind")
-        values = (self.task, self.prompt, self.passed, self.failure, self.kind)
-        wanted = [
-            pl.col(name) == value for name, value in zip(columns, values, strict=True) if value is not None
-        ]
-        return pl.all_horizontal(pl.lit(value=True), *wanted)
+        wanted = zip(columns, asdict(self).values(), strict=True)
+        conditions = [pl.col(name) == value for name, value in wanted if value is not None]
+        return pl.all_horizontal(pl.lit(value=True), *conditions)
+
+    @property
+    def verdict(self) -> Self:
+        """The same in all tasks and prompts."""
+        return replace(self, task=None, prompt=None)
 
     def query(self, evaluation: str | None) -> str:
         """It as the query of an address; empty if it means all completions of the usual evaluation."""
@@ -59,42 +64,13 @@ class Filter:
         query = urlencode({name: v for name, v in values.items() if v is not None}, errors="replace")
         return f"?{query}" if query else ""
 
-    @property
-    def verdict(self) -> Self:
-        """The same in all tasks and prompts."""
-        return replace(self, task=None, prompt=None)
-
-
-@dataclass(frozen=True)
-class Cell:
-    """The completions of a prompt.
-
-    Args:
-        task: its task.
-        prompt: counted from 0.
-        written: how many there are.
-        judged: how many of them were judged.
-        counted: how many of those meet a condition.
-    """
-
-    task: str
-    prompt: int
-    written: int
-    judged: int
-    counted: int
-
-    @property
-    def share(self) -> float | None:
-        """Of the judged ones, those that are counted; None where none is judged."""
-        return self.counted / self.judged if self.judged else None
-
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
     """One evaluation of a run as it was last read.
 
     Args:
-        results: the verdicts; lines that could not be read are among its faults.
+        results: the verdicts; what could not be read is among its faults.
         evaluations: the names of all evaluations of the run.
         is_written: whether a process is writing the run.
         version: differs whenever something has changed.
@@ -116,11 +92,16 @@ class Snapshot:
         return self.results.suite
 
     @cached_property
-    def completions(self) -> pl.DataFrame:
-        """A row for each completion, in the suite's order, also for those of which only the verdict is there.
+    def models(self) -> list[str]:
+        """The models that wrote the completions, as far as that was recorded."""
+        return sorted({c.model for c in self.results.completions.values() if c.model is not None})
 
-        `passed` is null where nothing was judged; `worlds` has a sign for each world, and `why` the check or
-        the error that decided.
+    @cached_property
+    def completions(self) -> pl.DataFrame:
+        """A row for each completion in the suite's order, also where only the verdict is there.
+
+        `passed` is null where nothing was judged, `worlds` has a sign for each world, `why` is the check or
+        the error that decided, and `written` whether the completion stands in the run now.
         """
         judged = self.results.table.group_by(KEY, maintain_order=True).agg(
             pl.col("passed", "^failure_.*$", "stale").first(),
@@ -137,13 +118,8 @@ class Snapshot:
         place = pl.col("task").replace_strict(
             tasks, range(len(tasks)), default=len(tasks), return_dtype=pl.Int64
         )
-        return (
-            judged.join(written, on=KEY, how="full", coalesce=True)
-            .with_columns(
-                pl.col("stale", "written").fill_null(value=False), pl.col("worlds", "why").fill_null("")
-            )
-            .sort(place, *KEY)
-        )
+        filled = (pl.col("stale", "written").fill_null(value=False), pl.col("worlds", "why").fill_null(""))
+        return judged.join(written, on=KEY, how="full", coalesce=True).with_columns(*filled).sort(place, *KEY)
 
     def row(self, name: str) -> dict[str, Any] | None:
         """The row of a completion, by its name; None if there is none."""
@@ -160,44 +136,32 @@ class Snapshot:
         at = keys.index(key) if key in keys else None
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
-    def cells(self, counted: Filter) -> list[Cell]:
-        """All prompts, in order, and how many of their completions a filter means in each."""
-        cells = self.completions.group_by("task", "prompt", maintain_order=True).agg(
+    def prompts(self, filter: Filter) -> list[dict[str, Any]]:  # noqa: A002
+        """All prompts in order, and how many of their completions are `written`, `judged` and `counted`.
+
+        `share` is that of the counted ones among the judged; None where none is judged.
+
+        Args:
+            filter: which completions are counted, of any task and prompt.
+        """
+        judged = pl.col("judged")
+        counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
             written=pl.col("written").sum(),
             judged=pl.col("passed").count(),
-            counted=counted.verdict.condition.sum(),
+            counted=filter.verdict.condition.sum(),
         )
-        return [Cell(*cell) for cell in cells.iter_rows()]
+        share = pl.col("counted") / pl.when(judged > 0).then(judged)
+        return counts.with_columns(share=share).to_dicts()
 
-    @cached_property
-    def written(self) -> int:
-        """How many completions there are."""
-        return len(self.results.completions)
-
-    @cached_property
+    @property
     def judged(self) -> int:
         """How many completions were judged."""
         return self.completions["passed"].count()
 
-    @cached_property
+    @property
     def passed(self) -> int:
         """How many completions passed."""
         return int(self.completions["passed"].sum())
-
-    @cached_property
-    def to_judge(self) -> int:
-        """How many of the completions were to be judged."""
-        return self.results.scope.total
-
-    @cached_property
-    def stale(self) -> int:
-        """How many verdicts are on other programs than stand in the run now."""
-        return len(self.results.stale)
-
-    @cached_property
-    def models(self) -> list[str]:
-        """The models that wrote the completions, as far as that was recorded."""
-        return sorted({c.model for c in self.results.completions.values() if c.model is not None})
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:
@@ -214,15 +178,9 @@ class Snapshot:
         """The classes of failures that there are, each with its kinds, the most frequent first."""
         classes = failures(self.results.table) if self.judged else ()
         return [
-            replace(each, kinds=tuple(sorted(filter(_occurs, each.kinds), key=_frequency)))
-            for each in classes
-            if _occurs(each)
+            replace(
+                of, kinds=tuple(sorted((k for k in of.kinds if k.count), key=lambda k: (-k.count, k.name)))
+            )
+            for of in classes
+            if of.count
         ]
-
-
-def _occurs(failures: Failures) -> bool:
-    return failures.count > 0
-
-
-def _frequency(failures: Failures) -> tuple[int, str]:
-    return -failures.count, failures.name

@@ -31,7 +31,7 @@ def test_a_run_that_has_only_begun_is_not_damaged(runs: Path) -> None:
     (runs / "begun").mkdir()
     (runs / "begun" / "run.json").write_text("{}")
     begun = RunStore(runs).open("begun")
-    assert (begun.written, begun.results.key, begun.results.faults) == (0, None, ())
+    assert (len(begun.results.completions), begun.results.key, begun.results.faults) == (0, None, ())
 
 
 def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -133,7 +133,7 @@ def test_a_growing_run_is_not_read_all_the_time(runs: Path, monkeypatch: pytest.
     assert store.version("hasty") != first.version
     with run.writing():
         now = store.open("hasty")
-    assert (now.is_written, now.written) == (True, 45)
+    assert (now.is_written, len(now.results.completions)) == (True, 45)
 
 
 def test_a_row_that_was_written_anew_is_not_shown_for_another(runs: Path) -> None:

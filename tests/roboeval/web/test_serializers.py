@@ -25,7 +25,7 @@ def test_many_damaged_lines_are_counted(runs: Path) -> None:
     places = [note.partition(":")[0] for note in said[:5]]
     assert places == [f"completions.jsonl, line {n}" for n in range(1, 6)]
     assert said[5].startswith("8 more lines")
-    assert run.written == 45
+    assert len(run.results.completions) == 45
 
 
 def test_runs_in_short_are_read_once_and_not_for_longer_than_asked(

@@ -31,8 +31,8 @@ def test_a_row_for_each_completion(runs: Path) -> None:
     run = opened(runs / "hasty")
     rows = [json.loads(line) for line in lines_of(Run(runs / "hasty").rows("paper"))]
     assert run.completions.height == len(rows) == 45
-    assert run.written == run.to_judge == run.judged == 45
-    assert (run.stale, run.results.faults, run.models) == (0, (), ["recorded:hasty"])
+    assert len(run.results.completions) == run.results.scope.total == run.judged == 45
+    assert (len(run.results.stale), run.results.faults, run.models) == (0, (), ["recorded:hasty"])
     assert state_of(run, 45) is State.JUDGED
     for row in rows:
         shown = run.row(f"{row['task']}/{row['prompt']}/{row['index']}")
@@ -56,7 +56,12 @@ def test_what_is_not_judged_yet_or_judged_and_gone_is_there_too(runs: Path) -> N
     run.completions.write_bytes(b"".join(completions[5:]))
     run.rows("paper").write_bytes(b"".join(rows[:40]))
     seen = opened(run.path)
-    assert (seen.written, seen.judged, seen.stale, seen.completions.height) == (40, 40, 5, 45)
+    assert (len(seen.results.completions), seen.judged, len(seen.results.stale), seen.completions.height) == (
+        40,
+        40,
+        5,
+        45,
+    )
     waiting = seen.completions.filter(seen.completions["passed"].is_null())
     assert sorted(keys(waiting)) == sorted(_key(line) for line in completions[40:])
     gone = seen.completions.filter(~seen.completions["written"])
@@ -77,12 +82,14 @@ def test_a_program_that_changed_since_it_was_judged_is_stale(runs: Path) -> None
     assert keys(run.completions.filter("stale")) == [_key(lines[7])]
 
 
-def test_filters_cells_and_neighbours(runs: Path) -> None:
+def test_filters_prompts_and_neighbours(runs: Path) -> None:
     run = opened(runs / "hasty")
-    cells = run.cells(Filter(passed=True))
-    assert [cell.task for cell in cells] == ["LunchBreak"] * 5 + ["SayGoodDay"] * 5 + ["StaplerSupply"] * 5
-    assert all((cell.written, cell.judged) == (3, 3) for cell in cells)
-    assert sum(cell.counted for cell in cells) == run.passed
+    cells = run.prompts(Filter(passed=True))
+    assert [cell["task"] for cell in cells] == [
+        task for task in ("LunchBreak", "SayGoodDay", "StaplerSupply") for _ in range(5)
+    ]
+    assert all((cell["written"], cell["judged"]) == (3, 3) for cell in cells)
+    assert sum(cell["counted"] for cell in cells) == run.passed
     assert keys(run.select(Filter())) == keys(run.completions)
     assert {task for task, _, _ in keys(run.select(Filter("LunchBreak")))} == {"LunchBreak"}
     kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
@@ -130,7 +137,7 @@ def test_a_damaged_row_is_named_and_the_others_are_shown(runs: Path, content: by
     run = opened(runs / "hasty")
     (fault,) = run.results.faults
     assert (fault.file, fault.line) == (rows, 11)
-    assert (run.judged, run.stale) == (44, 0)
+    assert (run.judged, len(run.results.stale)) == (44, 0)
     assert state_of(run, 45) is State.DAMAGED
 
 
@@ -139,5 +146,5 @@ def test_half_a_character_in_a_name_of_a_task_breaks_nothing(runs: Path) -> None
     odd = {**json.loads(lines_of(completions)[0]), "task": "half \ud800"}
     completions.write_bytes(completions.read_bytes() + to_line(odd))
     run = opened(runs / "hasty")
-    assert (run.written, run.judged) == (46, 45)
+    assert (len(run.results.completions), run.judged) == (46, 45)
     assert keys(run.completions)[-1] == ("half \\ud800", odd["prompt"], odd["index"])

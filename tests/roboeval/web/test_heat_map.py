@@ -1,0 +1,66 @@
+"""Heat maps: the number and the shade of a cell, and where it leads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from roboeval.evaluation.run import Run
+from roboeval.web.heat_map import TaskCells, failure_rows, percent, shade
+from roboeval.web.run_store import RunStore
+from roboeval.web.snapshot import Filter
+
+
+@pytest.mark.parametrize(
+    ("share", "text", "look"),
+    [(0, "0", "s0"), (1e-4, "<1", "s1"), (0.336, "34", "s3"), (0.9999, ">99", "s9"), (1, "100", "s10")],
+)
+def test_little_is_not_nothing_and_nearly_all_is_not_all(share: float, text: str, look: str) -> None:
+    assert (percent(share), shade(share, bad=False)) == (text, look)
+    assert shade(share, bad=True) == look.replace("s", "f")
+    assert shade(None, bad=True) == "waits"
+
+
+@pytest.mark.parametrize(
+    ("chosen", "column", "value"),
+    [
+        (Filter(), "passed", True),
+        (Filter("LunchBreak", 1, passed=False), "passed", False),
+        (Filter("LunchBreak", failure="PythonError"), "failure_class", "PythonError"),
+    ],
+)
+def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) -> None:
+    rows = Run(runs / "hasty").rows("paper")
+    rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[:30]))
+    run = RunStore(runs).open("hasty")
+    cells = TaskCells(run, chosen, "paper")
+    assert [each["name"] for each in cells.columns] == ["all", *"01234"]
+    completions = run.completions.to_dicts()
+    for task in cells.tasks:
+        mean, *prompts = cells.row(task)
+        shares = []
+        for number, cell in enumerate(prompts):
+            same = [row for row in completions if (row["task"], row["prompt"]) == (task, number)]
+            judged = [row for row in same if row["passed"] is not None]
+            if judged:
+                shares.append(sum(row[column] == value for row in judged) / len(judged))
+                assert cell["text"] == percent(shares[-1]), cell["title"]
+            else:
+                assert (cell["text"], cell["shade"]) == (f"({len(same)})", "waits")
+            assert cell["here"] is ((task, number) == (chosen.task, chosen.prompt))
+            assert f"task={task}&prompt={number}" in cell["href"]
+        assert mean["text"] == (percent(sum(shares) / len(shares)) if shares else "-")
+    assert cells.row("NoTask") == [{"text": "", "shade": "none"}] * 6
+
+
+def test_kinds_of_failures_by_run(runs: Path) -> None:
+    run = RunStore(runs).open("hasty")
+    kinds = {kind.name: kind for of in run.failures for kind in of.kinds}
+    rows = failure_rows([run, run])
+    assert len(rows) == len(kinds)
+    shares = [kinds[row["name"].partition(": ")[2]].share for row in rows]
+    assert shares == sorted(shares, reverse=True)
+    for row, share in zip(rows, shares, strict=True):
+        assert [cell["text"] for cell in row["cells"]] == [percent(share)] * 2
+    assert failure_rows([]) == []
