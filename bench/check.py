@@ -21,8 +21,8 @@ from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.imagined import ImaginedRobot, Plan
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.lots import Lot
-from roboeval.evaluation.completions import Completion, recorded_completions
 from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.runs.completions import Completion, recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))

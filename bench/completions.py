@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 
 from codebotler.files import to_line
-from roboeval.evaluation.completions import read_completions, recorded_completions
 from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.runs.completions import read_completions, recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 ORIGINAL = 0.354  # seconds a run

@@ -26,7 +26,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.trace import Status
 from codebotler.world import Room, World
 from in_process import Reused, compiled
-from roboeval.evaluation.completions import recorded_completions
+from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))

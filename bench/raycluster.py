@@ -15,10 +15,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from codebotler.simulator.lane import Lane
-from roboeval.evaluation.completions import Completion, recorded_completions
 from roboeval.evaluation.engines import Engine, Local, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import Cluster
+from roboeval.evaluation.runs.completions import Completion, recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 ROUNDS = 3

@@ -18,11 +18,11 @@ from pathlib import Path
 import polars as pl
 
 from codebotler.files import to_line, to_text
-from roboeval.evaluation.completions import Completion, recorded_completions
 from roboeval.evaluation.judge import evaluate, head
-from roboeval.evaluation.results import read_results
-from roboeval.evaluation.rows import Row
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.results import read_results
+from roboeval.evaluation.runs.rows import Row
 from roboeval.report.runs import JudgedRun, named_apart
 from roboeval.report.writing import headline, sections, write_report
 from roboeval.suites.load import Suite, load_suite

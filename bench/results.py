@@ -1,6 +1,6 @@
 """How long does it take to read a judged run of 100,000 completions as one table?
 
-The run is made up: verdicts on the programs that ship with the package, repeated under other indices. It prints
+The run is made up: verdicts on programs that ship with the package, repeated under other indices. It prints
 the processor time of `load_results` beside that of parsing the same files with `json` and no more, and of one
 page of numbers.
 """
@@ -17,8 +17,8 @@ from roboeval import evaluate, load_results, load_suite, recorded_completions
 from roboeval.analysis.metrics import overall, task_scores
 from roboeval.analysis.summary import failures
 from roboeval.evaluation.judge import head
-from roboeval.evaluation.rows import Seal
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.rows import Seal
 
 ROWS = int(os.environ.get("ROWS", "100000"))
 

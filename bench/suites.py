@@ -12,8 +12,8 @@ from functools import partial
 
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluation.completions import recorded_completions
 from roboeval.evaluation.judge import judge
+from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 ROUNDS = 3

@@ -43,7 +43,7 @@ MODULES = {
     "roboeval": (
         "roboeval",
         "roboeval.suites.load",
-        "roboeval.evaluation.completions",
+        "roboeval.evaluation.runs.completions",
         "roboeval.analysis.metrics",
     ),
 }

@@ -19,11 +19,11 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from roboeval.evaluation.completions import Completion, read_completions, recorded_completions
     from roboeval.evaluation.judge import evaluate
-    from roboeval.evaluation.results import load_results
     from roboeval.evaluation.rewards import reward
-    from roboeval.evaluation.rows import Row
+    from roboeval.evaluation.runs.completions import Completion, read_completions, recorded_completions
+    from roboeval.evaluation.runs.results import load_results
+    from roboeval.evaluation.runs.rows import Row
     from roboeval.suites.load import Suite, load_suite
 else:  # each name is imported when it is first used
     from codebotler.facade import facade
@@ -31,14 +31,14 @@ else:  # each name is imported when it is first used
     __getattr__, __dir__ = facade(
         __name__,
         {
-            "Completion": "evaluation.completions",
-            "Row": "evaluation.rows",
+            "Completion": "evaluation.runs.completions",
+            "Row": "evaluation.runs.rows",
             "Suite": "suites.load",
             "evaluate": "evaluation.judge",
-            "load_results": "evaluation.results",
+            "load_results": "evaluation.runs.results",
             "load_suite": "suites.load",
-            "read_completions": "evaluation.completions",
-            "recorded_completions": "evaluation.completions",
+            "read_completions": "evaluation.runs.completions",
+            "recorded_completions": "evaluation.runs.completions",
             "reward": "evaluation.rewards",
         },
     )

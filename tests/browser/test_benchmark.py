@@ -17,7 +17,7 @@ from playwright.sync_api import Page, expect
 from codebotler.files import to_line
 from command_line import forked
 from pageserver import PageServer
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
 from runs_server import serving
 from seals import unseal
 from viewing import PHONE, SCREENS, OpenPage, Screen, expect_no_grave_fault

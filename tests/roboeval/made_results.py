@@ -9,11 +9,11 @@ from typing import Any
 import polars as pl
 
 from codebotler.files import to_line
-from roboeval.evaluation.completions import Completion, Key
-from roboeval.evaluation.results import FailedRows, Results
-from roboeval.evaluation.rows import JudgedRow, RowData, judged_row, key_of
-from roboeval.evaluation.run import Run
-from roboeval.evaluation.table import TableBuilder
+from roboeval.evaluation.runs.completions import Completion, Key
+from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.results import FailedRows, Results
+from roboeval.evaluation.runs.rows import JudgedRow, RowData, judged_row, key_of
+from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.suites.load import Suite
 
 VERDICT = {

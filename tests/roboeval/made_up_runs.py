@@ -14,8 +14,8 @@ import polars as pl
 from codebotler.files import to_line
 from codebotler.simulator.rules import Rules
 from made_results import VERDICT, results_of
-from roboeval.evaluation.completions import Completion
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.folder import Run
 from roboeval.report.runs import JudgedRun
 from roboeval.suites.load import Suite
 from seals import unseal

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from codebotler.files import to_text
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
 
 
 def unseal(run: Path, key: str = "paper") -> None:

@@ -10,8 +10,8 @@ from codebotler.simulator.robot import resolve_room
 from roboeval.analysis.metrics import Estimate, completions_of, prompt_scores, task_scores
 from roboeval.analysis.statistics import by_formula
 from roboeval.analysis.summary import failures
-from roboeval.evaluation.results import Results
-from roboeval.evaluation.rows import RowData
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.rows import RowData
 from roboeval.suites.load import Suite
 
 REPORTS = "report-back"

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from roboeval.analysis.similarity import Fix, Lines, Passing, passing, shape, shortest_fix, similarity
-from roboeval.evaluation.completions import Key, name_of
 from roboeval.evaluation.explanation import reason
-from roboeval.evaluation.results import Results
-from roboeval.evaluation.rows import RowData, key_of
+from roboeval.evaluation.runs.completions import Key, name_of
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.rows import RowData, key_of
 
 ALIKE = 0.6  # of their lines two shapes share to be of one group
 

@@ -12,7 +12,7 @@ from typing import Any
 from codebotler.rtl import CannotJudge, Formula, holds, parse
 from codebotler.trace import Trace
 from codebotler.tracefile import trace_from
-from roboeval.evaluation.completions import Key
+from roboeval.evaluation.runs.completions import Key
 
 BATCH = 100  # rows that a process looks through at a time
 SMALL = 20  # batches for which other processes are not worth their start

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import visible
-from roboeval.evaluation.results import Results
+from roboeval.evaluation.runs.results import Results
 from roboeval.suites.load import Suite
 
 

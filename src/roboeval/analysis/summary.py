@@ -12,9 +12,9 @@ import polars as pl
 from codebotler.badinput import BadInput
 from codebotler.terminal import visible
 from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, completions_of, overall, task_scores
-from roboeval.evaluation.completions import how_many
 from roboeval.evaluation.failures import CLASSES
-from roboeval.evaluation.results import Scope
+from roboeval.evaluation.runs.completions import how_many
+from roboeval.evaluation.runs.results import Scope
 from roboeval.suites.load import Suite
 
 

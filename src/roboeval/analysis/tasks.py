@@ -9,9 +9,9 @@ from typing import Any
 import polars as pl
 
 from roboeval.analysis.metrics import completions_of
-from roboeval.evaluation.completions import Completion, Key
 from roboeval.evaluation.explanation import reason
-from roboeval.evaluation.results import Results
+from roboeval.evaluation.runs.completions import Completion, Key
+from roboeval.evaluation.runs.results import Results
 
 
 def task_data(results: Results, task: str) -> dict[str, Any]:

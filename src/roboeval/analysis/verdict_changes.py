@@ -13,8 +13,8 @@ from roboeval.analysis.cluster import Cluster, cluster_data, clusters, groups
 from roboeval.analysis.compare import Comparison, PromptScores, compared, comparison_data
 from roboeval.analysis.metrics import pass_at_1
 from roboeval.analysis.statistics import ROUNDING
-from roboeval.evaluation.completions import Key, how_many
-from roboeval.evaluation.results import Results
+from roboeval.evaluation.runs.completions import Key, how_many
+from roboeval.evaluation.runs.results import Results
 from roboeval.suites.load import Suite
 
 

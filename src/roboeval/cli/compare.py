@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.results import Results
+    from roboeval.evaluation.runs.results import Results
 
 
 def compare(
@@ -88,7 +88,7 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
     """Print what a second suite changes."""
     from roboeval.analysis.verdict_changes import changes_data, verdict_changes
     from roboeval.cli.views.comparison import changes_view
-    from roboeval.evaluation.completions import how_many
+    from roboeval.evaluation.runs.completions import how_many
 
     if len({path.resolve() for path in paths}) < len(paths):
         fail("a run is named twice; name each once")
@@ -164,7 +164,7 @@ def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEn
         engine: where programs are checked.
     """
     from roboeval.evaluation.checks import check_programs
-    from roboeval.evaluation.table import with_answers
+    from roboeval.evaluation.runs.table import with_answers
 
     assert results.suite is not None, "it judged them"
     judged = [results.completions[key] for key in results.places]

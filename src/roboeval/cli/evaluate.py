@@ -27,7 +27,7 @@ from roboeval.cli.show import print_summary
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.rows import JudgedRow
+    from roboeval.evaluation.runs.rows import JudgedRow
 
 
 def evaluate(
@@ -55,13 +55,13 @@ def evaluate(
 ) -> None:
     """Say of every completion whether it does what is asked."""
     from codebotler.files import to_line
-    from roboeval.evaluation.completions import how_many
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import evaluate as judge_all
-    from roboeval.evaluation.results import Scope
-    from roboeval.evaluation.rows import judged_row
-    from roboeval.evaluation.run import Run, open_source, tasks_to_judge
-    from roboeval.evaluation.table import TableBuilder
+    from roboeval.evaluation.runs.completions import how_many
+    from roboeval.evaluation.runs.folder import Run, open_source, tasks_to_judge
+    from roboeval.evaluation.runs.results import Scope
+    from roboeval.evaluation.runs.rows import judged_row
+    from roboeval.evaluation.runs.table import TableBuilder
 
     opened_engine = engine_named(engine, workers, require_isolation=require_isolation)
     judged_by = load(suite)
@@ -109,8 +109,8 @@ def import_(
     suite: SuiteOption = "paper",
 ) -> None:
     """Make a run of completions from elsewhere."""
-    from roboeval.evaluation.completions import how_many
-    from roboeval.evaluation.run import Run, open_source
+    from roboeval.evaluation.runs.completions import how_many
+    from roboeval.evaluation.runs.folder import Run, open_source
 
     known = load(suite)
     opened = open_source(path, known)

@@ -52,7 +52,7 @@ def find(
     """
     from roboeval.analysis.cluster import clusters, groups
     from roboeval.analysis.search import Question, Search
-    from roboeval.evaluation.completions import how_many
+    from roboeval.evaluation.runs.completions import how_many
 
     if negated and formula is None:
         fail("--not is about a formula; name one, or leave --not out")
@@ -116,7 +116,7 @@ def print_found(
 
 
 def _found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]:
-    from roboeval.evaluation.completions import name_of
+    from roboeval.evaluation.runs.completions import name_of
 
     return {
         "completion": name_of(one.key),
@@ -133,7 +133,7 @@ def show_found(
     from rich.text import Text
 
     from roboeval.cli.views.groups import cluster_view, found_view
-    from roboeval.evaluation.completions import how_many
+    from roboeval.evaluation.runs.completions import how_many
 
     parts = [found_view(found, total)]
     if told:

@@ -137,7 +137,7 @@ def complete(
     from codebotler.models.open import open_model
     from roboeval.evaluation.generate import generate_run
     from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.run import Run, tasks_to_judge
+    from roboeval.evaluation.runs.folder import Run, tasks_to_judge
 
     suite = load(suite_name)
     plan = GenerationPlan(suite, tasks_to_judge(suite, tasks, ablated=False)[0], num_completions)

@@ -89,8 +89,8 @@ def mutate(
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
     """The programs that a user names, by their task; the same one may be among them several times."""
-    from roboeval.evaluation.completions import name_of
-    from roboeval.evaluation.run import open_source
+    from roboeval.evaluation.runs.completions import name_of
+    from roboeval.evaluation.runs.folder import open_source
     from roboeval.mutation.mutants import Original
 
     found: dict[str, list[Original]] = {}

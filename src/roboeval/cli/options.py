@@ -15,7 +15,7 @@ from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.results import Results
+    from roboeval.evaluation.runs.results import Results
     from roboeval.suites.load import Suite
 
 
@@ -107,7 +107,7 @@ def load(suite: str) -> Suite:
 
 def as_judged(run: Path, suite: Suite, *, ablated: bool) -> Suite:
     """The suite with the worlds in which a run was judged, if they were drawn otherwise than now."""
-    from roboeval.evaluation.run import Run, evaluation_key, load_head
+    from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
 
     path = Run(run).head(evaluation_key(suite, ablated=ablated))
     if suite.worlds is None or not path.is_file():
@@ -166,8 +166,8 @@ def open_run(
         BadInput: it is no run, was not judged so, or is damaged.
     """
     from codebotler.badinput import BadInput
-    from roboeval.evaluation.results import read_results
-    from roboeval.evaluation.run import Run, evaluation_key
+    from roboeval.evaluation.runs.folder import Run, evaluation_key
+    from roboeval.evaluation.runs.results import read_results
 
     suite = as_judged(run, load(suite_name), ablated=ablated)
     folder, key = Run(run), evaluation_key(suite, ablated=ablated)
@@ -211,7 +211,7 @@ def open_current(
 
 def complaint_of(results: Results) -> str | None:
     """That rows judge other programs than stand in the run now, if any does."""
-    from roboeval.evaluation.completions import name_of
+    from roboeval.evaluation.runs.completions import name_of
 
     stale = results.stale
     if not stale:
@@ -225,7 +225,7 @@ def complaint_of(results: Results) -> str | None:
 
 def unfinished_of(results: Results) -> str | None:
     """That there is more to judge than was judged, if so."""
-    from roboeval.evaluation.completions import how_many
+    from roboeval.evaluation.runs.completions import how_many
 
     count, total = len(results.places), results.scope.total
     return None if count >= total else f"{count:,} of {how_many(total)} judged"
@@ -233,7 +233,7 @@ def unfinished_of(results: Results) -> str | None:
 
 def _to_go_on(results: Results, suite: Suite) -> list[str]:
     """What else a command needs to go on with an evaluation."""
-    from roboeval.evaluation.run import tasks_to_judge
+    from roboeval.evaluation.runs.folder import tasks_to_judge
 
     tasks = results.tasks
     drawn = [("--worlds", suite.worlds), ("--seed", suite.seed)] if suite.folder else []

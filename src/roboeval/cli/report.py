@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.results import Results
+    from roboeval.evaluation.runs.results import Results
     from roboeval.report.runs import JudgedRun
 
 
@@ -92,7 +92,7 @@ def judged_run(opened: Opened, suite: str, *, beside: str | None, engine: OpenEn
         beside: another suite, whose verdicts are set beside these.
         engine: where programs are checked; None where they are not to be.
     """
-    from roboeval.evaluation.run import evaluation_key
+    from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.report.runs import JudgedRun
 
     results = opened.results

@@ -25,8 +25,8 @@ from roboeval.cli.output import fail, note, print_json, print_rich
 if TYPE_CHECKING:
     import polars as pl
 
-    from roboeval.evaluation.completions import Key
-    from roboeval.evaluation.results import Results, Scope
+    from roboeval.evaluation.runs.completions import Key
+    from roboeval.evaluation.runs.results import Results, Scope
     from roboeval.suites.load import Suite
 
 
@@ -86,7 +86,7 @@ def print_summary(
     """Print the tables of an evaluation."""
     from roboeval.analysis.summary import summary, summary_data
     from roboeval.cli.views.results import summary_view
-    from roboeval.evaluation.completions import name_of
+    from roboeval.evaluation.runs.completions import name_of
 
     counted = summary(table, suite, scope, k=k, ablated=ablated)
     if as_json:

@@ -14,9 +14,9 @@ from codebotler.checker import Check, Settings, check_on
 from codebotler.files import Appender, read_rows, to_line, to_text, write_whole
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.lane import Lane
-from roboeval.evaluation.completions import Completion
 from roboeval.evaluation.engines import OpenEngine, Work
-from roboeval.evaluation.run import Run, load_head
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
 
 ProgramKey: TypeAlias = tuple[str, str]

@@ -11,11 +11,11 @@ from typing import Any
 
 from codebotler.badinput import BadInput
 from codebotler.files import Appender, to_line, to_text, write_whole
-from roboeval.evaluation.completions import Completion, Key, name_of
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import evaluation, head, judgements
-from roboeval.evaluation.rows import JudgedRow, Seal, is_sealed, judged_row, read_lines_of
-from roboeval.evaluation.run import Run, evaluation_key, load_head
+from roboeval.evaluation.runs.completions import Completion, Key, name_of
+from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
+from roboeval.evaluation.runs.rows import JudgedRow, Seal, is_sealed, judged_row, read_lines_of
 from roboeval.suites.load import Suite
 
 

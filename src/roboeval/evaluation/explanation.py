@@ -12,7 +12,7 @@ from codebotler.storyboard import steps_of
 from codebotler.trace import Event, Trace
 from codebotler.tracefile import trace_from
 from codebotler.world import World
-from roboeval.evaluation.completions import Completion
+from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite
 
 NOT_RECORDED = "instruction not recorded"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from codebotler.trace import Outcome, Status
-from roboeval.evaluation.rows import Failure
+from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
 

@@ -14,7 +14,6 @@ from codebotler.files import MAX_ROW, Appender, to_line, to_text, write_whole
 from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Settings, unheard
 from codebotler.models.paced import Paced
 from codebotler.prompts import Prompt, prompt_for
-from roboeval.evaluation.completions import Key, how_many
 from roboeval.evaluation.requests import (
     GenerationPlan,
     RequestLog,
@@ -23,7 +22,8 @@ from roboeval.evaluation.requests import (
     run_metadata,
     timestamp,
 )
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.completions import Key, how_many
+from roboeval.evaluation.runs.folder import Run
 
 FAILURES_IN_A_ROW = 3  # after so many, or one for each request under way, a model is given up
 

@@ -16,10 +16,10 @@ from codebotler.models.base import Settings
 from codebotler.prompts import prompt_for
 from codebotler.reply import program_of
 from codebotler.simulator.warm import warm
-from roboeval.evaluation.completions import Completion
 from roboeval.evaluation.engines import Local
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Suite, load_suite
 
 Registered = TypeVar("Registered", bound=Callable[..., object])

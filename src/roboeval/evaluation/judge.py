@@ -24,10 +24,10 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
-from roboeval.evaluation.completions import Completion, name_of, unknown
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
-from roboeval.evaluation.rows import Judgement, Row, bounded
+from roboeval.evaluation.runs.completions import Completion, name_of, unknown
+from roboeval.evaluation.runs.rows import Judgement, Row, bounded
 from roboeval.suites.load import Requirement, Scenario, Suite, expect_suite
 
 LOG = logging.getLogger("roboeval.evaluation.judge")

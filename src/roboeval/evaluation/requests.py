@@ -16,8 +16,8 @@ from codebotler.badinput import BadInput
 from codebotler.files import Appender, read_rows, to_line, write_whole
 from codebotler.models.base import Settings
 from codebotler.prompts import template_hash
-from roboeval.evaluation.completions import Completion, Key, name_of, read_completions
-from roboeval.evaluation.run import Run, load_head
+from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
+from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies

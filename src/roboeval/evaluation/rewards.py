@@ -18,8 +18,8 @@ from codebotler.simulator.engine import digest
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.warm import warm
 from codebotler.trace import Outcome
-from roboeval.evaluation.completions import unknown
 from roboeval.evaluation.judge import is_met, may_satisfy
+from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite
 
 ERRED = 0.5

@@ -14,7 +14,7 @@ from roboeval.analysis.verdict_changes import (
     said_of_prompts,
     verdict_changes,
 )
-from roboeval.evaluation.completions import how_many, name_of
+from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import (

@@ -10,8 +10,8 @@ from html import escape
 from pathlib import Path
 
 from roboeval.analysis.cluster import Cluster
-from roboeval.evaluation.completions import name_of
 from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.runs.completions import name_of
 from roboeval.report.sheets import Cell, Code, Column, Groups, Part, Picture, Prose, Section, Sheet, told
 
 WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote

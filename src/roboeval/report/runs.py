@@ -12,7 +12,7 @@ from codebotler.cachedproperty import cached_property
 from codebotler.terminal import visible
 from roboeval.analysis.metrics import TaskScore, completions_of, task_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
-from roboeval.evaluation.results import Results
+from roboeval.evaluation.runs.results import Results
 from roboeval.suites.load import Suite
 
 LONGEST_NAME = 100

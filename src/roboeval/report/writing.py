@@ -10,7 +10,7 @@ from pathlib import Path
 from codebotler.badinput import BadInput
 from codebotler.files import write_whole
 from roboeval.analysis.cost import Price
-from roboeval.evaluation.completions import how_many
+from roboeval.evaluation.runs.completions import how_many
 from roboeval.report import breakdown, cost, failures, scores
 from roboeval.report.drawing import darkened, styled, written
 from roboeval.report.page import GENERATOR, Drawn, page

@@ -11,7 +11,7 @@ from fastapi import APIRouter, Depends, HTTPException, Query
 from fastapi.responses import Response
 
 from codebotler.badinput import BadInput
-from roboeval.evaluation.completions import name_of
+from roboeval.evaluation.runs.completions import name_of
 from roboeval.web.run_store import RunGoneError, RunStore
 from roboeval.web.serializers import RunList, completion_details, entry_data, run_details
 from roboeval.web.snapshot import Filter

@@ -18,9 +18,9 @@ from codebotler.web.strip import scenes
 from codebotler.web.words import Words
 from codebotler.world import World
 from roboeval.analysis.tasks import by_hand
-from roboeval.evaluation.completions import Key, name_of
 from roboeval.evaluation.explanation import NOT_RECORDED, cut_told
 from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.runs.completions import Key, name_of
 from roboeval.suites.catalogue import person_told
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import RunStore

@@ -13,8 +13,8 @@ from typing import TypeAlias
 
 from codebotler.badinput import BadInput
 from codebotler.terminal import note, shortened
-from roboeval.evaluation.results import Results, read_results
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.suites.installed import installed_suites
 from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
 from roboeval.web.snapshot import Snapshot

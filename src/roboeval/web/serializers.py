@@ -12,8 +12,8 @@ from typing import Any
 from codebotler.badinput import BadInput
 from codebotler.terminal import shortened
 from roboeval.analysis.tasks import by_hand
-from roboeval.evaluation.completions import Key, how_many, name_of
 from roboeval.evaluation.explanation import GONE, completion_data
+from roboeval.evaluation.runs.completions import Key, how_many, name_of
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import KEY, Filter, Snapshot

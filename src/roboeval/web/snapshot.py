@@ -13,9 +13,9 @@ from fastapi import Query
 from codebotler.cachedproperty import cached_property
 from roboeval.analysis.metrics import Estimate, TaskScore, overall, task_scores
 from roboeval.analysis.summary import Failures, failures
-from roboeval.evaluation.completions import Key
-from roboeval.evaluation.results import Results
-from roboeval.evaluation.table import storable
+from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 
 KEY = ("task", "prompt", "index")

@@ -6,7 +6,7 @@ from typing import Any
 from made_results import results_of
 from roboeval.analysis.cluster import cluster_data, clusters, groups
 from roboeval.cli.views.groups import cluster_view
-from roboeval.evaluation.completions import Key
+from roboeval.evaluation.runs.completions import Key
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 GOES = """\

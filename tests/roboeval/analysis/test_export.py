@@ -14,9 +14,9 @@ import pytest
 from codebotler.badinput import BadInput
 from made_results import results_of
 from roboeval.analysis.export import kind_of, write
-from roboeval.evaluation.completions import Completion
-from roboeval.evaluation.rows import RowData
-from roboeval.evaluation.table import COMPLETION_COLUMNS, WORLD_COLUMNS
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.rows import RowData
+from roboeval.evaluation.runs.table import COMPLETION_COLUMNS, WORLD_COLUMNS
 
 PROGRAM = "def task_program():\n    go_to('x')\n"
 COMPLETION = Completion(task="Visit", prompt=1, index=2, program=PROGRAM, model="recorded:careful")

@@ -18,7 +18,7 @@ from roboeval.analysis.summary import causes as causes_of
 from roboeval.analysis.summary import summary as summary_of
 from roboeval.cli.views.results import summary_view
 from roboeval.evaluation.failures import CLASSES
-from roboeval.evaluation.results import Scope
+from roboeval.evaluation.runs.results import Scope
 from roboeval.suites.load import Suite
 from small_run import ROWS, SUITE, TASK, printed, row
 

@@ -14,8 +14,8 @@ from roboeval.analysis.selection import Selection, parse_selection
 from roboeval.analysis.summary import summary
 from roboeval.analysis.tasks import task_data
 from roboeval.cli.views.results import summary_view, task_view
-from roboeval.evaluation.completions import Completion
-from roboeval.evaluation.results import Results, Scope
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.results import Results, Scope
 from small_run import HOSTILE, ROWS, SHOWN, SUITE, printed, row
 
 

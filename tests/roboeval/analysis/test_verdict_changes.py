@@ -24,8 +24,8 @@ from roboeval.analysis.verdict_changes import (
     verdict_changes,
 )
 from roboeval.cli.views.comparison import changes_view
-from roboeval.evaluation.results import Results
-from roboeval.evaluation.rows import RowData, key_of
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.rows import RowData, key_of
 from small_run import HOSTILE, SHOWN, SUITE, printed, row
 
 STRICT = replace(SUITE, name="strict")

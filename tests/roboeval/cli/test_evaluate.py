@@ -230,7 +230,7 @@ def test_a_published_file_that_is_not_assignments_of_texts(tmp_path: Path) -> No
 def test_a_run_that_another_process_writes(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row())
     script = (
-        "import pathlib, sys\nfrom roboeval.evaluation.run import Run\n"
+        "import pathlib, sys\nfrom roboeval.evaluation.runs.folder import Run\n"
         f"with Run(pathlib.Path({str(tmp_path / 'run')!r})).writing():\n"
         "    print('on', flush=True)\n    sys.stdin.read()\n"
     )

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from roboeval.evaluation.completions import Completion, read_completions
 from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.runs.completions import Completion, read_completions
 from roboeval.suites.load import Suite
 
 KINDS_OF_TRACE = {

@@ -21,11 +21,11 @@ from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
-from roboeval.evaluation.completions import Completion
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.judge import evaluation, judge, judgement
-from roboeval.evaluation.results import Results
-from roboeval.evaluation.rows import RowData
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.results import Results
+from roboeval.evaluation.runs.rows import RowData
 from roboeval.suites.load import Requirement, Scenario, Suite, Task
 
 HOSTILE = "[red]x[/red]\x1b[2J\x07\u202e\ud800"

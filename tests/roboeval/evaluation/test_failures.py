@@ -3,7 +3,7 @@ import pytest
 from codebotler.rtl import parse
 from codebotler.trace import Outcome, RunError, Status
 from roboeval.evaluation.failures import CLASSES, Verdict, failure
-from roboeval.evaluation.rows import Failure
+from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement
 from roboeval.suites.schema import Category
 

@@ -18,10 +18,10 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.files import Appender, read_rows, to_line
 from codebotler.models.base import ModelError, Settings
-from roboeval.evaluation.completions import read_completions
 from roboeval.evaluation.generate import Pace, Progress, generate_run
 from roboeval.evaluation.requests import GenerationPlan, RequestLog
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.completions import read_completions
+from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import Suite
 from scripted_model import Scripted
 
@@ -330,7 +330,7 @@ sys.path.insert(0, {tests!r})
 from codebotler.models.base import Settings
 from roboeval.evaluation.generate import Pace, generate_run
 from roboeval.evaluation.requests import GenerationPlan
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import load_suite
 from scripted_model import Scripted
 print("on", flush=True)

@@ -30,9 +30,9 @@ from playwright.sync_api import expect, sync_playwright
 from codebotler.badinput import BadInput
 from codebotler.prompts import prompt_for
 from roboeval.evaluation import inspect as inspecting
-from roboeval.evaluation.completions import Completion, recorded_completions
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.rows import Row
+from roboeval.evaluation.runs.completions import Completion, recorded_completions
+from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite
 from viewing import chromium
 

@@ -9,10 +9,10 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.world import Room, World
-from roboeval.evaluation.completions import Completion
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.judge import evaluate, judge
-from roboeval.evaluation.rows import Failure, Row
+from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
 
 SUITE = "name: mine\nversion: 1\n"

@@ -23,11 +23,11 @@ from codebotler.simulator.engine import NO_SECCOMP
 from codebotler.simulator.lane import EngineError
 from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine
-from roboeval.evaluation.completions import recorded_completions
 from roboeval.evaluation.engines import Local, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import LARGEST, VERSIONS, Cluster, run_shard, shard_size
-from roboeval.evaluation.rows import Row
+from roboeval.evaluation.runs.completions import recorded_completions
+from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite
 
 # Read when Ray is imported.

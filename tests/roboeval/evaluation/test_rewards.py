@@ -23,9 +23,9 @@ from codebotler.simulator.lane import EVENTS, Lane
 from codebotler.simulator.warm import warm
 from codebotler.trace import Event, Outcome, RunError, Status
 from processes import are_gone, children_of
-from roboeval.evaluation.completions import recorded_completions
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.rewards import Share, reward, total
+from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 RIGHT = """

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from roboeval.evaluation.completions import Completion
 from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
 from roboeval.linting.trials import tried

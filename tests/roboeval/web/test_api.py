@@ -21,7 +21,7 @@ from codebotler.web.access import Access
 from codebotler.web.guard import Guard, Rules
 from command_line import refused, roboeval
 from pageserver import PageServer
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
 from runs_server import serving
 
 HOSTILE = "<script>window.owned=1</script>[x](javascript:owned)\u202e\ud800\x00'\"&"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
 from roboeval.web.heat_map import TaskCells, failure_rows, percent, shade
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import Filter

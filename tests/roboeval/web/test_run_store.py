@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import load_suite
 from roboeval.web import run_store
 from roboeval.web.run_store import MOST_HELD, RunGoneError, RunStore

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from roboeval.evaluation.results import Results, read_results
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.web.run_store import MOST_HELD, RunStore
 from roboeval.web.serializers import RunList, State, notes
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from codebotler.files import to_line
-from roboeval.evaluation.run import Run
+from roboeval.evaluation.runs.folder import Run
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import State, state_of
 from roboeval.web.snapshot import Filter, Snapshot

@@ -14,8 +14,8 @@ from codebotler.storyboard import grid, storyboard
 from codebotler.terminal import shortened, visible
 from roboeval.analysis.tasks import by_hand
 from roboeval.cli.views.results import kind_view, prompt_lines
-from roboeval.evaluation.completions import name_of
 from roboeval.evaluation.explanation import GONE, NOT_RECORDED, cut_told
+from roboeval.evaluation.runs.completions import name_of
 
 MOST_LINES, EXPLANATION = 1_000, 2_000
 

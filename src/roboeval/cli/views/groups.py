@@ -16,8 +16,8 @@ from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found
 from roboeval.analysis.similarity import Change
 from roboeval.cli.views.results import kind_view
-from roboeval.evaluation.completions import how_many, name_of
 from roboeval.evaluation.explanation import GONE
+from roboeval.evaluation.runs.completions import how_many, name_of
 
 MOST_LINES = 60  # of a difference between programs
 

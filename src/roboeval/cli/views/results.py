@@ -16,9 +16,9 @@ from codebotler.storyboard import grid
 from codebotler.terminal import visible
 from roboeval.analysis.summary import Failures, Missing, Summary, judged_count
 from roboeval.analysis.tasks import by_hand
-from roboeval.evaluation.completions import how_many
 from roboeval.evaluation.explanation import NOT_RECORDED
 from roboeval.evaluation.failures import label_of, plural_of
+from roboeval.evaluation.runs.completions import how_many
 
 ALL_GONE = "the programs that were judged no longer stand in this run"
 

@@ -15,14 +15,14 @@ from typing import Any
 from codebotler import __version__
 from codebotler.badinput import BadInput, read_text
 from codebotler.files import sync_folder, to_line, to_text, write_whole, written_whole
-from roboeval.evaluation.completions import (
+from roboeval.evaluation.runs.completions import (
     COMPLETIONS,
     EXAMPLE,
     Completion,
     read_completions,
     recorded_completions,
 )
-from roboeval.evaluation.published import passed_over, published_completions
+from roboeval.evaluation.runs.published import passed_over, published_completions
 from roboeval.suites.load import ABLATED, Suite
 
 

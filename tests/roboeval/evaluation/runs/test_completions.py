@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from codebotler.badinput import BadInput
 from codebotler.files import MAX_ROW, Appender, sync_folder, to_line, write_whole
-from roboeval.evaluation.completions import read_completions
-from roboeval.evaluation.run import Run, open_source
+from roboeval.evaluation.runs.completions import read_completions
+from roboeval.evaluation.runs.folder import Run, open_source
 from roboeval.suites.load import Suite
 
 ROW = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": "x = 1"}

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.evaluation import published
-from roboeval.evaluation.published import published_completions
+from roboeval.evaluation.runs import published
+from roboeval.evaluation.runs.published import published_completions
 
 FILE = "name = 'n'\nprompt = 'p'\ncompletion = 'x = 1'\n"
 

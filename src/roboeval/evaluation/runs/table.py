@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from roboeval.evaluation.completions import Completion, Key
-from roboeval.evaluation.rows import JudgedRow
+from roboeval.evaluation.runs.completions import Completion, Key
+from roboeval.evaluation.runs.rows import JudgedRow
 
 CHUNK = 10_000  # rows of the table that are held as Python objects at one time
 MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted

@@ -15,7 +15,7 @@ from typing import TypeAlias
 from codebotler.badinput import BadInput, read_text, text_of
 from codebotler.files import MAX_ROW
 from codebotler.syntaxtree import parse
-from roboeval.evaluation.completions import Completion, Key, check_length, name_of, unknown
+from roboeval.evaluation.runs.completions import Completion, Key, check_length, name_of, unknown
 from roboeval.suites.load import Suite
 
 MAX_UNPACKED = 1_000_000_000
