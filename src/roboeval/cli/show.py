@@ -42,7 +42,7 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
-    from roboeval.analysis.selection import parse_selection
+    from roboeval.analysis.tasks import parse_selection
 
     opened = open_run(run, suite, ablated=ablation)
     results = opened.results
@@ -130,11 +130,11 @@ def export(
 ) -> None:
     """Write a run's verdicts as one flat table."""
     from codebotler.replacing import expect_replaceable
-    from roboeval.analysis.export import BEGINNINGS, kind_of, write
+    from roboeval.evaluation.runs.table import BEGINNINGS, kind_of, write_table
 
     kind = format or kind_of(out)
     results = open_current(run, suite, ablated=ablation).results
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
     expect_replaceable(path, *BEGINNINGS)
-    write(results.table, path, kind)
+    write_table(results.table, path, kind)
     note(f"the table is in {path}")

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 
 from codebotler.badinput import Loader
 from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.export import write
 from roboeval.evaluation.failures import label_of
+from roboeval.evaluation.runs.table import write_table
 
 Kind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number"]
 Cell: TypeAlias = str | int | float | None
@@ -167,7 +167,9 @@ def write_csv(table: Sheet, folder: Path) -> None:
     kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))
     rows = [list(map(_plain, row)) for row in table.rows]
-    write(pl.DataFrame(rows, schema=schema, orient="row", strict=False), folder / f"{table.name}.csv", "csv")
+    write_table(
+        pl.DataFrame(rows, schema=schema, orient="row", strict=False), folder / f"{table.name}.csv", "csv"
+    )
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:

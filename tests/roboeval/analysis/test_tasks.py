@@ -10,9 +10,8 @@ import pytest
 from codebotler.badinput import BadInput
 from codebotler.terminal import visible
 from made_results import results_of, table_of
-from roboeval.analysis.selection import Selection, parse_selection
 from roboeval.analysis.summary import summary
-from roboeval.analysis.tasks import task_data
+from roboeval.analysis.tasks import Selection, parse_selection, task_data
 from roboeval.cli.views.results import summary_view, task_view
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results, Scope

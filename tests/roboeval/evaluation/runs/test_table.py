@@ -13,7 +13,7 @@ import pytest
 
 from codebotler.badinput import BadInput
 from made_results import results_of
-from roboeval.analysis.export import kind_of, write
+from roboeval.evaluation.runs.table import kind_of, write_table
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import RowData
 from roboeval.evaluation.runs.table import COMPLETION_COLUMNS, WORLD_COLUMNS
@@ -104,7 +104,7 @@ def test_a_passed_row_without_its_completion_has_empty_cells() -> None:
 
 
 def test_no_rows_are_an_empty_table_with_all_columns(tmp_path: Path) -> None:
-    write(table([], []), tmp_path / "t.csv", "csv")
+    write_table(table([], []), tmp_path / "t.csv", "csv")
     assert (tmp_path / "t.csv").read_text() == ",".join(COLUMNS) + "\n"
 
 
@@ -112,7 +112,7 @@ def test_no_rows_are_an_empty_table_with_all_columns(tmp_path: Path) -> None:
 def test_both_formats_keep_a_table(message: str, tmp_path: Path) -> None:
     frame = table([ROW, with_message(message)], [COMPLETION])
     for kind in ("csv", "parquet"):
-        write(frame, tmp_path / kind, kind)
+        write_table(frame, tmp_path / kind, kind)
     assert pl.read_parquet(tmp_path / "parquet").equals(frame)
     assert pl.read_csv(tmp_path / "csv", schema=dict(COLUMNS)).equals(frame)
 
@@ -120,12 +120,12 @@ def test_both_formats_keep_a_table(message: str, tmp_path: Path) -> None:
 def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
     for kind in ("csv", "parquet"):
         for name in ("one", "two"):
-            write(table([ROW] * 3, [COMPLETION]), tmp_path / name, kind)
+            write_table(table([ROW] * 3, [COMPLETION]), tmp_path / name, kind)
         assert (tmp_path / "one").read_bytes() == (tmp_path / "two").read_bytes()
 
 
 def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
-    write(table([row(verdict("in"))], []), tmp_path / "t", "csv")
+    write_table(table([row(verdict("in"))], []), tmp_path / "t", "csv")
     (line,) = (tmp_path / "t").read_bytes().splitlines()[1:]
     assert line.startswith(b"Visit,1,2,,")
     assert line.endswith(
@@ -136,8 +136,8 @@ def test_the_bytes_of_a_csv(tmp_path: Path) -> None:
 @pytest.mark.parametrize("message", ["=cmd()", "+1", "-1", "@x", "\t=1", "\r=1", "\n=1"])
 def test_no_text_is_a_formula_in_csv_and_parquet_keeps_it(message: str, tmp_path: Path) -> None:
     frame = table([with_message(message)], [COMPLETION])
-    write(frame, tmp_path / "t.csv", "csv")
-    write(frame, tmp_path / "t.parquet", "parquet")
+    write_table(frame, tmp_path / "t.csv", "csv")
+    write_table(frame, tmp_path / "t.parquet", "parquet")
     assert pl.read_csv(tmp_path / "t.csv")["error_message"].item() == "'" + message
     assert pl.read_parquet(tmp_path / "t.parquet")["error_message"].item() == message
 
@@ -145,19 +145,19 @@ def test_no_text_is_a_formula_in_csv_and_parquet_keeps_it(message: str, tmp_path
 def test_half_of_a_surrogate_pair_is_written_out(tmp_path: Path) -> None:
     completion = Completion(task="Visit", prompt=1, index=2, program="'\ud800'")
     frame = table([with_message("\ud800")], [completion])
-    write(frame, tmp_path / "t", "csv")
+    write_table(frame, tmp_path / "t", "csv")
     assert frame["error_message"].item() == r"\ud800"
 
 
 def test_a_table_is_written_where_a_link_leads_and_replaces_nothing_but_files(tmp_path: Path) -> None:
-    write(table([], []), tmp_path / "t", "parquet")
+    write_table(table([], []), tmp_path / "t", "parquet")
     (tmp_path / "link").symlink_to("t")
-    write(table([], []), tmp_path / "link", "csv")
+    write_table(table([], []), tmp_path / "link", "csv")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "t").read_text().startswith("task,")
     os.mkfifo(tmp_path / "pipe")
     reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
-    write(table([], []), tmp_path / "pipe", "csv")
+    write_table(table([], []), tmp_path / "pipe", "csv")
     assert (tmp_path / "pipe").is_fifo()
     assert os.read(reader, 100).startswith(b"task,")
     os.close(reader)
@@ -170,9 +170,9 @@ def test_a_long_table_keeps_its_order() -> None:
 
 def test_a_wrong_format_or_place_is_explained(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r'"xlsx".* csv, parquet'):
-        write(table([], []), tmp_path / "t", "xlsx")
+        write_table(table([], []), tmp_path / "t", "xlsx")
     with pytest.raises(BadInput, match="no such folder") as error:
-        write(table([], []), tmp_path / "no" / "t.csv", "csv")
+        write_table(table([], []), tmp_path / "no" / "t.csv", "csv")
     assert error.value.file == tmp_path / "no"
 
 
