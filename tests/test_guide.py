@@ -16,7 +16,7 @@ from codebotler.world import OptionFile, PersonFile, Room, RoomFile, World
 from roboeval.linting.findings import Kind
 from roboeval.suites.schema import (
     Ability,
-    AcceptedFile,
+    Accepted,
     Category,
     CheckFile,
     CornerFile,
@@ -24,7 +24,7 @@ from roboeval.suites.schema import (
     DrawnTaskFile,
     DrawnThingFile,
     DrawnWorldsFile,
-    FactFile,
+    Fact,
     ScenarioFile,
     SuiteFile,
     TaskFile,
@@ -119,9 +119,9 @@ def test_the_keys_of_files_are_listed(page: str, head: str, forms: tuple[type[Ba
 @pytest.mark.parametrize(
     ("page", "head", "row", "form"),
     [
-        (TASKS, "key of a task", "`facts`", FactFile),
+        (TASKS, "key of a task", "`facts`", Fact),
         (TASKS, "key of a task", "`checks`", CheckFile),
-        (TASKS, "key of a task", "`accepted`", AcceptedFile),
+        (TASKS, "key of a task", "`accepted`", Accepted),
         (TASKS, "key of a person", "`answers`", OptionFile),
         (TASKS, "key of a file of solutions", "`equivalent_mutants`", EquivalentMutantFile),
         (DRAWN, "key", "`corners`", CornerFile),

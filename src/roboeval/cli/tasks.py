@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -28,7 +29,7 @@ def tasks(
     json: JsonOption = False,
 ) -> None:
     """List a suite's tasks, show one, lint them, start a new one."""
-    from roboeval.suites.catalogue import other_suites, suite_data, suite_view, task_view
+    from roboeval.cli.views.tasks import suite_task_view, suite_view
 
     if new is not None:
         if task is not None or lint or accepted or json:
@@ -45,7 +46,7 @@ def tasks(
     elif json:
         print_json(suite_data(known, None if task is None else known.task(task).name))
     elif task is not None:
-        print_rich(task_view(known.task(task)))
+        print_rich(suite_task_view(known.task(task)))
     else:
         print_rich(suite_view(known))
         for sentence in other_suites(known.name):
@@ -54,9 +55,14 @@ def tasks(
 
 def start(task: str, suite: str) -> None:
     """Start a task in a folder, and say how to go on."""
-    from roboeval.suites.catalogue import expect_own, new_task
+    from roboeval.suites.installed import installed_suites
+    from roboeval.suites.load import shipped_suites
+    from roboeval.suites.new_task import new_task
 
-    expect_own(suite)
+    brought = [one.package for one in installed_suites() if one.name == suite]
+    if suite in shipped_suites() or brought:
+        whose = f"belongs to the package {brought[0]}" if brought else "ships with RoboEval"
+        fail(f'the suite "{suite}" {whose} and stays as it is; name a folder of your own with --suite')
     path = new_task(Path(suite), task)
     lint = command("tasks", "--lint", suite=suite)
     note(f"{path} is a whole task; make it yours, and let `{lint}` look at it")
@@ -74,3 +80,45 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     print_text(render(findings, accepted=accepted))
     if any(finding.accepted is None for finding in findings):
         raise SystemExit(1)
+
+
+def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
+    """The tasks of a suite, or only one, for machines."""
+    tasks = [
+        {
+            "task": task.name,
+            "summary": task.summary,
+            "abilities": list(task.abilities),
+            "prompts": list(task.prompts),
+            "worlds": [scenario.world.about for scenario in task.scenarios],
+            "ablation": task.ablation is not None,
+        }
+        for task in suite.tasks.values()
+        if only in {None, task.name}
+    ]
+    return {"suite": suite.name, "version": suite.version, "digest": suite.digest, "tasks": tasks}
+
+
+def other_suites(name: str) -> Iterator[str]:
+    """What else --suite takes besides one, in a sentence, and why suites of packages cannot be used."""
+    from codebotler.badinput import BadInput
+    from roboeval.suites.installed import installed_suites
+    from roboeval.suites.load import load_suite, shipped_suites
+
+    shipped = shipped_suites()
+    others = [one for one in shipped if one != name]
+    for suite in installed_suites():
+        if suite.name in shipped:
+            yield (
+                f'the package {suite.package} names a suite "{suite.name}", as one is named that ships '
+                "with RoboEval, so that nobody can ask for it; rename it there"
+            )
+            continue
+        try:
+            load_suite(suite.name)
+        except BadInput as error:
+            yield str(error)
+        else:
+            others += [f"{suite.name} ({suite.package})"] * (suite.name != name)
+    if others:
+        yield f"other suites, by --suite: {', '.join(others)}; or the folder of your own"

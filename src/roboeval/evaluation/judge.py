@@ -28,7 +28,7 @@ from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown
 from roboeval.evaluation.runs.rows import Judgement, Row, bounded
-from roboeval.suites.load import Requirement, Scenario, Suite, expect_suite
+from roboeval.suites.load import Requirement, Scenario, Suite
 
 LOG = logging.getLogger("roboeval.evaluation.judge")
 
@@ -89,11 +89,9 @@ def evaluate(
         engine: where programs are run; by default in so many lanes of this machine, started and ended for it.
 
     Raises:
-        BadInput: there are no workers or no suite; or, when it is read, a completion is none or not of the
-            suite.
+        BadInput: there are no workers; or, when it is read, a completion is none or not of the suite.
         EngineError: no isolated process can be started.
     """
-    expect_suite(suite)
     chosen = engine or Local(workers, require_isolation=require_isolation)
     told = judgements(completions, suite, ablated=ablated, engine=chosen)
     return (evaluation(completion, one) for completion, one in told if one is not None)

@@ -95,8 +95,8 @@ def mutation_score(
 
 def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
     """The worlds in which mutants of a task are tried, with what they require."""
-    if suite.further is not None:
-        return suite.further(task, count or WORLDS, seed + 1 + (suite.seed or 0))
+    if suite.worlds is not None:
+        return suite.with_worlds(count or WORLDS, seed + 1 + (suite.seed or 0)).tasks[task.name].scenarios
     if count is not None:
         raise BadInput(
             f'the worlds of the suite "{suite.name}" are written out, and no further ones can be made; '

@@ -1,4 +1,4 @@
-"""Computes what a task says of its worlds: a small part of Python's expressions, read and never run."""
+"""Computes what a task says about its worlds: a small part of Python's expressions, read and never run."""
 
 from __future__ import annotations
 
@@ -6,87 +6,22 @@ import ast
 import operator
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
 from functools import cache
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 from codebotler.syntaxtree import parse_expression
 
 Names = Mapping[str, Any]
-"""What an expression may name, and what it stands for."""
+"""What an expression may name: texts, numbers, lists, and people and things as namespaces."""
 
 
 class ExpressionError(ValueError):
-    """A text is no expression, or names what there is not; the message is one sentence."""
+    """A text is not an expression, or names what does not exist; the message is one sentence."""
 
 
-@dataclass(frozen=True)
-class PersonFact:
-    """A person as expressions know them.
-
-    Args:
-        name: how the task calls them.
-        room: where they are; empty if nowhere.
-        answers: what they answer, in order; a position among the options as a number.
-        topics: what they answer to questions about something.
-        after_looks: how often the robot looks in vain before they come.
-    """
-
-    name: str
-    room: str
-    answers: tuple[str | int, ...]
-    topics: Mapping[str, str | int]
-    after_looks: int
-
-
-@dataclass(frozen=True)
-class ThingFact:
-    """A thing as expressions know it.
-
-    Args:
-        name: how the task calls it.
-        label: how the world does.
-        room: where it lies; empty if nowhere.
-    """
-
-    name: str
-    label: str
-    room: str
-
-
-@cache  # the same few for each of many worlds
-def parsed(text: str) -> ast.expr:
-    """The expression that a text is.
-
-    Raises:
-        ExpressionError: it is none.
-    """
-    try:
-        return parse_expression(text.strip())
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ExpressionError(f'"{text}" cannot be read as an expression') from None
-
-
-def value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
-    """What an expression stands for.
-
-    Args:
-        node: the expression.
-        names: what it may name.
-
-    Raises:
-        ExpressionError: it names what there is not, or is more than an expression may be.
-    """
-    try:
-        return _value(node, names)
-    except ExpressionError:
-        raise
-    except (TypeError, KeyError, IndexError, ZeroDivisionError, ValueError, OverflowError) as error:
-        raise ExpressionError(f'"{ast.unparse(node)}" cannot be computed ({error})') from None
-
-
-_COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
+_OPERATORS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
     ast.Lt: operator.lt,
@@ -95,8 +30,6 @@ _COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.GtE: operator.ge,
     ast.In: lambda one, other: one in other,
     ast.NotIn: lambda one, other: one not in other,
-}
-_COMPUTE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
@@ -111,6 +44,37 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "max": max,
     "min": min,
 }
+
+
+@cache  # the same few for each of many worlds
+def parsed(text: str) -> ast.expr:
+    """The syntax tree of an expression.
+
+    Raises:
+        ExpressionError: the text is none.
+    """
+    try:
+        return parse_expression(text.strip())
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ExpressionError(f'"{text}" cannot be read as an expression') from None
+
+
+def value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
+    """The value of an expression.
+
+    Args:
+        node: the expression.
+        names: what it may name.
+
+    Raises:
+        ExpressionError: it names what does not exist, or is more than an expression may be.
+    """
+    try:
+        return _value(node, names)
+    except ExpressionError:
+        raise
+    except (TypeError, KeyError, IndexError, ZeroDivisionError, ValueError, OverflowError) as error:
+        raise ExpressionError(f'"{ast.unparse(node)}" cannot be computed ({error})') from None
 
 
 def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911, PLR0912 - one for each node
@@ -136,11 +100,11 @@ def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911,
             return all(each) if isinstance(op, ast.And) else any(each)
         case ast.UnaryOp(ast.Not(), inner):
             return not _value(inner, names)
-        case ast.BinOp(left, op, right) if type(op) in _COMPUTE:
-            return _COMPUTE[type(op)](_value(left, names), _value(right, names))
+        case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
+            return _OPERATORS[type(op)](_value(left, names), _value(right, names))
         case ast.Compare(left, ops, others):
-            each_value = [_value(one, names) for one in (left, *others)]
-            return all(_COMPARE[type(op)](*two) for op, two in zip(ops, pairwise(each_value), strict=True))
+            values = [_value(one, names) for one in (left, *others)]
+            return all(_OPERATORS[type(op)](*two) for op, two in zip(ops, pairwise(values), strict=True))
         case ast.IfExp(test, body, orelse):
             return _value(body if _value(test, names) else orelse, names)
         case ast.ListComp(element, [loop]) | ast.GeneratorExp(element, [loop]):
@@ -151,7 +115,7 @@ def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911,
 
 
 def _part(whole: Any, name: str) -> Any:  # noqa: ANN401 - of a fact
-    if isinstance(whole, PersonFact | ThingFact) and name in {field.name for field in fields(whole)}:
+    if isinstance(whole, SimpleNamespace) and name in vars(whole):
         return getattr(whole, name)
     raise ExpressionError(
         f'".{name}" is nothing that can be known; of people and things it is their name or room'
@@ -159,11 +123,11 @@ def _part(whole: Any, name: str) -> Any:  # noqa: ANN401 - of a fact
 
 
 def each_of(loop: ast.comprehension, names: Names) -> Iterator[Names]:
-    """The names for each turn of a loop such as `for person in people if person.room`.
+    """The names in each turn of a loop such as `for person in people if person.room`.
 
     Args:
         loop: the loop.
-        names: what there is outside of it.
+        names: those outside of it.
 
     Raises:
         ExpressionError: it is no such loop.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -14,7 +14,7 @@ GROUP = "roboeval.suites"
 
 @dataclass(frozen=True)
 class InstalledSuite:
-    """A suite that a package says it has.
+    """A suite that an installed package declares.
 
     Args:
         name: by which it is asked for, and that its suite.yaml must have as well.
@@ -38,32 +38,27 @@ class InstalledSuite:
         except (ImportError, ValueError):
             spec = None
         found = [Path(place, *below) for place in (spec and spec.submodule_search_locations) or ()]
-        folder = next((folder for folder in found if (folder / "suite.yaml").is_file()), None)
-        if folder is None:
-            there = f"there is no suite.yaml in {found[0]}" if found else f'there is no package "{top}"'
-            raise BadInput(
-                f'the package {self.package} says that its suite "{self.name}" is {self.place}, but {there}; '
-                "install it again, or name a folder with --suite"
-            )
-        return folder
+        for folder in found:
+            if (folder / "suite.yaml").is_file():
+                return folder
+        missing = f"there is no suite.yaml in {found[0]}" if found else f'there is no package "{top}"'
+        raise BadInput(
+            f'the package {self.package} says that its suite "{self.name}" is {self.place}, but {missing}; '
+            "install it again, or name a folder with --suite"
+        )
 
 
-def installed_suites() -> tuple[InstalledSuite, ...]:
-    """What the packages of this environment bring, by name; two may have the same one."""
-    points = entry_points(group=GROUP)
-    return tuple(sorted(map(_suite, points), key=lambda suite: (suite.name, suite.package)))
-
-
-def _suite(point: EntryPoint) -> InstalledSuite:
-    package = "of unknown name" if point.dist is None else f"{point.dist.name} {point.dist.version}"
-    return InstalledSuite(point.name, package, point.value.strip())
+def installed_suites() -> list[InstalledSuite]:
+    """The suites of installed packages, by name; two may have the same one."""
+    suites = []
+    for point in entry_points(group=GROUP):
+        package = "of unknown name" if point.dist is None else f"{point.dist.name} {point.dist.version}"
+        suites.append(InstalledSuite(point.name, package, point.value.strip()))
+    return sorted(suites, key=lambda suite: (suite.name, suite.package))
 
 
 def installed_folder(name: str) -> Path | None:
     """The folder of the suite that a package brings by a name; None if no package does.
-
-    Args:
-        name: of the suite.
 
     Raises:
         BadInput: several packages bring one of this name, a folder here has it, too, or it is not there.

@@ -5,22 +5,21 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
 from os import PathLike
 from pathlib import Path
-from typing import TypeAlias
 
-from codebotler.arguments import expect_skills, expect_text, expect_whole
+from codebotler.arguments import expect_whole
 from codebotler.badinput import BadInput, YamlFile
 from codebotler.english import counted
 from codebotler.simulator.rules import Rules
 from codebotler.skills import SKILLS, SkillTable
 from roboeval.suites.installed import installed_folder, installed_suites
-from roboeval.suites.schema import MOST_WORLDS, SuiteFile
-from roboeval.suites.task import Accepted, Check, Fact, Requirement, Scenario, Task
-from roboeval.suites.taskfile import Lot, read_task
+from roboeval.suites.schema import MOST_WORLDS, Accepted, Fact, SuiteFile
+from roboeval.suites.task import Check, Requirement, Scenario, Task
+from roboeval.suites.taskfile import read_task
 
 __all__ = [
     "ABLATED",
@@ -42,23 +41,6 @@ SUITES = Path(__file__).parent
 SUITE_NAME = re.compile(r"[a-z][a-z0-9-]*")
 
 
-Further: TypeAlias = Callable[[Task, int, int], tuple[Scenario, ...]]
-"""Makes so many worlds of a task with what they require, from a seed; the same seed makes the same ones."""
-
-
-def expect_suite(given: object) -> None:
-    """Refuse what is no suite, such as the name of one.
-
-    Args:
-        given: what was given.
-
-    Raises:
-        BadInput: it is none.
-    """
-    if not isinstance(given, Suite):
-        raise BadInput(f"the suite is {given!r}, but it must be one that load_suite has read")
-
-
 @dataclass(frozen=True)
 class Suite:
     """Tasks and the rules by which they are judged.
@@ -70,7 +52,6 @@ class Suite:
         rules: how worlds are simulated.
         tasks: by name, sorted.
         digest: a hash of all that verdicts and prompts depend on.
-        further: makes worlds that no file writes out; None where all worlds are written out.
         folder: where it was read from.
         worlds: how many worlds a task has at least, where they are drawn; None if they are written by hand.
         seed: from which they are drawn.
@@ -83,7 +64,6 @@ class Suite:
     rules: Rules
     tasks: Mapping[str, Task]
     digest: str
-    further: Further | None = field(default=None, compare=False)  # follows from the rest
     folder: Path | None = None
     worlds: int | None = None
     seed: int | None = None
@@ -103,19 +83,18 @@ class Suite:
             seed: from which to draw them; the same as now by default.
 
         Raises:
-            BadInput: its worlds are written by hand, or a number is none or out of its range.
+            BadInput: its worlds are written by hand, or the number of worlds is out of its range.
         """
         if self.worlds is None or self.folder is None:
             raise BadInput(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
         if count is not None:
             expect_whole(count, "the number of worlds", least=1, most=MOST_WORLDS)
-        if seed is not None:
-            expect_whole(seed, "the seed")
-        seed = self.seed if seed is None else seed
-        return _read_suite(self.folder, self.skills, count or self.worlds, seed)
+        return _read_suite(
+            self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed
+        )
 
     def with_own_worlds(self) -> Suite:
-        """The same suite as it is read where nobody asks for other worlds."""
+        """The same suite with the worlds that its file asks for."""
         if self.worlds is None or self.folder is None:
             return self
         return _read_suite(self.folder, self.skills)
@@ -127,15 +106,9 @@ class Suite:
             BadInput: there is none.
         """
         if name not in self.tasks:
-            raise BadInput(
-                f'the suite "{self.name}" has no task "{name}"; its tasks are {", ".join(self.tasks)}'
-            )
+            known = ", ".join(self.tasks)
+            raise BadInput(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
         return self.tasks[name]
-
-
-def shipped_suites() -> tuple[str, ...]:
-    """The names of the suites that ship with RoboEval."""
-    return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
 
 
 def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKILLS) -> Suite:
@@ -148,9 +121,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     Raises:
         BadInput: there is no such suite, or one of its files is wrong.
     """
-    name = str(name) if isinstance(name, PathLike) else name
-    expect_text(name, "the suite's name")
-    expect_skills(skills)
+    name = str(name)
     folder = suite_folder(name)
     suite = _read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():
@@ -159,8 +130,13 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     return suite
 
 
+def shipped_suites() -> tuple[str, ...]:
+    """The names of the suites that ship with RoboEval."""
+    return tuple(sorted(path.parent.name for path in SUITES.glob("*/suite.yaml")))
+
+
 def suite_folder(name: str) -> Path:
-    """Where the files of a suite lie: one that ships with RoboEval, one that a package brings, or a folder.
+    """The folder of a suite: one that ships with RoboEval, one that a package brings, or a folder.
 
     Args:
         name: of the suite, or its folder.
@@ -174,37 +150,34 @@ def suite_folder(name: str) -> Path:
         return brought.resolve()
     folder = Path(name)
     if not (folder / "suite.yaml").is_file():
-        known = dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())])
-        raise BadInput(
-            f'there is no suite "{name}": neither one of {", ".join(known)} nor a folder with a suite.yaml'
-        )
+        known = ", ".join(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
+        raise BadInput(f'there is no suite "{name}": neither one of {known} nor a folder with a suite.yaml')
     return folder.resolve()
 
 
 def task_files(folder: Path) -> list[Path]:
-    """One file a task, which is named as it, in the order of their names.
-
-    Args:
-        folder: of a suite.
-    """
+    """The task files in a suite's folder, in the order of their names."""
     return sorted((folder / "tasks").glob("*.yaml"))
+
+
+# --- reading
 
 
 def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
     """The suite in a folder as its files are now, which are read again only if they have changed."""
     files = [folder / "suite.yaml", *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
-    as_they_are = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
-    return _suite_of(folder, skills, count, seed, as_they_are)
-
-
-Files: TypeAlias = tuple[tuple[str, int, int], ...]
-"""The name, the time of the last change in nanoseconds, and the size in bytes of each."""
+    versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)
+    return _suite_of(folder, skills, count, seed, versions)
 
 
 @lru_cache(maxsize=8)  # a training loop may draw other worlds for each step
 def _suite_of(
-    folder: Path, skills: SkillTable, count: int | None, seed: int | None, _as_they_are: Files
+    folder: Path,
+    skills: SkillTable,
+    count: int | None,
+    seed: int | None,
+    _versions: tuple[tuple[str, int, int], ...],
 ) -> Suite:
     file = YamlFile.read(folder / "suite.yaml")
     head = file.validate(SuiteFile)
@@ -214,48 +187,42 @@ def _suite_of(
     paths = task_files(folder)
     if not paths:
         raise BadInput("the suite has no tasks; put one file a task there", file=folder / "tasks")
+    count, seed = count or head.worlds, head.seed if seed is None else seed
     documents = [YamlFile.read(path) for path in paths]
-    lot = Lot(count or head.worlds, head.seed if seed is None else seed)
-    lenders = [
-        None if head.instructions is None else _lender(file, head.instructions, path) for path in paths
-    ]
+    words = head.rules.words_for_people
+    lenders = [_lender(file, head.instructions, path) if head.instructions else None for path in paths]
     tasks = [
-        read_task(document, path, skills, lender=lender, lot=lot, words=head.rules.words_for_people)
+        read_task(document, path, skills, lender=lender, count=count, seed=seed, words=words)
         for document, path, lender in zip(documents, paths, lenders, strict=True)
     ]
-    content = [file.data, *(document.data for document in documents)]
-    content += [lender.data for lender in lenders if lender is not None]
-    drawn = [task for task in tasks if task.drawn]
-    content += [
-        [scenario.world.to_data(), *(requirement.text for requirement in scenario.require)]
-        for task in drawn
-        for scenario in task.scenarios
-    ]
-    canonical = json.dumps(content, sort_keys=True, default=str)
+    drawn = any(task.drawn for task in tasks)
     return Suite(
         name=head.name,
         version=head.version,
         about=head.about,
         rules=head.rules.rules(),
         tasks={task.name: task for task in tasks},
-        digest=hashlib.sha256(canonical.encode()).hexdigest(),
-        further=partial(_further, folder, skills) if drawn else None,
+        digest=_digest([file, *documents, *(lender for lender in lenders if lender is not None)], tasks),
         folder=folder,
-        worlds=lot.count if drawn else None,
-        seed=lot.seed if drawn else None,
+        worlds=count if drawn else None,
+        seed=seed if drawn else None,
         skills=skills,
     )
-
-
-def _further(folder: Path, skills: SkillTable, task: Task, count: int, seed: int) -> tuple[Scenario, ...]:
-    return _read_suite(folder, skills, count, seed).tasks[task.name].scenarios
 
 
 def _lender(file: YamlFile, suite: str, path: Path) -> YamlFile:
     """The task file of another suite from which a task has its instruction."""
     lender = SUITES / suite / "tasks" / path.name
     if not lender.is_file():
-        raise file.wrong(
-            f'the suite "{suite}" has no task "{path.stem}" to take instructions from', "instructions"
-        )
+        sentence = f'the suite "{suite}" has no task "{path.stem}" to take instructions from'
+        raise file.wrong(sentence, "instructions")
     return YamlFile.read(lender)
+
+
+def _digest(files: list[YamlFile], tasks: list[Task]) -> str:
+    """A hash of what the files say, and of the worlds that were drawn."""
+    content: list[object] = [file.data for file in files]
+    drawn = (scenario for task in tasks if task.drawn for scenario in task.scenarios)
+    content += [[one.world.to_data(), *(requirement.text for requirement in one.require)] for one in drawn]
+    canonical = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(canonical.encode()).hexdigest()

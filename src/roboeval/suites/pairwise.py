@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import combinations, product
 from random import Random
 from typing import TypeAlias
@@ -16,11 +16,7 @@ _TRIES = 12  # rows that are made up for each that is taken
 
 
 def pairs(sizes: Mapping[str, int]) -> set[Pair]:
-    """All pairs of values of two factors.
-
-    Args:
-        sizes: how many values each factor has.
-    """
+    """All pairs of values of two factors."""
     return {
         ((one, i), (other, j))
         for one, other in combinations(sorted(sizes), 2)
@@ -31,6 +27,19 @@ def pairs(sizes: Mapping[str, int]) -> set[Pair]:
 def met(row: Row) -> set[Pair]:
     """The pairs that meet in a row."""
     return set(combinations(sorted(row.items()), 2))
+
+
+def spread(sizes: Mapping[str, int], count: int, random: Random) -> list[Row]:
+    """A covering array, with rows drawn by chance behind it up to a number.
+
+    Args:
+        sizes: how many values each factor has.
+        count: how many rows at least.
+        random: where draws come from.
+    """
+    rows = covering(sizes, random)
+    rows += [{name: random.randrange(size) for name, size in sizes.items()} for _ in range(count - len(rows))]
+    return rows
 
 
 def covering(sizes: Mapping[str, int], random: Random) -> list[Row]:
@@ -46,46 +55,22 @@ def covering(sizes: Mapping[str, int], random: Random) -> list[Row]:
     rows: list[Row] = []
     while left:
         seeds = random.sample(sorted(left), min(_TRIES, len(left)))
-        best = max(
-            (_row(sizes, dict(seed), left, random) for seed in seeds), key=lambda row: len(met(row) & left)
+        rows.append(
+            max((_row(sizes, seed, left, random) for seed in seeds), key=lambda row: len(met(row) & left))
         )
-        rows.append(best)
-        left -= met(best)
+        left -= met(rows[-1])
     return rows
 
 
-def _row(sizes: Mapping[str, int], start: Row, left: set[Pair], random: Random) -> Row:
-    row = dict(start)
+def _row(sizes: Mapping[str, int], seed: Pair, left: set[Pair], random: Random) -> Row:
+    row = dict(seed)
     factors = [factor for factor in sorted(sizes) if factor not in row]
     random.shuffle(factors)
     for factor in factors:
         values = random.sample(range(sizes[factor]), sizes[factor])
-        row[factor] = max(values, key=lambda value: _gained(row, factor, value, left))
+        row[factor] = max(values, key=lambda value: _gained(row, (factor, value), left))
     return {factor: row[factor] for factor in sizes}
 
 
-def _gained(row: Row, factor: str, value: int, left: set[Pair]) -> int:
-    new = (factor, value)
+def _gained(row: Row, new: tuple[str, int], left: set[Pair]) -> int:
     return sum((min(new, old), max(new, old)) in left for old in row.items())
-
-
-def drawn(sizes: Mapping[str, int], random: Random) -> Row:
-    """A row of values drawn by chance.
-
-    Args:
-        sizes: how many values each factor has.
-        random: where draws come from.
-    """
-    return {factor: random.randrange(size) for factor, size in sizes.items()}
-
-
-def spread(sizes: Mapping[str, int], count: int, random: Random) -> Sequence[Row]:
-    """A covering array, with rows drawn by chance behind it up to a number.
-
-    Args:
-        sizes: how many values each factor has.
-        count: how many rows at least.
-        random: where draws come from.
-    """
-    rows = covering(sizes, random)
-    return [*rows, *(drawn(sizes, random) for _ in range(count - len(rows)))]

@@ -48,16 +48,22 @@ class CheckFile(_Form):
     rtl: Text
 
 
-class FactFile(_Form):
-    """A fact as a task file writes it."""
+class Fact(_Form):
+    """Something the requirements of a task rest on.
+
+    Args:
+        fact: what it is, in a sentence.
+        words: regexes; at least one is found in every prompt, or none in any if it is common sense.
+        commonsense: whether the model must know it without being told.
+    """
 
     fact: Text
-    words: Annotated[list[Text], Field(min_length=1)]
+    words: Annotated[tuple[Text, ...], Field(min_length=1)]
     commonsense: bool = False
 
 
-class AcceptedFile(_Form):
-    """An accepted finding as a task file writes it."""
+class Accepted(_Form):
+    """A finding of the linter that is there on purpose, and why."""
 
     finding: Text
     because: Text
@@ -78,6 +84,10 @@ Levels = Annotated[list[Text], Field(min_length=1)] | Text
 NOWHERE = "nowhere"
 
 
+Answers = AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]
+Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
+
+
 class DrawnPersonFile(_Form):
     """Who may be in the worlds of a task.
 
@@ -86,12 +96,9 @@ class DrawnPersonFile(_Form):
 
     name: Name | None = None
     where: Levels = Field(alias="in")
-    answers: list[AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]] = []
-    topics: dict[Name, AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]] = {}
-    after_looks: (
-        Annotated[int, Field(strict=True, ge=0, le=1_000)]
-        | list[Annotated[int, Field(strict=True, ge=0, le=1_000)]]
-    ) = 0
+    answers: list[Answers] = []
+    topics: dict[Name, Answers] = {}
+    after_looks: Looks | list[Looks] = 0
     leaves: Annotated[bool, Field(strict=True)] = False
 
 
@@ -120,33 +127,29 @@ class DrawnWorldsFile(_Form):
     corners: list[CornerFile] = []
 
 
-class TaskFile(_Form):
-    """A task file."""
-
+class _AnyTaskFile(_Form):
     name: Name
     summary: Name
-    abilities: list[Ability] = []
+    abilities: tuple[Ability, ...] = ()
     prompts: Annotated[list[Name], Field(min_length=1)]
-    facts: list[FactFile] = []
+    facts: tuple[Fact, ...] = ()
     checks: dict[str, CheckFile]
+    accepted: tuple[Accepted, ...] = ()
+
+
+class TaskFile(_AnyTaskFile):
+    """A task file that lists its worlds."""
+
     worlds: Annotated[list[ScenarioFile], Field(min_length=1)]
-    accepted: list[AcceptedFile] = []
 
 
-class DrawnTaskFile(_Form):
-    """A task file that describes its worlds instead of listing them."""
+class DrawnTaskFile(_AnyTaskFile):
+    """A task file that describes its worlds."""
 
-    name: Name
-    summary: Name
-    abilities: list[Ability] = []
-    prompts: Annotated[list[Name], Field(min_length=1)]
-    facts: list[FactFile] = []
-    checks: dict[str, CheckFile]
     worlds: DrawnWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
-    phrases: dict[Name, Annotated[list[Name], Field(min_length=1)]] = {}
+    phrases: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = {}
     require: Annotated[list[Text], Field(min_length=1)]
-    accepted: list[AcceptedFile] = []
 
 
 class LimitsFile(_Form):
@@ -171,9 +174,9 @@ class RulesFile(_Form):
     literals: Literal["lowercase", "as-written"] = "lowercase"
     matching: Literal["label-in-request", "whole-words"] = "label-in-request"
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
-    words_for_people: list[Name] = []
-    words_for_yes: list[Name] = []
-    words_for_no: list[Name] = []
+    words_for_people: tuple[Name, ...] = ()
+    words_for_yes: tuple[Name, ...] = ()
+    words_for_no: tuple[Name, ...] = ()
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: LimitsFile = LimitsFile()
     skill_seconds: Literal[0] = 0
@@ -181,18 +184,8 @@ class RulesFile(_Form):
 
     def rules(self) -> Rules:
         """The rules it describes."""
-        limits = Limits(self.limits.seconds, self.limits.calls, self.limits.ticks)
-        return Rules(
-            self.literals,
-            self.matching,
-            self.people,
-            tuple(self.words_for_people),
-            tuple(self.words_for_yes),
-            tuple(self.words_for_no),
-            self.events,
-            limits,
-            self.clock_starts,
-        )
+        values = {name: value for name, value in self if name != "skill_seconds"}
+        return Rules(**values | {"limits": Limits(**dict(self.limits))})
 
 
 class SuiteFile(_Form):

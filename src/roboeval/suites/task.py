@@ -1,4 +1,4 @@
-"""Tasks: what is asked of a robot, in which worlds, and which requirements each world has."""
+"""Tasks: prompts, worlds, and what each world requires."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 
 from codebotler.english import counted
 from codebotler.rtl import Formula
-from codebotler.world import World
-from roboeval.suites.schema import Ability, Category
+from codebotler.world import Answer, Person, World
+from roboeval.suites.schema import Ability, Accepted, Category, Fact
 
 
 @dataclass(frozen=True)
@@ -42,21 +42,6 @@ class Scenario:
 
 
 @dataclass(frozen=True)
-class Fact:
-    """Something the requirements rest on.
-
-    Args:
-        fact: what it is, in a sentence.
-        words: regexes; at least one is found in every prompt, or none in any where it is common sense.
-        commonsense: whether the model must know it without being told.
-    """
-
-    fact: str
-    words: tuple[str, ...]
-    commonsense: bool = False
-
-
-@dataclass(frozen=True)
 class Check:
     """A named constraint of a task.
 
@@ -65,7 +50,7 @@ class Check:
         parameters: names of what is put into its text.
         category: the class of failure if it does not hold.
         rtl: the constraint with `{parameter}` where an argument goes.
-        commonsense: whether it tests what nobody told the model.
+        commonsense: whether it tests what no prompt says.
         line: where it stands in the task file.
     """
 
@@ -78,21 +63,13 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Accepted:
-    """A finding of the linter that is there on purpose."""
-
-    finding: str
-    because: str
-
-
-@dataclass(frozen=True)
 class Task:
     """One task of a suite: prompts, worlds, requirements (paper, section IV).
 
     Args:
         name: as rows of completions call it.
         summary: what it is about, in a sentence.
-        abilities: what it takes.
+        abilities: what a robot needs for it.
         prompts: phrasings of the same instruction.
         facts: what the requirements rest on.
         checks: the named constraints.
@@ -126,3 +103,18 @@ class Task:
     def judged_in(self, *, ablated: bool = False) -> tuple[Scenario, ...]:
         """The worlds and requirements by which programs are judged; none if there is no ablation."""
         return (self.ablation or ()) if ablated else self.scenarios
+
+
+def describe_person(person: Person) -> str:
+    """A person's name, with what they answer and when they come and go."""
+    parts = [f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]
+    parts += [f"{topic}: {_answer(answer)}" for topic, answer in person.topics]
+    if person.after_looks:
+        parts.append(f"comes after {person.after_looks} looks in vain")
+    if person.leaves:
+        parts.append("then goes")
+    return f"{person.name} ({'; '.join(parts)})"
+
+
+def _answer(answer: Answer) -> str:
+    return answer if isinstance(answer, str) else f"option {answer}"

@@ -1,4 +1,4 @@
-"""Worlds drawn from a description, and what each of them requires."""
+"""Worlds drawn from the description in a task file, and what each of them requires."""
 
 from __future__ import annotations
 
@@ -6,26 +6,23 @@ import ast
 import fnmatch
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from random import Random
+from types import SimpleNamespace
 from typing import Any, TypeAlias
 
-from codebotler.badinput import Place, YamlFile
+from codebotler.badinput import YamlFile
 from codebotler.cachedproperty import cached_property
 from codebotler.world import OptionFile, Person, Room, World
-from roboeval.suites.expression import ExpressionError, Names, PersonFact, ThingFact, each_of, parsed, value
+from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
 from roboeval.suites.pairwise import Row, spread
-from roboeval.suites.schema import (
-    NOWHERE,
-    CornerFile,
-    DrawnPersonFile,
-    DrawnTaskFile,
-    DrawnThingFile,
-    DrawnWorldsFile,
-)
+from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile
 
 Level: TypeAlias = str | int
 """Something that may be the case: a room, an answer, a position among the options, a number of looks."""
+
+_TRIES = 50  # draws for a world that is not there yet
 
 
 @dataclass(frozen=True)
@@ -42,48 +39,65 @@ class Setting:
     chosen: Mapping[str, Level]
     rooms: tuple[str, ...]
 
+    def room(self, name: str) -> str:
+        """Where somebody or something is; empty if nowhere."""
+        room = str(self.chosen[f"{name}.in"])
+        return "" if room == NOWHERE else room
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What tells the world from others: of who is nowhere, the answers do not count."""
+        absent = {_owner(factor) for factor, level in self.chosen.items() if level == NOWHERE}
+        chosen = self.chosen.items()
+        return self.rooms, *(one for one in chosen if one[1] == NOWHERE or _owner(one[0]) not in absent)
+
 
 @dataclass(frozen=True)
-class Description:
-    """What a task says of its worlds.
+class WorldSampler:
+    """Draws worlds from the description in a task file.
 
     Args:
-        form: the task file.
-        file: where it stands.
+        form: the task file's content.
+        file: the task file.
     """
 
     form: DrawnTaskFile
     file: YamlFile
 
     @property
-    def worlds(self) -> DrawnWorldsFile:
-        """What it says of the worlds themselves."""
+    def described(self) -> DrawnWorldsFile:
+        """The description of the worlds."""
         return self.form.worlds
 
     @cached_property
     def factors(self) -> dict[str, tuple[Level, ...]]:
-        """Whatever there is to choose from in a world, by name, such as `alice.in` and `alice.answer 1`."""
+        """The levels of whatever may differ between worlds, such as `alice.in` and `alice.answer 1`."""
         found: dict[str, tuple[Level, ...]] = {}
-        for name, person in self.worlds.people.items():
-            found[f"{name}.in"] = self._rooms(person.where, ("people", name, "in"))
+        for name, person in self.described.people.items():
+            found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
             for number, answers in enumerate(person.answers, 1):
                 found[f"{name}.answer {number}"] = _levels(answers)
             for topic, answers in person.topics.items():
                 found[f"{name}.topic {topic}"] = _levels(answers)
             found[f"{name}.after_looks"] = _levels(person.after_looks)
-        for name, thing in self.worlds.things.items():
-            found[f"{name}.in"] = self._rooms(thing.where, ("things", name, "in"))
+        for name, thing in self.described.things.items():
+            found[f"{name}.in"] = self._rooms(thing.where, "things", name, "in")
         return found
 
-    def _rooms(self, where: str | list[str], place: Place) -> tuple[Level, ...]:
-        levels = _levels(where)
-        for level in levels:
-            if level != NOWHERE and level not in self.worlds.rooms:
-                sentence = (
-                    f'there is no room "{level}"; there is {", ".join(self.worlds.rooms)} and {NOWHERE}'
-                )
+    @cached_property
+    def _free(self) -> dict[str, int]:
+        """How many levels each factor has that has a choice."""
+        return {factor: len(levels) for factor, levels in self.factors.items() if len(levels) > 1}
+
+    def _rooms(self, where: str | list[str], *place: str) -> tuple[Level, ...]:
+        known = self.described.rooms
+        for room in _levels(where):
+            if room not in (*known, NOWHERE):
+                sentence = f'there is no room "{room}"; there is {", ".join(known)} and {NOWHERE}'
                 raise self.file.wrong(sentence, "worlds", *place)
-        return levels
+        return _levels(where)
+
+    # --- drawing
 
     def settings(self, count: int, seed: int) -> Iterator[Setting]:
         """The corners, and behind them worlds in which every two levels of two factors meet.
@@ -92,24 +106,24 @@ class Description:
             count: how many at least; fewer only where there are no more.
             seed: from which they are drawn.
         """
-        free = {factor: len(levels) for factor, levels in self.factors.items() if len(levels) > 1}
         random = Random(f"{self.form.name} {seed}")  # noqa: S311 - no secret
-        corners = [self._corner(corner, number) for number, corner in enumerate(self.worlds.corners)]
+        corners = [self._corner(corner, number) for number, corner in enumerate(self.described.corners)]
         yield from corners
-        seen = {_identity(corner) for corner in corners}
-        rows = spread(free, max(1, count - len(corners)), random) if free else [{}] * (count - len(corners))
+        seen = {corner.identity for corner in corners}
+        left = count - len(corners)
+        rows = spread(self._free, max(1, left), random) if self._free else [{}] * left
         for number, row in enumerate(rows, len(corners) + 1):
             for _ in range(_TRIES):
                 setting = self._drawn(row, number, random)
-                if _identity(setting) not in seen:
-                    seen.add(_identity(setting))
+                if setting.identity not in seen:
+                    seen.add(setting.identity)
                     yield setting
                     break
 
     def _drawn(self, row: Row, number: int, random: Random) -> Setting:
         chosen = {factor: levels[row.get(factor, 0)] for factor, levels in self.factors.items()}
-        rooms = random.sample(self.worlds.rooms, len(self.worlds.rooms))
-        return Setting(f"{number}: {self._told(chosen)}", chosen, tuple(rooms))
+        rooms = random.sample(self.described.rooms, len(self.described.rooms))
+        return Setting(f"{number}: {self._about(chosen)}", chosen, tuple(rooms))
 
     def _corner(self, corner: CornerFile, number: int) -> Setting:
         chosen = {factor: levels[0] for factor, levels in self.factors.items()}
@@ -119,34 +133,29 @@ class Description:
             fitting = [
                 f for f in named if level in self.factors[f] or (level == NOWHERE and f.endswith(".in"))
             ]
-            chosen.update(dict.fromkeys(fitting, level))
             if not fitting:
-                known = ", ".join(f for f, levels in self.factors.items() if len(levels) > 1)
+                known = ", ".join(self._free)
                 sentence = f'nothing that "{pattern}" names can be "{level}"; there is {known}'
                 raise self.file.wrong(sentence, "worlds", "corners", number, "set")
-        return Setting(corner.about, chosen, tuple(self.worlds.rooms))
+            chosen.update(dict.fromkeys(fitting, level))
+        return Setting(corner.about, chosen, tuple(self.described.rooms))
 
-    def _told(self, chosen: Mapping[str, Level]) -> str:
+    def _about(self, chosen: Mapping[str, Level]) -> str:
         """What is the case, in a few words: who and what is where, and what people answer."""
         parts = []
-        everything: dict[str, DrawnPersonFile | DrawnThingFile] = {**self.worlds.people, **self.worlds.things}
-        for name, thing in everything.items():
-            room = chosen[f"{name}.in"]
-            places = [level for level in _levels(thing.where) if level != NOWHERE]
-            told = [f"in {room}"] if len(places) > 1 and room != NOWHERE else []
-            for factor, level in chosen.items():
-                if factor.startswith(f"{name}.") and len(self.factors[factor]) > 1 and factor != f"{name}.in":
-                    topic = factor.partition(" ")[2]
-                    prefix = (
-                        f"{topic} " if ".topic " in factor else "after looks " if "looks" in factor else ""
-                    )
-                    told.append(f"{prefix}{level}")
-            is_told = told or len(_levels(thing.where)) > 1
+        for name in (*self.described.people, *self.described.things):
+            levels, room = self.factors[f"{name}.in"], chosen[f"{name}.in"]
             if room == NOWHERE:
                 parts.append(f"{name} out")
-            elif is_told:
-                parts.append(f"{name} {', '.join(told)}" if told else f"{name} in")
+                continue
+            details = [f"in {room}"] if sum(level != NOWHERE for level in levels) > 1 else []
+            free = [factor for factor in self._free if factor.startswith(f"{name}.")]
+            details += [_detail(factor, chosen[factor]) for factor in free if factor != f"{name}.in"]
+            if details or len(levels) > 1:
+                parts.append(f"{name} {', '.join(details) or 'in'}")
         return "; ".join(parts) or "rooms in another order"
+
+    # --- what follows from a setting
 
     def world(self, setting: Setting) -> World:
         """The world of a setting.
@@ -154,49 +163,17 @@ class Description:
         Raises:
             BadInput: what it may wait for cannot be computed.
         """
+        things = self._things(setting)
         rooms = []
         for room in setting.rooms:
-            labels = [t.label for t in self._things(setting) if t.room == room]
-            here = [name for name in self.worlds.people if setting.chosen[f"{name}.in"] == room]
-            people = [self._person(name, setting) for name in here]
-            rooms.append(Room(room, tuple(labels), tuple(people)))
-        wait = self.worlds.may_wait_forever
+            here = [name for name in self.described.people if setting.room(name) == room]
+            people = tuple(self._person(name, setting) for name in here)
+            rooms.append(Room(room, tuple(thing.label for thing in things if thing.room == room), people))
+        wait = self.described.may_wait_forever
         if isinstance(wait, str):
-            wait = bool(self._computed(wait, self.names(setting), "worlds", "may_wait_forever"))
-        return World(tuple(rooms), self.worlds.robot, setting.about, wait)
-
-    def _person(self, name: str, setting: Setting) -> Person:
-        form, chosen = self.worlds.people[name], setting.chosen
-        answers = tuple(chosen[f"{name}.answer {n + 1}"] for n in range(len(form.answers)))
-        topics = tuple((topic, chosen[f"{name}.topic {topic}"]) for topic in form.topics)
-        return Person(form.name or name, answers, topics, int(chosen[f"{name}.after_looks"]), form.leaves)
-
-    def _things(self, setting: Setting) -> Iterator[ThingFact]:
-        for name, form in self.worlds.things.items():
-            room = str(setting.chosen[f"{name}.in"])
-            yield ThingFact(name, form.label or name, "" if room == NOWHERE else room)
-
-    def names(self, setting: Setting) -> Names:
-        """What the requirements of a world may name.
-
-        Raises:
-            BadInput: something under `let` cannot be computed.
-        """
-        people = []
-        for name in self.worlds.people:
-            one = self._person(name, setting)
-            room = "" if (where := str(setting.chosen[f"{name}.in"])) == NOWHERE else where
-            people.append(PersonFact(name, room, one.answers, dict(one.topics), one.after_looks))
-        names: dict[str, Any] = {"people": people, "things": [*self._things(setting)], "rooms": setting.rooms}
-        for name, text in self.form.let.items():
-            names[name] = self._computed(text, names, "let", name)
-        return names
-
-    def _computed(self, text: str, names: Names, *place: str) -> Any:  # noqa: ANN401 - texts, numbers, lists
-        try:
-            return value(parsed(text), names)
-        except ExpressionError as error:
-            raise self.file.wrong(str(error), *place) from None
+            with self._located("worlds", "may_wait_forever"):
+                wait = bool(value(parsed(wait), self._names(setting)))
+        return World(tuple(rooms), self.described.robot, setting.about, wait)
 
     def requirements(self, setting: Setting) -> Iterator[tuple[str, int]]:
         """What a world requires, as a task that lists its worlds would say it, and which entry says so.
@@ -204,16 +181,42 @@ class Description:
         Raises:
             BadInput: an entry cannot be read or computed.
         """
-        names = self.names(setting)
+        names = self._names(setting)
         for number, text in enumerate(self.form.require):
-            try:
-                for one in _required(text, names):
-                    yield one, number
-            except ExpressionError as error:
-                raise self.file.wrong(str(error), "require", number) from None
+            with self._located("require", number):
+                yield from ((one, number) for one in _required(text, names))
 
+    def _person(self, name: str, setting: Setting) -> Person:
+        form, chosen = self.described.people[name], setting.chosen
+        answers = tuple(chosen[f"{name}.answer {n + 1}"] for n in range(len(form.answers)))
+        topics = tuple((topic, chosen[f"{name}.topic {topic}"]) for topic in form.topics)
+        return Person(form.name or name, answers, topics, int(chosen[f"{name}.after_looks"]), form.leaves)
 
-_TRIES = 50  # draws for a world that is not there yet
+    def _things(self, setting: Setting) -> list[SimpleNamespace]:
+        things = self.described.things.items()
+        return [SimpleNamespace(name=n, label=form.label or n, room=setting.room(n)) for n, form in things]
+
+    def _names(self, setting: Setting) -> Names:
+        """What the requirements of a world may name."""
+        people = []
+        for name in self.described.people:
+            one = self._person(name, setting)
+            answered = {"answers": one.answers, "topics": dict(one.topics), "after_looks": one.after_looks}
+            people.append(SimpleNamespace(name=name, room=setting.room(name), **answered))
+        names: dict[str, Any] = {"people": people, "things": self._things(setting), "rooms": setting.rooms}
+        for name, text in self.form.let.items():
+            with self._located("let", name):
+                names[name] = value(parsed(text), names)
+        return names
+
+    @contextmanager
+    def _located(self, *place: str | int) -> Iterator[None]:
+        """Raise errors of expressions as those of the file at a place."""
+        try:
+            yield
+        except ExpressionError as error:
+            raise self.file.wrong(str(error), *place) from None
+
 
 Form: TypeAlias = str | int | OptionFile
 """A level as a task file writes it."""
@@ -224,15 +227,14 @@ def _levels(form: Form | Sequence[Form]) -> tuple[Level, ...]:
     return tuple(item.option if isinstance(item, OptionFile) else item for item in items)
 
 
-def _identity(setting: Setting) -> tuple[object, ...]:
-    """What tells a world from others: of who is nowhere, the answers do not count."""
-    absent = {_owner(factor) for factor, level in setting.chosen.items() if level == NOWHERE}
-    chosen = setting.chosen.items()
-    return setting.rooms, *(one for one in chosen if one[1] == NOWHERE or _owner(one[0]) not in absent)
-
-
 def _owner(factor: str) -> str:
     return factor.partition(".")[0]
+
+
+def _detail(factor: str, level: Level) -> str:
+    if ".topic " in factor:
+        return f"{factor.partition(' ')[2]} {level}"
+    return f"after looks {level}" if "looks" in factor else f"{level}"
 
 
 def _required(text: str, names: Names) -> Iterator[str]:

@@ -21,7 +21,7 @@ from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED, cut_told
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import Key, name_of
-from roboeval.suites.catalogue import person_told
+from roboeval.suites.task import describe_person
 from roboeval.web.heat_map import address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import completion_details
@@ -173,6 +173,6 @@ def _draw_rooms(world: World) -> None:
     ui.html(floorplan(world, None, world.robot), sanitize=False).classes("map")
     with ui.element("dl").classes("rooms"):
         for room in world.rooms:
-            inside = ", ".join([*map(person_told, room.people), *room.objects])
+            inside = ", ".join([*map(describe_person, room.people), *room.objects])
             Words("dt", shortened(room.name, 200))
             Words("dd", shortened(inside, 500) if inside else "nobody and nothing")

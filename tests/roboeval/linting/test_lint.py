@@ -15,8 +15,8 @@ from roboeval.evaluation.runs.completions import Completion
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
 from roboeval.linting.trials import tried
-from roboeval.suites.catalogue import new_task
 from roboeval.suites.load import load_suite
+from roboeval.suites.new_task import new_task
 from roboeval.suites.solutions import solutions
 
 Lint = Callable[..., list[Finding]]

@@ -16,7 +16,7 @@ from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.report import to_yaml
 from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMutant
 from roboeval.mutation.trials import Run, mutation_score, result_of, worlds_of
-from roboeval.suites.load import Scenario, Suite, Task, load_suite
+from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import equivalent_mutants
 from small_suite import a_suite
 
@@ -179,15 +179,20 @@ def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
         worlds_of(suite, task, 200, 1)
 
 
-def test_worlds_that_a_suite_makes_for_mutants_are_not_those_it_judges_by(suite: Suite, task: Task) -> None:
-    seeds: list[int] = []
+def test_worlds_that_a_suite_makes_for_mutants_are_not_those_it_judges_by(
+    suite: Suite, task: Task, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[int, int]] = []
 
-    def further(task: Task, count: int, seed: int) -> tuple[Scenario, ...]:
-        seeds.append(seed)
-        return (task.scenarios * count)[:count]
+    def with_worlds(suite: Suite, count: int, seed: int) -> Suite:
+        drawn.append((count, seed))
+        return suite
 
-    makes = replace(suite, further=further, seed=3)
-    assert worlds_of(makes, task, 3, 1) == (*task.scenarios, *task.scenarios)[:3]
-    assert [len(worlds_of(makes, task, None, seed)) for seed in range(5)] == [200] * 5
+    monkeypatch.setattr(Suite, "with_worlds", with_worlds)
+    makes = replace(suite, worlds=30, seed=3)
+    assert worlds_of(makes, task, 3, 1) == task.scenarios
+    assert [worlds_of(makes, task, None, seed) for seed in range(5)] == [task.scenarios] * 5
+    assert [count for count, _ in drawn] == [3, *[200] * 5]
+    seeds = [seed for _, seed in drawn[1:]]
     assert 3 not in seeds
     assert len(set(seeds)) == 5

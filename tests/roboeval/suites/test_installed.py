@@ -8,9 +8,10 @@ import pytest
 
 from codebotler.badinput import BadInput
 from command_line import ENVIRONMENT, roboeval
-from roboeval.suites.catalogue import new_task, other_suites
+from roboeval.cli.tasks import other_suites
 from roboeval.suites.installed import installed_suites
 from roboeval.suites.load import load_suite
+from roboeval.suites.new_task import new_task
 from roboeval.web.run_store import RunStore
 
 Install = Callable[..., Path]

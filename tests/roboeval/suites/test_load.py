@@ -8,8 +8,8 @@ import pytest
 
 from codebotler.badinput import BadInput
 from codebotler.rtl import parse
-from roboeval.suites.catalogue import new_task
 from roboeval.suites.load import load_suite
+from roboeval.suites.new_task import new_task
 from small_suite import SUITE, TASK, a_suite
 
 
@@ -249,6 +249,5 @@ def test_a_suite_can_be_copied_and_sent_and_stand_in_a_set(name: str) -> None:
     suite = load_suite(name)
     again = pickle.loads(pickle.dumps(suite))
     assert {suite, again, copy.deepcopy(suite)} == {suite}
-    if suite.further is not None:
-        task = suite.tasks["LunchTime"]
-        assert again.further(task, 9, 5) == suite.further(task, 9, 5)
+    if suite.worlds is not None:
+        assert again.with_worlds(9, 5) == suite.with_worlds(9, 5)

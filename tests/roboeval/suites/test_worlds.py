@@ -4,11 +4,12 @@ import ast
 import re
 from pathlib import Path
 from random import Random
+from types import SimpleNamespace
 
 import pytest
 
 from codebotler.badinput import BadInput
-from roboeval.suites.expression import ExpressionError, PersonFact, each_of, parsed, value
+from roboeval.suites.expression import ExpressionError, each_of, parsed, value
 from roboeval.suites.load import _suite_of, load_suite
 from roboeval.suites.pairwise import covering, met, pairs, spread
 from roboeval.suites.schema import MOST_WORLDS
@@ -190,8 +191,9 @@ def test_every_task_of_plus_has_its_worlds_and_its_pairs() -> None:
         assert len({s.world.about for s in task.scenarios}) == len(task.scenarios), task.name
 
 
+KIM = SimpleNamespace(name="kim", room="lab", answers=("yes", 2), topics={"tea": "3|three"}, after_looks=0)
 FACTS = {
-    "people": [PersonFact("kim", "lab", ("yes", 2), {"tea": "3|three"}, 0), PersonFact("lou", "", (), {}, 4)],
+    "people": [KIM, SimpleNamespace(name="lou", room="", answers=(), topics={}, after_looks=4)],
     "rooms": ("lab", "hall"),
     "n": 3,
 }

@@ -16,7 +16,7 @@ from codebotler.badinput import BadInput
 from codebotler.english import counted
 from codebotler.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.models.recorded import recorded_model
-from roboeval.suites.load import Suite, expect_suite
+from roboeval.suites.load import Suite
 
 COMPLETIONS = "completions.jsonl"
 EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
@@ -217,7 +217,6 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
         BadInput: there is no such model or suite, or the model knows none of its instructions.
     """
     expect_text(name, "the model's name")
-    expect_suite(suite)
     model = recorded_model(name)
     found = False
     for task in suite.tasks.values():

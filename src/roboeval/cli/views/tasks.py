@@ -1,0 +1,93 @@
+"""A suite's tasks, and one task with its checks and worlds."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from rich.console import Console, ConsoleOptions, Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.world import World
+from roboeval.suites.load import Check, Scenario, Suite, Task
+from roboeval.suites.task import describe_person
+
+
+def suite_view(suite: Suite) -> RenderableType:
+    """All tasks, one a row."""
+    table = Table(box=None, padding=(0, 2, 0, 0), show_edge=False)
+    table.add_column("task", no_wrap=True)
+    table.add_column("worlds", justify="right")
+    table.add_column("prompts", justify="right")
+    table.add_column("what is asked")
+    for task in suite.tasks.values():
+        worlds, prompts = len(task.scenarios), len(task.prompts)
+        table.add_row(Text(task.name, "bold"), str(worlds), str(prompts), Text(task.summary))
+    return Group(Text(f"{suite.name}: {suite.about}"), Text(), table)
+
+
+def suite_task_view(task: Task) -> RenderableType:
+    """One task: its phrasings, its checks, and what each world requires."""
+    parts: list[RenderableType] = [
+        Text.assemble((task.name, "bold"), f"  {task.summary}"),
+        Text(f"takes {', '.join(task.abilities)}", "dim"),
+    ]
+    common = {True: " (common sense: no prompt says it)", False: ""}
+    parts += _section("Prompts", [Text(f"{n}  {prompt}") for n, prompt in enumerate(task.prompts)])
+    parts += _section("Facts", [Text(f"{fact.fact}{common[fact.commonsense]}") for fact in task.facts])
+    parts += _section("Checks", [*map(_check_view, task.checks)])
+    if task.phrases:
+        named = [
+            Text.assemble((f"{{{name}}}", "bold"), f"  {', '.join(each)}") for name, each in task.phrases
+        ]
+        parts += _section("Phrases in checks", named)
+    for number, scenario in enumerate(task.scenarios, 1):
+        parts += _section(f"World {number}: {scenario.world.about}", _world_lines(scenario))
+    return Group(*parts)
+
+
+def _section(title: str, lines: Sequence[RenderableType]) -> list[RenderableType]:
+    return [Text(), Text(title, "bold"), *(Padding(line, (0, 0, 0, 2)) for line in lines)]
+
+
+def _check_view(check: Check) -> RenderableType:
+    head = check.name + (f"({', '.join(check.parameters)})" if check.parameters else "")
+    formula = _Formula(" ".join(check.rtl.split()), "dim")
+    return Group(Text.assemble((head, "bold"), f"  {check.category}"), Padding(formula, (0, 0, 0, 2)))
+
+
+def _world_lines(scenario: Scenario) -> list[RenderableType]:
+    lines: list[RenderableType] = [*_room_lines(scenario.world)]
+    if scenario.world.may_wait_forever:
+        lines.append(Text("a program may wait here for ever", "italic"))
+    return [*lines, *(_Formula(f"requires {requirement.text}") for requirement in scenario.require)]
+
+
+def _room_lines(world: World) -> Iterator[Text]:
+    for room in world.rooms:
+        there = [*room.objects, *map(describe_person, room.people)]
+        there += ["the robot"] if room.name == world.robot else []
+        yield Text(f"{room.name}: {', '.join(there) or 'nobody and nothing'}")
+
+
+@dataclass(frozen=True)
+class _Formula:
+    """A formula that is broken into lines where no text of it is torn."""
+
+    text: str
+    style: str = ""
+
+    def __rich_console__(self, _: Console, options: ConsoleOptions) -> Iterator[Text]:
+        line = ""
+        for part in _UNTORN.findall(self.text):
+            if line and len((line + part).rstrip()) > options.max_width:
+                yield Text(line.rstrip(), self.style)
+                line = ""
+            line += part
+        yield Text(line, self.style)
+
+
+_UNTORN = re.compile(r"""(?:r?"(?:\\.|[^"\\])*"|r?'(?:\\.|[^'\\])*'|[^\s"'(]+|\S)[(),]*\s*""")
