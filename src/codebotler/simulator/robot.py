@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from typing import TypeAlias
 
 from codebotler.badinput import BadInput
@@ -365,9 +365,10 @@ LOOKING = (get_current_location, get_all_rooms, is_in_room)
 def located(trace: Trace, world: World) -> Trace:
     """The trace with the place of each event, found by driving through the world again."""
     rooms = [room.name for room in world.rooms]
+    room_of = cache(partial(resolve_room, rooms))
     here, events = world.robot, []
     for event in trace:
         events.append(replace(event, place=here))
         if event.kind == "goto":
-            here = resolve_room(rooms, event.text) or here
+            here = room_of(event.text) or here
     return tuple(events)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache, partial
 from typing import Any
 
 from codebotler.english import counted
@@ -111,8 +112,7 @@ def _world_data(verdict: Mapping[str, Any], scenario: Scenario | None, patience:
 
 
 def _rooms_of(world: World) -> Callable[[str], str | None]:
-    rooms = [room.name for room in world.rooms]
-    return lambda request: resolve_room(rooms, request)
+    return cache(partial(resolve_room, [room.name for room in world.rooms]))
 
 
 def _explained(

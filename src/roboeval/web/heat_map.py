@@ -46,11 +46,11 @@ def models_of(run: Snapshot) -> str:
     return shortened(", ".join(run.models), MOST_MODELS) + by_hand(run.models)
 
 
-def failure_text(filter: Filter) -> str | None:  # noqa: A002 - what it is
+def failure_text(chosen: Filter) -> str | None:
     """The kind or class of failures that a filter means, as text; None if it means others, too."""
-    if filter.kind is not None:
-        return shortened(filter.kind, MOST_NAME)
-    return None if filter.failure is None else f"a {shortened(label_of(filter.failure), MOST_NAME)}"
+    if chosen.kind is not None:
+        return shortened(chosen.kind, MOST_NAME)
+    return None if chosen.failure is None else f"a {shortened(label_of(chosen.failure), MOST_NAME)}"
 
 
 class TaskCells:
@@ -58,13 +58,13 @@ class TaskCells:
 
     Args:
         run: as it was last read.
-        filter: what is counted, by default what passed, and which cell is marked.
+        chosen: what is counted, by default what passed, and which cell is marked.
         evaluation: as addresses are to name it.
     """
 
-    def __init__(self, run: Snapshot, filter: Filter, evaluation: str | None = None) -> None:  # noqa: A002
-        self._run, self._filter, self._evaluation = run, filter, evaluation
-        counted = Filter(passed=True) if filter.verdict == Filter() else filter
+    def __init__(self, run: Snapshot, chosen: Filter, evaluation: str | None = None) -> None:
+        self._run, self._filter, self._evaluation = run, chosen, evaluation
+        counted = Filter(passed=True) if chosen.verdict == Filter() else chosen
         self._bad = not counted.passed
         by = failure_text(counted)
         self._verb = "passed" if counted.passed else "failed" if by is None else f"failed with {by}"
@@ -131,12 +131,12 @@ def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
     ]
 
 
-def _failure_cell(run: Snapshot, filter: Filter, kind: Failures | None) -> dict[str, Any]:  # noqa: A002
+def _failure_cell(run: Snapshot, chosen: Filter, kind: Failures | None) -> dict[str, Any]:
     count, share = (0, 0.0) if kind is None else (kind.count, kind.share)
     text = percent(share)
     return {
         "text": text,
         "shade": shade(share, bad=True),
-        "title": f"{shortened(run.name, MOST_NAME)}: {text} % failed with {failure_text(filter)}, {count:,}",
-        "href": f"{address(run.name)}{filter.query(None)}#completions" if count else None,
+        "title": f"{shortened(run.name, MOST_NAME)}: {text} % failed with {failure_text(chosen)}, {count:,}",
+        "href": f"{address(run.name)}{chosen.query(None)}#completions" if count else None,
     }

@@ -19,7 +19,7 @@ from roboeval.web.snapshot import Filter, Snapshot
 from roboeval.web.widgets import EVERY, CompletionList, HeatMap, count_text, score_text, show_state
 
 MOST_NAME = 80
-GONE = "This run is gone: its folder was deleted or renamed. What is below was read before."
+GONE = "This run was deleted or renamed. What you see was read before that."
 
 
 async def draw_run(store: RunStore, name: str, chosen: Filter, evaluation: str | None) -> None:
@@ -102,7 +102,7 @@ class _RunPage:
 
     def _show_kinds(self) -> None:
         run = self._run
-        counts = {Filter(): ("all that were judged", run.judged), Filter(passed=True): ("passed", run.passed)}
+        counts = {Filter(): ("all judged", run.judged), Filter(passed=True): ("passed", run.passed)}
         for of in run.failures:
             counts[Filter(failure=of.name)] = plural_of(of.name), of.count
             counts |= {Filter(failure=of.name, kind=kind.name): (kind.name, kind.count) for kind in of.kinds}

@@ -21,7 +21,7 @@ from roboeval.web.snapshot import Snapshot
 
 MOST_HELD = 16  # evaluations that stay in memory
 REST = 10  # times as long as reading a run took, it is not read again
-OUTSIDE = "leads out of the folder of runs, where nothing is read"
+OUTSIDE = "leads out of the folder of runs, so it is not read"
 
 Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 

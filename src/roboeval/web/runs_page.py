@@ -26,7 +26,7 @@ ORDERS: Mapping[str, tuple[str, Order]] = {
     "Completions": ("descending", lambda run: (-run.get("completions", 0), run["run"])),
 }
 COLUMNS = ("Run", "Suite", "State", "Completions", "pass@1")
-NOTHING = "There is no run here yet. The first one, without a key or a network:"
+NOTHING = "There are no runs yet. This makes the first one, without a key or a network:"
 FIRST = "run --model recorded:hasty --num-completions 3"
 MOST_NAME = 80
 

@@ -93,9 +93,7 @@ def notes(run: Snapshot) -> list[str]:
     if faults:
         found.append("The other rows are shown.")
     if stale:
-        found.append(
-            f"{how_many(stale)} changed since the verdict; `roboeval evaluate` with --redo judges anew."
-        )
+        found.append(f"{how_many(stale)} changed since the verdict; `roboeval evaluate --redo` judges again.")
     if run.judged and run.suite is None:
         name = shortened(str(results.head.get("suite")), MOST_NAME)
         found.append(

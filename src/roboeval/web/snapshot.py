@@ -126,29 +126,29 @@ class Snapshot:
         found = self.completions.filter(pl.format("{}/{}/{}", *KEY) == name)
         return found.row(0, named=True) if found.height else None
 
-    def select(self, filter: Filter) -> pl.DataFrame:  # noqa: A002 - what it is
+    def select(self, chosen: Filter) -> pl.DataFrame:
         """The completions that a filter means, in order."""
-        return self.completions.filter(filter.condition)
+        return self.completions.filter(chosen.condition)
 
-    def neighbours(self, key: Key, filter: Filter) -> tuple[Key | None, Key | None]:  # noqa: A002
+    def neighbours(self, key: Key, chosen: Filter) -> tuple[Key | None, Key | None]:
         """The completions before and after one, among those that a filter means; None at an end."""
-        keys = [None, *self.select(filter).select(KEY).iter_rows(), None]
+        keys = [None, *self.select(chosen).select(KEY).iter_rows(), None]
         at = keys.index(key) if key in keys else None
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
-    def prompts(self, filter: Filter) -> list[dict[str, Any]]:  # noqa: A002
+    def prompts(self, chosen: Filter) -> list[dict[str, Any]]:
         """All prompts in order, and how many of their completions are `written`, `judged` and `counted`.
 
         `share` is that of the counted ones among the judged; None where none is judged.
 
         Args:
-            filter: which completions are counted, of any task and prompt.
+            chosen: which completions are counted, of any task and prompt.
         """
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
             written=pl.col("written").sum(),
             judged=pl.col("passed").count(),
-            counted=filter.verdict.condition.sum(),
+            counted=chosen.verdict.condition.sum(),
         )
         share = pl.col("counted") / pl.when(judged > 0).then(judged)
         return counts.with_columns(share=share).to_dicts()
