@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
@@ -11,14 +10,12 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.files import to_line
 from codebotler.simulator.rules import Rules
 from made_results import VERDICT, results_of
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run
 from roboeval.report.runs import JudgedRun
 from roboeval.suites.load import Suite
-from seals import unseal
 from small_run import TASK
 
 HOSTILE = "<script>alert('x')</script>&\"$\\frac{1}$\x1b[2J\u202e\ud800\n</pre>"
@@ -177,15 +174,3 @@ def unfinished(run: JudgedRun, total: int) -> JudgedRun:
     more = {(task, prompt, index): replace(last, index=index) for index in range(1_000, total + 990)}
     completions = {**run.results.completions, **more}
     return replace(run, results=replace(run.results, completions=completions))
-
-
-def grown(run: Path, times: int) -> None:
-    """Let a run on the disk have each of its completions so many times, with other indices."""
-    found = Run(run)
-    for path in (found.completions, found.rows("paper")):
-        rows = [json.loads(line) for line in path.read_bytes().splitlines()]
-        most = 1 + max(row["index"] for row in rows)
-        with path.open("wb") as file:
-            for n in range(times):
-                file.writelines(to_line({**row, "index": row["index"] + n * most}) for row in rows)
-    unseal(run)

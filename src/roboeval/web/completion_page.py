@@ -26,7 +26,7 @@ from roboeval.web.heat_map import address
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import completion_details
 from roboeval.web.snapshot import Filter, Snapshot
-from roboeval.web.widgets import Code
+from roboeval.web.widgets import ProgramView
 
 MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION = 80, 2_000, 5_000
 CHANGED = "The program was changed or removed after it was judged; the verdicts are on the earlier one."
@@ -93,9 +93,9 @@ def _draw_program(data: Mapping[str, Any]) -> None:
             Words("p", "It is no longer in this run.", "quiet")
             return
         lines = (world["line"] for world in data["worlds"] if not world["satisfied"])
-        code = Code(data["program"], (line for line in lines if line is not None))
-        if code.left_out:
-            Words("p", f"{code.left_out:,} more lines; all are in completions.jsonl.", "quiet")
+        view = ProgramView(data["program"], (line for line in lines if line is not None))
+        if view.left_out:
+            Words("p", f"{view.left_out:,} more lines; all are in completions.jsonl.", "quiet")
 
 
 def _draw_worlds(judged: Sequence[Mapping[str, Any]], worlds: Mapping[str, World]) -> None:

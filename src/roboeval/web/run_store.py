@@ -20,7 +20,7 @@ from roboeval.suites.load import ABLATED, Suite, load_suite, shipped_suites
 from roboeval.web.snapshot import Snapshot
 
 MOST_HELD = 16  # evaluations that stay in memory
-REST = 10  # times as long as reading a run took, it is not read again
+REST = 10  # a run is not read again before this many times as long as reading it took
 OUTSIDE = "leads out of the folder of runs, so it is not read"
 
 Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]

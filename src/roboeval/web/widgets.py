@@ -74,7 +74,7 @@ class CompletionList(_DataElement, component="static/rows.js"):
     """
 
 
-class Code(Element, component="static/code.js"):
+class ProgramView(Element, component="static/code.js"):
     """A program.
 
     Args:
