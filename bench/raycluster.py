@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from codebotler.simulator.lane import Lane
 from roboeval.evaluation.engines import Engine, Local, Work
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.ray import Cluster
+from roboeval.evaluation.ray import RayCluster
 from roboeval.evaluation.runs.completions import Completion, recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
@@ -58,7 +58,7 @@ def main() -> int:
     cores = os.cpu_count() or 1
     took: dict[str, list[float]] = {"local": [], "ray": []}
     rows: dict[str, list[str]] = {}
-    with Local(cores) as local, Cluster() as cluster:
+    with Local(cores) as local, RayCluster() as cluster:
         for engine in (local, cluster):
             seconds(engine, completions[:40], suite)  # processes start
         for number in range(ROUNDS):

@@ -257,6 +257,6 @@ def engine_named(name: str, workers: int | None, *, require_isolation: bool = Fa
         return Local(workers or cores(), require_isolation=require_isolation)
     if name != "ray":
         fail(f'there is no engine "{name}"; there are local and ray')
-    from roboeval.evaluation.ray import Cluster
+    from roboeval.evaluation.ray import RayCluster
 
-    return Cluster(workers, require_isolation=require_isolation)
+    return RayCluster(workers, require_isolation=require_isolation)

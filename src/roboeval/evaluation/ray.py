@@ -30,7 +30,7 @@ PATIENCE_S = 10  # until it is asked whether the cluster has any core left
 CONNECT_S = 5  # until something must have accepted a connection
 
 
-class Cluster:
+class RayCluster:
     """The cores of a Ray cluster; use as a context manager.
 
     The cluster is the one that RAY_ADDRESS names, or else the one that this machine is part of. Where there

@@ -25,7 +25,7 @@ from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine
 from roboeval.evaluation.engines import Local, Work
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.ray import LARGEST, VERSIONS, Cluster, run_shard, shard_size
+from roboeval.evaluation.ray import LARGEST, VERSIONS, RayCluster, run_shard, shard_size
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite
@@ -84,7 +84,7 @@ def test_missing_isolation_is_warned_of_once_or_refused(
     with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
         run_shard(functions, works, VERSIONS, require_isolation=True)
     result = run_shard(functions, works, VERSIONS, require_isolation=False)
-    cluster = Cluster()
+    cluster = RayCluster()
     cluster._ray = SimpleNamespace(wait=lambda shards, **_: (shards, []), get=lambda _: result)
     assert [values for _, values in cluster._ended(range(3))] == [[0, 1]] * 3
     (message,) = caplog.messages
@@ -92,8 +92,8 @@ def test_missing_isolation_is_warned_of_once_or_refused(
 
 
 ALONE = """
-from roboeval.evaluation.ray import Cluster
-with Cluster() as cluster:
+from roboeval.evaluation.ray import RayCluster
+with RayCluster() as cluster:
     import ray
     import psutil  # which comes with it
     works = [("", "1"), ("", "2"), ("", "1")]
@@ -171,9 +171,9 @@ def nodes(
 
 
 @pytest.fixture(scope="module")
-def cluster(nodes: Nodes) -> Iterator[Cluster]:
+def cluster(nodes: Nodes) -> Iterator[RayCluster]:
     assert nodes.address
-    with Cluster() as cluster:
+    with RayCluster() as cluster:
         yield cluster
 
 
@@ -209,7 +209,7 @@ def test_control_c_ends_it_and_keeps_what_was_judged(nodes: Nodes, tmp_path: Pat
     assert all(json.loads(line) for line in rows.read_text().splitlines())
 
 
-def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluster: Cluster) -> None:
+def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluster: RayCluster) -> None:
     read: list[int] = []
 
     def works() -> Iterator[Work]:
@@ -227,13 +227,13 @@ def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluste
     assert len(read) <= 6050 + MOST_AHEAD
 
 
-def test_what_a_call_raises_is_raised_here(cluster: Cluster) -> None:
+def test_what_a_call_raises_is_raised_here(cluster: RayCluster) -> None:
     results = cluster.map_distinct(lambda _, work: 1 // (int(work[1]) - 1), numbered(range(2)), abs)
     with pytest.raises(ZeroDivisionError):
         list(results)
 
 
-def test_results_that_are_not_wanted_do_no_harm(cluster: Cluster) -> None:
+def test_results_that_are_not_wanted_do_no_harm(cluster: RayCluster) -> None:
     for number in range(40):  # a shard that was cancelled when just done would abort this process soon
         results = cluster.map_distinct(lambda _, work: int(work[1]), numbered(range(500)), abs)
         assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
@@ -262,10 +262,10 @@ def test_a_cluster_is_started_where_there_is_none_and_only_this_machine_reaches_
 class Same:
     """A cluster that is open already."""
 
-    def __init__(self, cluster: Cluster) -> None:
+    def __init__(self, cluster: RayCluster) -> None:
         self.cluster = cluster
 
-    def __enter__(self) -> Cluster:
+    def __enter__(self) -> RayCluster:
         return self.cluster
 
     def __exit__(self, *_: object) -> None:
@@ -273,7 +273,7 @@ class Same:
 
 
 def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
-    nodes: Nodes, cluster: Cluster, paper: Suite, monkeypatch: pytest.MonkeyPatch
+    nodes: Nodes, cluster: RayCluster, paper: Suite, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     completions = list(recorded_completions("recorded:hasty", paper))
     here = list(evaluate(completions, paper, engine=Local(2)))
