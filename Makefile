@@ -80,7 +80,7 @@ test-ros1: $(VENV)/tested
 	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
 
 test-browser: $(VENV)/tested
-	$(BIN)/python -m pytest --no-skips --numprocesses 4 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
+	$(BIN)/python -m pytest --no-skips --numprocesses 3 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
 
 pictures: $(VENV)/tested
 	@shots=$$(mktemp -d) && \

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 from pageserver import PageServer
-from viewing import DESK, OpenPage, chromium
+from viewing import DESK, OpenPage, Shoot, chromium
 
 QUIETLY = [
     "--no-sandbox",
@@ -22,14 +22,22 @@ QUIETLY = [
 SECONDS = 60.0  # a busy machine is no fault of the page
 
 
-NOT_ALWAYS = {"desk-dark", "tablet-light", "phone-dark"}
+ONLY_FOR_SHOTS = {
+    *(
+        "test_pages[desk-dark]",
+        "test_pages[tablet-light]",
+        "test_pages[tablet-dark]",
+        "test_pages[phone-light]",
+    ),
+    *("test_face[desk-light]", "test_face[desk-dark]", "test_face[tablet-light]", "test_face[phone-dark]"),
+}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without --shots, look at each size and at each colour scheme, but not at all pairs of them."""
+    """Without --shots, look at a large and a small screen, one of them light and one dark."""
     if config.getoption("--shots"):
         return
-    left = [item for item in items if item.name.partition("[")[2].rstrip("]") in NOT_ALWAYS]
+    left = [item for item in items if item.name in ONLY_FOR_SHOTS]
     config.hook.pytest_deselected(items=left)
     items[:] = [item for item in items if item not in left]
 
@@ -80,7 +88,9 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
             expected.extend([expecting] if expecting else [])
             if beside is None:
                 context = browser.new_context(
-                    viewport={"width": size[0], "height": size[1]}, color_scheme="dark" if dark else "light"
+                    viewport={"width": size[0], "height": size[1]},
+                    color_scheme="dark" if dark else "light",
+                    reduced_motion="reduce",
                 )
                 contexts.callback(context.close)
             else:
@@ -98,7 +108,12 @@ def opened(browser: Browser) -> Iterator[OpenPage]:
 
 
 @pytest.fixture
-def shots(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
-    """The folder for screenshots: that of --shots, if it is given."""
-    folder = request.config.getoption("--shots") or tmp_path
-    return Path(folder)
+def shoot(pytestconfig: pytest.Config) -> Shoot:
+    """Takes a screenshot into the folder of --shots, if that is given."""
+    folder = pytestconfig.getoption("--shots")
+
+    def shoot(page: Page, name: str, *, full_page: bool = True) -> None:
+        if folder:
+            page.screenshot(path=Path(folder) / f"{name}.png", full_page=full_page)
+
+    return shoot

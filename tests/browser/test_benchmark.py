@@ -16,33 +16,23 @@ from playwright.sync_api import Page, expect
 
 from codebotler.files import to_line
 from command_line import forked
+from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer
 from roboeval.evaluation.runs.folder import Run
 from runs_server import serving
 from seals import unseal
-from viewing import PHONE, SCREENS, OpenPage, Screen, expect_no_grave_fault
+from viewing import DESK, PHONE, SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault
 
 TASKS = "SayGoodDay,LunchBreak,StaplerSupply"
-EVIL = [
-    "<script>window.owned = 1</script>",
-    '<img src=x onerror="window.owned = 1">',
-    "[a link](javascript:window.owned=1) **bold** `code`",
-    "{{ constructor.constructor('window.owned = 1')() }} ${window.owned = 1}",
-    "</textarea></script><svg onload=window.owned=1>'\"`--></style>",
-    "שלום עולם \u202e gnp.exe \u2066 مرحبا",
-    "\x1b[31mred\x00\u2028\ud800\U0001f916",
-    "long " * 20_000,
-]
-NAMES = ["script", "img", "markdown", "template", "tags", "bidi", "odd", "long"]
-OWN_TAGS = "script, img, iframe, object, embed, a[href^='javascript'], svg [onload], [onerror]"
+LONGEST = 1_000
+"""A longer text is looked at on a large screen, too."""
 
 
-def made(folder: Path, model: str, *arguments: str) -> Path:
+def made(folder: Path, model: str, *arguments: str, count: int = 3) -> Path:
     """A run that is made on the spot."""
     path = folder / model
-    ended = forked(
-        "roboeval", "run", "--model", f"recorded:{model}", "--num-completions", "3", *arguments, "--out", path
-    )
+    words = ("--model", f"recorded:{model}", "--num-completions", count, "--no-report", "--out", path)
+    ended = forked("roboeval", "run", *map(str, words), *arguments)
     assert ended.status == 0, ended.err
     return path
 
@@ -63,8 +53,8 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two real runs of all tasks."""
     folder = tmp_path_factory.mktemp("real") / "runs"
     folder.mkdir()
-    for model in ("hasty", "careful"):
-        made(folder, model)
+    made(folder, "hasty")
+    made(folder, "careful", count=1)
     return folder
 
 
@@ -79,6 +69,21 @@ def runs(real: Path, tmp_path: Path) -> Path:
     """A folder with a copy of one, to be changed at will."""
     folder = tmp_path / "runs"
     shutil.copytree(real / "hasty", folder / "hasty")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small run."""
+    folder = tmp_path_factory.mktemp("few")
+    return made(folder, "hasty", "--tasks", TASKS, count=1)
+
+
+@pytest.fixture
+def few_runs(few: Path, tmp_path: Path) -> Path:
+    """A folder with a copy of it, to be changed at will."""
+    folder = tmp_path / "runs"
+    shutil.copytree(few, folder / "hasty")
     return folder
 
 
@@ -242,7 +247,16 @@ def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> N
     with serving(folder) as server:
         page = opened(server)
         expect(page.get_by_text("There are no runs yet.")).to_be_visible()
-        command = ["run", "--model", "recorded:hasty", "--num-completions", "2", "--tasks", TASKS]
+        command = [
+            "run",
+            "--model",
+            "recorded:hasty",
+            "--num-completions",
+            "2",
+            "--tasks",
+            TASKS,
+            "--no-report",
+        ]
         made = subprocess.Popen(
             [sys.executable, "-m", "roboeval", *command, "--out", folder / "new"],
             stdout=subprocess.DEVNULL,
@@ -257,11 +271,11 @@ def test_a_real_run_appears_as_it_is_made(tmp_path: Path, opened: OpenPage) -> N
         page.context.close()
 
 
-def test_a_run_that_is_deleted_while_it_is_looked_at(runs: Path, opened: OpenPage) -> None:
-    with serving(runs) as server:
+def test_a_run_that_is_deleted_while_it_is_looked_at(few_runs: Path, opened: OpenPage) -> None:
+    with serving(few_runs) as server:
         page = opened(server, "runs/hasty", expecting="404")
-        expect(page.locator("#count")).to_have_text("240 completions")
-        shutil.rmtree(runs / "hasty")
+        expect(page.locator("#count")).to_have_text("15 completions")
+        shutil.rmtree(few_runs / "hasty")
         expect(page.get_by_role("alert")).to_have_text(re.compile("^This run was deleted"))
         expect(page.locator(".heat td").first).to_be_visible()
         page.reload()
@@ -271,15 +285,15 @@ def test_a_run_that_is_deleted_while_it_is_looked_at(runs: Path, opened: OpenPag
         page.context.close()
 
 
-def test_a_damaged_row_is_said_and_the_others_are_shown(runs: Path, opened: OpenPage) -> None:
-    rows = Run(runs / "hasty").rows("paper")
+def test_a_damaged_row_is_said_and_the_others_are_shown(few_runs: Path, opened: OpenPage) -> None:
+    rows = Run(few_runs / "hasty").rows("paper")
     lines = rows.read_bytes().splitlines(keepends=True)
     rows.write_bytes(b"".join([*lines[:10], b"{broken\n", *lines[11:]]))
-    with serving(runs) as server:
+    with serving(few_runs) as server:
         page = opened(server, "runs/hasty")
         expect(page.locator(".notes")).to_contain_text("paper.jsonl, line 11: this line is no row")
         expect(page.locator(".facts .state")).to_have_text("damaged")
-        expect(page.locator("#count")).to_have_text("240 completions")
+        expect(page.locator("#count")).to_have_text("15 completions")
         page.context.close()
 
 
@@ -318,12 +332,12 @@ def expect_unharmed(page: Page, before: int) -> None:
 
 
 @pytest.mark.parametrize("evil", EVIL, ids=NAMES)
-def test_no_text_becomes_more_than_text(runs: Path, opened: OpenPage, evil: str) -> None:
+def test_no_text_becomes_more_than_text(few: Path, tmp_path: Path, opened: OpenPage, evil: str) -> None:
     """A program, a model, an instruction, an error, a check, a world, a room, a task, a run, a file."""
     name = "".join(c for c in evil if c.isprintable()).replace("/", "|")[:80].strip()
     whole = evil.encode(errors="replace").decode()  # a name in an address holds no half character
-    run = Run(runs / name)
-    (runs / "hasty").rename(run.path)
+    run = Run(tmp_path / "runs" / name)
+    shutil.copytree(few, run.path)
 
     def make_evil(completion: dict[str, Any], row: dict[str, Any]) -> None:
         completion |= {"program": evil * 3, "model": evil, "instruction": evil}
@@ -347,15 +361,14 @@ def test_no_text_becomes_more_than_text(runs: Path, opened: OpenPage, evil: str)
     changed(run, make_evil)
     head = json.loads(run.head("paper").read_text())
     shutil.copy(run.rows("paper"), run.rows(name))
-    with serving(runs) as server:
-        before = opened(server)
-        expect(before.locator(".runs tbody tr")).to_have_count(1)
-        count = before.locator(OWN_TAGS).count()
-        expect_unharmed(before, count)
-        for size in ((1440, 900), PHONE):
+    with serving(run.path.parent) as server:
+        for size in (DESK, PHONE) if len(evil) > LONGEST else (PHONE,):
             page = opened(server, size=size)
+            expect(page.locator(".runs tbody tr")).to_have_count(1)
+            count = page.locator(OWN_TAGS).count()
+            expect_unharmed(page, count)
             page.locator(".runs tbody a").click()
-            expect(page.locator("#count")).to_have_text("240 completions")
+            expect(page.locator("#count")).to_have_text("15 completions")
             expect_unharmed(page, count)
             page.locator(".kind").nth(2).click()
             expect(page.get_by_role("button", name="Show all")).to_be_visible()
@@ -373,7 +386,6 @@ def test_no_text_becomes_more_than_text(runs: Path, opened: OpenPage, evil: str)
             expect(page.locator(".heat td").first).to_be_visible()
             expect_unharmed(page, count)
             page.context.close()
-        before.context.close()
     assert head["suite"] == "paper"
 
 
@@ -385,14 +397,14 @@ def visible(text: str) -> str:
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
-def test_pages(served: PageServer, opened: OpenPage, shots: Path, screen: Screen) -> None:
+def test_pages(served: PageServer, opened: OpenPage, shoot: Shoot, screen: Screen) -> None:
     which, size, dark = screen
     page = opened(served, size=size, dark=dark)
 
     def look(name: str) -> None:
         page.evaluate("scrollTo(0, 0)")
         page.wait_for_timeout(300)
-        page.screenshot(path=shots / f"{name}-{which}.png", full_page=True)
+        shoot(page, f"{name}-{which}")
         expect_no_grave_fault(page)
         assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
 

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from faces import HEARING, SPEAKING
 from pageserver import PageServer
-from viewing import SCREENS, OpenPage, Screen, expect_no_grave_fault
+from viewing import SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault
 
 OFFICE = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
 LONG = (
@@ -68,7 +68,7 @@ def expect_names_beside_stop(page: Page) -> None:
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen[0])
-def test_face(office: PageServer, opened: OpenPage, shots: Path, screen: Screen) -> None:
+def test_face(office: PageServer, opened: OpenPage, shoot: Shoot, screen: Screen) -> None:
     which, size, dark = screen
     office.rest()
     page = opened(office, size=size, dark=dark, link=office.face_link, script=SPEAKING + HEARING)
@@ -76,7 +76,7 @@ def test_face(office: PageServer, opened: OpenPage, shots: Path, screen: Screen)
 
     def look(name: str, at: Page = page) -> None:
         at.wait_for_timeout(500)
-        at.screenshot(path=shots / f"{name}-{which}.png")
+        shoot(at, f"{name}-{which}", full_page=False)
         expect_no_grave_fault(at)
         if at is page:
             expect_in_sight(page)

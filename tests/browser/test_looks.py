@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from pageserver import PageServer
-from viewing import SCREENS, OpenPage, Screen, expect_no_grave_fault
+from viewing import SCREENS, OpenPage, Screen, Shoot, expect_no_grave_fault
 
 OFFICE = (Path(__file__).parents[2] / "examples" / "office.yaml").read_text()
 PROBLEMS = """def task_program():
@@ -33,7 +33,7 @@ def office(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PageServer]:
 def test_pages(
     office: PageServer,
     opened: OpenPage,
-    shots: Path,
+    shoot: Shoot,
     screen: Screen,
 ) -> None:
     which, size, dark = screen
@@ -42,7 +42,7 @@ def test_pages(
     def look(name: str) -> None:
         page.evaluate("scrollTo(0, 0)")
         page.wait_for_timeout(400)
-        page.screenshot(path=shots / f"{name}-{which}.png", full_page=True)
+        shoot(page, f"{name}-{which}")
         expect_no_grave_fault(page)
 
     expect(page.locator(".picks .pick").first).to_be_visible()

@@ -1,16 +1,14 @@
 """Texts that somebody who wishes a page ill would have a robot, a model or a world say."""
 
 EVIL = [
-    "<script>window.owned = 1</script>",
-    '<img src=x onerror="window.owned = 1">',
-    "[a link](javascript:window.owned=1) **bold** `code`",
-    "{{ constructor.constructor('window.owned = 1')() }} ${window.owned = 1}",
-    "</textarea></script><svg onload=window.owned=1>'\"`--></style>",
-    "שלום עולם \u202e gnp.exe \u2066 مرحبا",
-    "\x1b[31mred\x00\u2028\ud800\U0001f916",
-    "long " * 20_000,
+    '<script>window.owned = 1</script><img src=x onerror="window.owned = 1">',
+    "[a link](javascript:window.owned=1) **bold** `code` שלום עולם \u202e gnp.exe \u2066 مرحبا",
+    "</textarea></script><svg onload=window.owned=1>'\"`--></style>\x1b[31mred\x00\u2028\ud800\U0001f916",
+    "{{ constructor.constructor('window.owned = 1')() }} ${window.owned = 1} " + "long " * 20_000,
 ]
-NAMES = ["script", "img", "markdown", "template", "tags", "bidi", "odd", "long"]
+"""Each stands in the first 80 characters, as long as a name may be."""
+
+NAMES = ["markup", "direction", "tags", "long"]
 
 OWN_TAGS = (
     "script, img:not(.cm-widgetBuffer), iframe, object, embed, a[href^='javascript'], svg [onload], [onerror]"
