@@ -29,12 +29,13 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
         an ability, how many of the judged tasks take it, their pass@1 with its interval over tasks, and the
         share of their completions that fail, by class.
     """
+    scores = {one.task: [p.pass_at(1) for p in one.prompts] for one in task_scores(table, suite.tasks)}
     for ability in dict.fromkeys(ability for task in suite.tasks.values() for ability in task.abilities):
-        tasks = [name for name, task in suite.tasks.items() if ability in task.abilities]
-        those = table.filter(pl.col("task").is_in(tasks))
-        if not those.is_empty():
-            scores = [[prompt.pass_at(1) for prompt in score.prompts] for score in task_scores(those, tasks)]
-            yield ability, len(scores), by_formula(scores), {one.name: one.share for one in failures(those)}
+        tasks = [name for name in scores if name in suite.tasks and ability in suite.tasks[name].abilities]
+        if tasks:
+            causes = failures(table.filter(pl.col("task").is_in(tasks)))
+            at = by_formula([scores[name] for name in tasks])
+            yield ability, len(tasks), at, {one.name: one.share for one in causes}
 
 
 def coming_back(results: Results) -> pl.DataFrame:

@@ -156,7 +156,8 @@ def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
         prompts: at least one.
         most: the last number of retries.
     """
-    return [_mean([chances(prompt.trials, n).accepted for prompt in prompts]) for n in range(most + 1)]
+    rejected = [sum(not t.accepted for t in prompt.trials) / len(prompt.trials) for prompt in prompts]
+    return [_mean([1 - share ** (n + 1) for share in rejected]) for n in range(most + 1)]
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import SequenceMatcher
 from typing import TypeAlias
@@ -29,8 +29,12 @@ def shape(program: str) -> Lines:
     if not isinstance(tree, ast.Module):
         return _lines(program)
     try:
-        numbers = {name: f"name{number}" for number, name in enumerate(_chosen(tree), 1)}
-        return _lines(ast.unparse(_Renamed(numbers).visit(tree)))
+        nodes = list(ast.walk(tree))
+        bound = names_bound(tree) - {TASK}
+        numbers = {name: f"name{number}" for number, name in enumerate(_chosen(nodes, bound), 1)}
+        for node in nodes:
+            _rename(node, numbers)
+        return _lines(ast.unparse(tree))
     except (RecursionError, MemoryError, ValueError):
         return _lines(program)
 
@@ -39,44 +43,29 @@ def _lines(text: str) -> Lines:
     return tuple(line.rstrip() for line in text[:LONGEST].splitlines() if line.strip())
 
 
-def _chosen(tree: ast.Module) -> list[str]:
+CHOOSES: Mapping[type[ast.AST], str] = {
+    **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef, ast.ExceptHandler), "name"),
+    ast.Name: "id",
+    ast.arg: "arg",
+}
+"""Where in a syntax tree a chosen name stands."""
+REPEATS: Mapping[type[ast.AST], str] = {**CHOOSES, ast.MatchAs: "name", ast.MatchStar: "name"}
+
+
+def _chosen(nodes: Iterable[ast.AST], bound: Container[str]) -> list[str]:
     """The names that a program binds, but for its entry, in the order in which they stand there."""
-    bound = names_bound(tree) - {TASK}
-    found = [
-        (getattr(node, "lineno", 0), getattr(node, "col_offset", 0), name)
-        for node in ast.walk(tree)
-        for name in _names(node)
-        if name in bound
-    ]
-    return list(dict.fromkeys(name for _, _, name in sorted(found)))
+    named = [(node, getattr(node, CHOOSES[type(node)])) for node in nodes if type(node) in CHOOSES]
+    found = sorted((node.lineno, node.col_offset, name) for node, name in named if name in bound)  # type: ignore[attr-defined]  # all that are named have a place
+    return list(dict.fromkeys(name for _, _, name in found))
 
 
-def _names(node: ast.AST) -> Iterator[str]:
-    match node:
-        case ast.Name(name) | ast.arg(name) | ast.FunctionDef(name) | ast.ClassDef(name):
-            yield name
-        case ast.AsyncFunctionDef(name) | ast.ExceptHandler(_, str(name)):
-            yield name
-
-
-class _Renamed(ast.NodeTransformer):
-    """Replaces names, and drops texts that stand alone, such as docstrings."""
-
-    def __init__(self, numbers: dict[str, str]) -> None:
-        self._numbers = numbers
-
-    def generic_visit(self, node: ast.AST) -> ast.AST:
-        for field in ("id", "arg", "name"):
-            old = getattr(node, field, None)
-            if isinstance(old, str) and not isinstance(node, ast.keyword | ast.alias):
-                setattr(node, field, self._numbers.get(old, old))
-        super().generic_visit(node)
-        return node
-
-    def visit_Expr(self, node: ast.Expr) -> ast.AST:
-        if isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
-            return ast.copy_location(ast.Pass(), node)
-        return self.generic_visit(node)
+def _rename(node: ast.AST, numbers: Mapping[str, str]) -> None:
+    """Replace its name; a text that stands alone, such as a docstring, becomes a `pass`."""
+    if (field := REPEATS.get(type(node))) is not None:
+        old = getattr(node, field)
+        setattr(node, field, numbers.get(old, old))
+    elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        node.value = ast.Name("pass") if isinstance(node.value.value, str) else node.value
 
 
 def similarity(one: Counter[str], other: Counter[str]) -> float:

@@ -50,6 +50,11 @@ def report(
 
     The page also says why, and how sure that is.
     """
+    import atexit
+    import gc
+
+    gc.disable()  # a fifth of the time would go into looking for cycles among all that a report holds,
+    atexit.register(gc.freeze)  # for the last time when Python ends
     from codebotler.terminal import busy
     from roboeval.evaluation.engines import Local
     from roboeval.report.cost import expect_known, read_prices

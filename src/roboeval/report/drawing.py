@@ -5,19 +5,26 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from functools import cache, partial
+from typing import Any, ClassVar
 
 import matplotlib as mpl
+import numpy as np
+from fontTools import subset
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import GraphicsContextBase, RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 from matplotlib.figure import Figure
+from matplotlib.transforms import Affine2D, Bbox
+from PIL import Image
 
 from codebotler.terminal import visible
 
 WIDE, NARROW = 7.16, 3.5  # inches: both columns of a paper, and one
+DPI, POINTS = 300, 72  # of an inch
 
 PAPER, INK, FAINT, QUIET = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
 BLACK, WHITE = "#010101", "#fefefe"  # of data, and of text on full shades; SVG leaves out what is #000000
@@ -33,6 +40,10 @@ COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", BLA
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LONGEST_NAME = 26
+
+# A PDF says where each letter stands, so a font in it needs no tables by which a program would lay out text;
+# to copy them takes half the time of a PDF.
+getattr(subset.Options, "_drop_tables_default", []).extend(("GDEF", "GPOS", "GSUB"))
 
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -75,24 +86,81 @@ def styled() -> Iterator[None]:
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of so many inches that places what stands in it by itself."""
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
-def written(figure: Figure, kind: str) -> bytes:
-    """A figure as png, pdf or svg, with no date and no version in it."""
-    nothing: dict[str, dict[str, None]] = {
-        "png": {"Software": None},
-        "pdf": {"Creator": None, "Producer": None, "CreationDate": None},
-        "svg": {"Creator": None, "Date": None},
-    }
-    if (layout := figure.get_layout_engine()) is not None:  # once, for all formats
+def written(figure: Figure) -> dict[str, bytes]:
+    """A figure as png, pdf and svg, with no date and no version in it; laid out and drawn once for all."""
+    canvas = FigureCanvasAgg(figure)
+    if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
-        figure.set_layout_engine(None)  # "none" would leave one behind, for which all is drawn twice
-    content = io.BytesIO()
-    figure.savefig(content, format=kind, dpi=300 if kind == "png" else 72, metadata=nothing[kind])
-    return _slim(content.getvalue()) if kind == "svg" else content.getvalue()
+        figure.set_layout_engine(None)
+    again = Repetition(figure)
+    renderer = canvas.get_renderer()  # type: ignore[no-untyped-call]
+    figure.draw(Recorder(renderer, again.calls))  # type: ignore[arg-type]  # it has all that one has
+    found = {"png": io.BytesIO(), "pdf": io.BytesIO(), "svg": io.BytesIO()}
+    pixels = np.asarray(renderer.buffer_rgba())[..., :3]
+    Image.fromarray(pixels).save(found["png"], format="png", dpi=(DPI, DPI), compress_level=3)
+    for kind, names in (("pdf", ("Creator", "Producer", "CreationDate")), ("svg", ("Creator", "Date"))):
+        again.savefig(found[kind], format=kind, metadata=dict.fromkeys(names))
+    written = {kind: content.getvalue() for kind, content in found.items()}
+    return {**written, "svg": _slim(written["svg"])}
+
+
+class Recorder:
+    """Passes on to a renderer what is drawn, and notes each call with its pen."""
+
+    def __init__(self, renderer: RendererBase, calls: list[Any]) -> None:
+        self._renderer, self._calls = renderer, calls
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a renderer has
+        found = getattr(self._renderer, name)
+        return partial(self._draw, name, found) if name.startswith("draw_") else found
+
+    def _draw(
+        self,
+        name: str,
+        draw: Callable[..., None],
+        pen: GraphicsContextBase,
+        *args: Any,  # noqa: ANN401 - whatever a renderer takes
+        **more: Any,  # noqa: ANN401
+    ) -> None:
+        kept = GraphicsContextBase()
+        kept.copy_properties(pen)
+        self._calls.append((name, kept, args, more))
+        draw(pen, *args, **more)
+
+
+class Repetition(Figure):
+    """A drawing that is repeated, call by call, where an inch has 72 points, for other formats."""
+
+    TRANSFORMS: ClassVar = {
+        "draw_path": (1,),
+        "draw_markers": (1, 3),
+        "draw_path_collection": (0, 4),
+        "draw_quad_mesh": (0, 5),
+    }
+    """Which arguments of a call lead to dots."""
+
+    def __init__(self, figure: Figure) -> None:
+        super().__init__(figsize=tuple(figure.get_size_inches()), dpi=POINTS)
+        self.calls: list[Any] = []
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Repeat all calls."""
+        smaller = Affine2D().scale(POINTS / DPI)
+        for name, kept, noted, more in self.calls:
+            pen, args = renderer.new_gc(), list(noted)
+            pen.copy_properties(kept)
+            if (clip := kept.get_clip_rectangle()) is not None:
+                pen.set_clip_rectangle(Bbox(smaller.transform(clip)))
+            if name == "draw_text":
+                x, y = smaller.transform(args[:2])
+                args[:2] = x, y if renderer.flipy() else self.bbox.height - y
+            for at in self.TRANSFORMS.get(name, ()):
+                args[at] = args[at] + smaller
+            getattr(renderer, name)(pen, *args, **more)
+            pen.restore()
 
 
 def _slim(svg: bytes) -> bytes:
@@ -114,11 +182,17 @@ def shades(paper: str = PAPER, middle: str = MIDDLE) -> LinearSegmentedColormap:
     return LinearSegmentedColormap.from_list("shades", [paper, middle, FULL])
 
 
+@cache
+def dark_colours() -> dict[bytes, bytes]:
+    """What takes the place of which colour on a dark page."""
+    light, dark = shades(), shades(DARK[PAPER], DARK_MIDDLE)
+    pairs = {to_hex(light(n)): to_hex(dark(n)) for n in range(light.N)} | DARK
+    return {old.encode(): new.encode() for old, new in pairs.items()}
+
+
 def darkened(svg: bytes) -> bytes:
     """A drawing in colours for a dark page."""
-    light, dark = shades(), shades(DARK[PAPER], DARK_MIDDLE)
-    others = {to_hex(light(n)): to_hex(dark(n)) for n in range(light.N)} | DARK
-    colours = {old.encode(): new.encode() for old, new in others.items()}
+    colours = dark_colours()
     return re.sub(rb"#[0-9a-f]{6}\b", lambda colour: colours.get(colour[0], colour[0]), svg)
 
 

@@ -9,8 +9,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.markers import TICKDOWN
 from matplotlib.patches import Patch
-from matplotlib.ticker import NullFormatter
 
 from roboeval.analysis.metrics import TaskScore, threshold_curve
 from roboeval.analysis.resample import LIMITS
@@ -103,7 +103,7 @@ def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[
     axes.set_yticks([0, 0.5, 1])
     axes.grid(visible=True, axis="y")
     axes.set_xticks(range(len(tasks)), [_two_lines(task) for task in tasks])
-    axes.tick_params(axis="x", length=0, labelsize=6.5 if room > 6 else 7)  # noqa: PLR2004 - many labels
+    axes.tick_params(axis="x", bottom=False, length=0, labelsize=6.5 if room > 6 else 7)  # noqa: PLR2004 - many labels
 
 
 def _two_lines(task: str) -> str:
@@ -197,12 +197,14 @@ def _threshold_axes(axes: Axes) -> None:
     axes.set_xscale("log")
     axes.set_xlim(1, LOWEST)
     axes.set_xticks([1, 0.1, 0.01, LOWEST], ["1", "0.1", "0.01", "0.001"])
-    axes.xaxis.set_minor_formatter(NullFormatter())
     share_axis(axes)
 
 
 def _threshold_labels(axes: Axes) -> None:
-    axes.tick_params(axis="x", which="minor", length=1.5)
+    axes.minorticks_off()  # which matplotlib would draw one by one
+    between = [digit * power for power in (0.1, 0.01, LOWEST) for digit in range(2, 10)]
+    small: dict[str, Any] = {"marker": TICKDOWN, "markersize": 1.5, "markeredgewidth": 0.6}
+    axes.plot(between, [0] * len(between), color=INK, clip_on=False, linestyle="none", **small)
     axes.grid(visible=True, axis="y")
     axes.set_xlabel("threshold of pass@1")
     axes.set_ylabel("prompts that reach it")
@@ -254,7 +256,7 @@ def heat(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) 
     middles = [at + 0.5 for at in range(max(len(rows), len(columns)))]
     axes.set_xticks(middles[: len(columns)], columns, rotation=38, ha="right", rotation_mode="anchor")
     axes.set_yticks(middles[: len(rows)], rows)
-    axes.tick_params(length=0)
+    axes.tick_params(left=False, bottom=False, length=0)
     axes.spines[:].set_color(FAINT)
     axes.spines[:].set_visible(True)
     if len(columns) > MOST_NUMBERS:
@@ -263,7 +265,8 @@ def heat(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) 
         for x, share in zip(middles, shares, strict=False):
             if share is not None:
                 colour = QUIET if share == 0 else INK if share < DARK_FROM else WHITE
-                axes.text(x, y, _percent(share), ha="center", va="center", color=colour, fontsize=6)
+                cell = axes.text(x, y, _percent(share), ha="center", va="center", color=colour, fontsize=6)
+                cell.set_in_layout(False)  # it lies within the axes
 
 
 def _percent(share: float) -> str:
@@ -304,7 +307,7 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
         left = left + shares
     axes.set_yticks(places, [brief(name, 34) for name, _ in found])
     axes.set_ylim(len(found) - 0.5, -0.5)
-    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="y", left=False, length=0)
     share_axis(axes, along="x")
 
 

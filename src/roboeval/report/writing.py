@@ -207,8 +207,7 @@ def pieces(sections: Sequence[Section]) -> int:
 def _draw(picture: Picture, folder: Path) -> Drawn:
     """Draw a figure, write it, and give it for the page."""
     with styled():
-        figure = picture.draw()
-        for kind in FORMATS:
-            write_whole(folder / f"{picture.name}.{kind}", written(figure, kind))
-        light = written(figure, "svg")
-    return light, darkened(light)
+        found = written(picture.draw())
+    for kind in FORMATS:
+        write_whole(folder / f"{picture.name}.{kind}", found[kind])
+    return found["svg"], darkened(found["svg"])
