@@ -5,9 +5,9 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from typing import Any, ClassVar
 
 import matplotlib as mpl
@@ -115,20 +115,16 @@ class Recorder:
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a renderer has
         found = getattr(self._renderer, name)
-        return partial(self._draw, name, found) if name.startswith("draw_") else found
+        if not name.startswith("draw_"):
+            return found
 
-    def _draw(
-        self,
-        name: str,
-        draw: Callable[..., None],
-        pen: GraphicsContextBase,
-        *args: Any,  # noqa: ANN401 - whatever a renderer takes
-        **more: Any,  # noqa: ANN401
-    ) -> None:
-        kept = GraphicsContextBase()
-        kept.copy_properties(pen)
-        self._calls.append((name, kept, args, more))
-        draw(pen, *args, **more)
+        def noted(pen: GraphicsContextBase, *args: Any, **more: Any) -> None:  # noqa: ANN401
+            kept = GraphicsContextBase()
+            kept.copy_properties(pen)
+            self._calls.append((name, kept, args, more))
+            found(pen, *args, **more)
+
+        return noted
 
 
 class Repetition(Figure):

@@ -24,16 +24,11 @@ from roboeval.report.sheets import (
     Prose,
     Section,
     Sheet,
+    note,
     section,
     sheet,
 )
 
-GROUPS = (
-    "Completions of one task that fail by the same error or check and with similar programs, the largest "
-    "groups first. Two programs are similar if they share six in ten of their lines, whatever names they "
-    "chose. A group is shown by its most frequent program, beside the program of the same task that passes "
-    "and differs in the fewest lines."
-)
 MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups that are shown of a run, and of all runs
 MOST_REVERSALS = 100  # groups of each run
 
@@ -78,7 +73,7 @@ def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
     tasks = {*paper.published()["pass_at_1"]}
     parts = ", ".join(run.name for run in known if {score.task for score in run.scores} != tasks)
     more = f"Published causes are of all {len(tasks)} tasks of the paper, which is more than {parts} did."
-    return [*paper.taken_for(runs), paper.TWO_SUMS, *([more] if parts else [])]
+    return [*paper.taken_for(runs), note("two-sums"), *([more] if parts else [])]
 
 
 # --- groups
@@ -95,7 +90,7 @@ def alike(runs: Sequence[JudgedRun]) -> Section:
         if left := together[most:]:
             those = f"{len(left):,} smaller groups with {how_many(sum(map(len, left)))}"
             notes.append(f"{run.name}: {those} are left out; `roboeval find` shows as many as --groups says.")
-    about = Prose([GROUPS] if shown else [])
+    about = Prose([note("groups")] if shown else [])
     return section("failures", about, Groups(shown), Prose(notes), groups_sheet(shown))
 
 

@@ -12,7 +12,19 @@ from pathlib import Path
 from roboeval.analysis.cluster import Cluster
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import name_of
-from roboeval.report.sheets import Cell, Code, Column, Groups, Part, Picture, Prose, Section, Sheet, told
+from roboeval.report.sheets import (
+    Cell,
+    Code,
+    Column,
+    Groups,
+    Part,
+    Picture,
+    Prose,
+    Section,
+    Sheet,
+    described,
+    told,
+)
 
 WORDS, CHARACTERS, LINES = 500, 6_000, 80  # of what models wrote
 LONG = 24  # rows from which a table is folded
@@ -39,7 +51,8 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Ma
     script = SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
-    links = "".join(f'<li><a href="#{_text(s.name)}">{_text(s.title)}</a></li>' for s in sections)
+    titles = {_text(section.name): _text(described("sections", section.name)) for section in sections}
+    links = "".join(f'<li><a href="#{name}">{title}</a></li>' for name, title in titles.items())
     body = "".join(_section(section, drawn) for section in sections)
     paragraphs = "".join(f"<p>{_text(words)}</p>" for words in lead)
     return (
@@ -67,7 +80,7 @@ def _text(words: str) -> str:
 def _section(section: Section, drawn: Mapping[str, Drawn]) -> str:
     parts = "".join(_part(part, drawn) for part in section.parts)
     name = _text(section.name)
-    head = f'<h2 id="{name}-h">{_text(section.title)}</h2>'
+    head = f'<h2 id="{name}-h">{_text(described("sections", section.name))}</h2>'
     return f'<section id="{name}" aria-labelledby="{name}-h">{head}\n{parts}</section>\n'
 
 
@@ -92,7 +105,7 @@ def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
     if picture.name not in drawn:
         return ""
     light, dark = map(_data, drawn[picture.name])
-    caption = _text(picture.caption)
+    caption = _text(described("figures", picture.name))
     return (
         f'<figure id="figure-{_text(picture.name)}"><picture>'
         f'<source media="screen and (prefers-color-scheme: dark)" srcset="{dark}">'
@@ -112,8 +125,9 @@ def _data(svg: bytes) -> str:
 def _table(sheet: Sheet) -> str:
     heads = "".join(f'<th scope="col" class="{_css(c)}">{_text(c.head)}</th>' for c in sheet.columns)
     rows = "".join(_row(row, sheet.columns) for row in sheet.rows)
-    title = f"{_text(sheet.title)}"
-    about = f"<p>{_text(sheet.about)}</p>" if sheet.about else ""
+    told_of = described("tables", sheet.name)
+    title, about = (_text(told_of.get(name, "")) for name in ("title", "about"))
+    about = f"<p>{about}</p>" if about else ""
     notes = "".join(f'<p class="note">{_text(note)}</p>' for note in sheet.notes)
     table = (
         f'<div class="wide" tabindex="0" role="region" aria-label="{title}"><table>'

@@ -3,45 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from roboeval.analysis.summary import Causes
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import Cell, Sheet, sheet
+from roboeval.report.sheets import Cell, Sheet, note, sheet
 
 SUITE = "paper"
-NAMES: Mapping[str, tuple[str, ...]] = {
-    "GPT-4": ("gpt-4", "openai/gpt-4", "gpt-4-0314", "gpt-4-0613"),
-    "GPT-3.5": ("text-davinci-003",),
-    "PaLM2": ("text-bison-001", "models/text-bison-001"),
-    "CodeLlama": ("codellama/codellama-34b-python-hf", "codellama-34b-python-hf"),
-    "StarCoder": ("bigcode/starcoder",),
-}
-"""What their makers call the paper's models, in small letters, without the provider."""
-SHORT: Mapping[str, tuple[str, ...]] = {
-    "GPT-3.5": ("gpt-3.5",),
-    "PaLM2": ("palm-2", "palm2"),
-    "CodeLlama": ("codellama",),
-    "StarCoder": ("starcoder",),
-}
-"""What the paper calls them. Where a provider is named this may be another model, such as a smaller one."""
-
-OTHER_PHRASINGS = (
-    "Published numbers are means over the authors' own five prompts of a task. The suite's instructions are "
-    "other phrasings of the same tasks, so only means of tasks are set side by side for runs that were "
-    "generated with them."
-)
-OWN_PROMPTS = (
-    "Published numbers of single prompts stand only beside completions that were written for the authors' "
-    "own prompts: imported ones, which do not say that they answer the suite's instructions."
-)
-TWO_SUMS = (
-    "Published means are those of the published table of pass@1: 46.3 % for CodeLlama and 31.25 % for "
-    "StarCoder. The published breakdown of failures sums up to 45.7 % and 31.2 % of completions that succeed."
-)
 
 
 @cache
@@ -59,8 +30,9 @@ def model_of(run: JudgedRun) -> str | None:
     if run.results.head.get("suite") != SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
-    known = [*NAMES.items(), *(() if colon else SHORT.items())]
-    return next((model for model, names in known if (name or provider) in names), None)
+    known = published()["names"] | ({} if colon else published()["short_names"])
+    model: str | None = known.get(name or provider)
+    return model
 
 
 def taken_for(runs: Iterable[JudgedRun]) -> list[str]:
@@ -125,5 +97,9 @@ def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
             for task, ours, theirs in pairs
         ]
     are_theirs = all(is_of_authors_prompts(run) for run, _ in known)
-    notes = [*taken_for(runs), *([] if are_theirs else [OTHER_PHRASINGS]), TWO_SUMS]
+    notes = [
+        *taken_for(runs),
+        *([] if are_theirs else [note("other-phrasings")]),
+        note("two-sums"),
+    ]
     return sheet("published", rows, notes=notes)

@@ -11,9 +11,8 @@ from roboeval.analysis.metrics import share_at_least, threshold_curve
 from roboeval.analysis.statistics import FEW, by_bootstrap, by_formula
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun, tasks_of
-from roboeval.report.sheets import Cell, Picture, Prose, Section, Sheet, section, sheet
+from roboeval.report.sheets import Cell, Picture, Prose, Section, Sheet, note, section, sheet
 
-MANY = "Of twenty pairs that do not differ at all, one has a p below 0.05 by chance."
 MOST_PAIRS = 10  # beyond which each run is compared with the best only
 
 
@@ -101,7 +100,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]
         ps, much = (found.p_prompts, found.p_tasks), (found.needed.completions, found.needed.prompts)
         rows.append([f"{second.name} minus {first.name}", found.prompts, over[0].mean, *ends, *ps, *much])
-    notes = [*([MANY] if len(rows) > 1 else []), *notes]
+    notes = [*([note("many-pairs")] if len(rows) > 1 else []), *notes]
     return section("differences", Prose(said), sheet("differences", rows, notes=notes))
 
 
@@ -135,7 +134,7 @@ def prompt_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     order = {task: at for at, task in enumerate(tasks_of(runs))}
     keys = sorted({key for run in runs for key in run.by_prompt}, key=lambda key: (order[key[0]], key[1]))
     rows = [[*key, *_cells(runs, theirs, key)] for key in keys]
-    return sheet("prompts", rows, notes=[paper.OWN_PROMPTS] if theirs else [], shares=[*chain(*heads)])
+    return sheet("prompts", rows, notes=[note("own-prompts")] if theirs else [], shares=[*chain(*heads)])
 
 
 def _cells(runs: Sequence[JudgedRun], theirs: Mapping[str, str], key: tuple[str, int]) -> Iterator[Cell]:

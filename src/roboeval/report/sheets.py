@@ -23,10 +23,20 @@ Cell: TypeAlias = str | int | float | None
 
 
 @cache
-def words() -> dict[str, dict[str, Any]]:
-    """What page.yaml says of sections, figures and tables, by their names."""
+def page_words() -> dict[str, dict[str, Any]]:
+    """What page.yaml says of sections, figures, tables and notes, by their names."""
     text = Path(__file__).with_name("page.yaml").read_text()
     return yaml.load(text, Loader)  # type: ignore[no-any-return]  # noqa: S506 - a safe one
+
+
+def described(kind: str, name: str) -> Any:  # noqa: ANN401 - a text, or several
+    """What page.yaml says of one of them."""
+    return page_words()[kind][name]
+
+
+def note(name: str) -> str:
+    """What a reader must know."""
+    return str(described("notes", name))
 
 
 class Column(NamedTuple):
@@ -58,16 +68,6 @@ class Sheet:
     rows: Sequence[Sequence[Any]]
     notes: Sequence[str] = ()
 
-    @property
-    def title(self) -> str:
-        """What it is called on the page."""
-        return str(words()["tables"][self.name]["title"])
-
-    @property
-    def about(self) -> str:
-        """What the numbers are, in sentences."""
-        return str(words()["tables"][self.name].get("about", ""))
-
 
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
@@ -80,7 +80,7 @@ def sheet(
         notes: what else a reader must know.
         shares: the heads of further columns, such as the names of models.
     """
-    kinds = words()["tables"][name]["columns"]
+    kinds = described("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
 
@@ -96,11 +96,6 @@ class Picture:
 
     name: str
     draw: Callable[[], Figure]
-
-    @property
-    def caption(self) -> str:
-        """What it shows, in sentences."""
-        return str(words()["figures"][self.name])
 
 
 @dataclass(frozen=True)
@@ -138,11 +133,6 @@ class Section:
 
     name: str
     parts: Sequence[Part]
-
-    @property
-    def title(self) -> str:
-        """Its heading."""
-        return str(words()["sections"][self.name])
 
 
 def section(name: str, *parts: Part) -> Section:

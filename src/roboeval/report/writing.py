@@ -22,9 +22,9 @@ from roboeval.report.sheets import (
     Prose,
     Section,
     Sheet,
+    page_words,
     section,
     sheet,
-    words,
     write_csv,
 )
 
@@ -194,7 +194,7 @@ def _is_report(page_file: Path) -> bool:
 
 def _forget_others(out: Path, names: AbstractSet[str]) -> None:
     """Remove what an earlier report wrote here that this one has not, such as rejection sampling."""
-    for name in {*words()["figures"], *words()["tables"]} - names:
+    for name in {*page_words()["figures"], *page_words()["tables"]} - names:
         for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
             (out / file).unlink(missing_ok=True)
 

@@ -128,7 +128,7 @@ def test_lines_end_where_the_axis_ends() -> None:
             np.asarray(line.get_xdata())
             for axes in figure.axes
             for line in axes.lines
-            if line.get_ls() != "None"
+            if line.get_linestyle() != "None"
         ]
         assert {float(xs.min()) for xs in lines} == {float(xs[-1]) for xs in lines} == {LOWEST}
 

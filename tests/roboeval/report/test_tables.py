@@ -19,7 +19,7 @@ from roboeval.report.cost import rejection_sampling, retries_sheet
 from roboeval.report.failures import all_causes, beside_notes, causes_sheet
 from roboeval.report.runs import JudgedRun, named_apart
 from roboeval.report.scores import curve_sheet, overall_sheet, prompt_sheet, task_sheet
-from roboeval.report.sheets import Column, Sheet, told, words, write_csv
+from roboeval.report.sheets import Column, Sheet, described, note, page_words, told, write_csv
 from roboeval.report.writing import sections
 from roboeval.suites.load import Suite
 
@@ -136,7 +136,7 @@ def test_cells_stand_only_beside_the_authors_own_prompts(paper_suite: Suite) -> 
     ):
         assert "gpt-4, published" not in [c.head for c in prompt_sheet([other]).columns]
         means = paper.published_sheet([other])
-        assert paper.OTHER_PHRASINGS in means.notes
+        assert note("other-phrasings") in means.notes
         assert column(means, "published")[0] == pytest.approx(0.995)
 
 
@@ -152,7 +152,7 @@ def test_published_means_are_those_of_the_table_of_pass_at_1(paper_suite: Suite)
     assert paper.causes("CodeLlama").classes["passed"] == 0.457
     assert paper.causes("StarCoder").classes["passed"] == 0.312
     table = paper.published_sheet([paper_run("starcoder")])
-    assert paper.TWO_SUMS in table.notes
+    assert note("two-sums") in table.notes
 
 
 def test_published_causes_are_of_known_classes_and_kinds() -> None:
@@ -168,7 +168,7 @@ def test_published_causes_only_where_asked_for() -> None:
     assert [name for name, _ in both] == ["gpt-4", "gpt-4, published", "mine"]
     table = causes_sheet(both)
     taken, sums, causes = beside_notes(runs)
-    assert ([taken], sums) == (paper.taken_for(runs), paper.TWO_SUMS)
+    assert ([taken], sums) == (paper.taken_for(runs), note("two-sums"))
     assert "16 tasks" in causes
     assert "gpt-4" in causes
     assert "None of these" in beside_notes(runs[1:])[0]
@@ -284,8 +284,8 @@ def test_cells_as_people_read_them() -> None:
 
 def test_all_that_page_yaml_describes_is_there() -> None:
     found = sections(usual(), with_published=True)
-    assert {section.name for section in found} <= {*words()["sections"]}
+    assert {section.name for section in found} <= {*page_words()["sections"]}
     for part in (part for section in found for part in section.parts):
         if isinstance(part, Sheet):
-            assert part.title
+            assert described("tables", part.name)["title"]
             assert all(len(row) == len(part.columns) for row in part.rows), part.name
