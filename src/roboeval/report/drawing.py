@@ -11,7 +11,6 @@ from functools import cache
 from typing import Any, ClassVar
 
 import matplotlib as mpl
-import numpy as np
 from fontTools import subset
 from matplotlib.axes import Axes
 from matplotlib.backend_bases import GraphicsContextBase, RendererBase
@@ -41,10 +40,6 @@ DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LONGEST_NAME = 26
 
-# A PDF says where each letter stands, so a font in it needs no tables by which a program would lay out text;
-# to copy them takes half the time of a PDF.
-getattr(subset.Options, "_drop_tables_default", []).extend(("GDEF", "GPOS", "GSUB"))
-
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 7.5,
@@ -60,6 +55,7 @@ STYLE: dict[Any, Any] = {
     **dict.fromkeys(("axes.edgecolor", "axes.labelcolor", "text.color", "xtick.color", "ytick.color"), INK),
     **dict.fromkeys(("axes.facecolor", "figure.facecolor", "savefig.facecolor"), PAPER),
     "axes.axisbelow": True,
+    "text.hinting": "none",  # for so many dots letters need not be moved to them
     "text.parse_math": False,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,
@@ -72,6 +68,20 @@ STYLE: dict[Any, Any] = {
     "pdf.fonttype": 42,
     "pdf.compression": 6,
 }
+
+
+load_font = subset.load_font
+
+
+def _load_font(*args: Any, **more: Any) -> Any:  # noqa: ANN401 - as fontTools has it
+    """A font for a PDF, without what places letters: a PDF says where each stands, and copying takes long."""
+    font = load_font(*args, **more)
+    for table in {"GDEF", "GPOS", "GSUB"}.intersection(font.keys()):
+        del font[table]
+    return font
+
+
+subset.load_font = _load_font
 
 
 @contextmanager
@@ -99,8 +109,8 @@ def written(figure: Figure) -> dict[str, bytes]:
     renderer = canvas.get_renderer()  # type: ignore[no-untyped-call]
     figure.draw(Recorder(renderer, again.calls))  # type: ignore[arg-type]  # it has all that one has
     found = {"png": io.BytesIO(), "pdf": io.BytesIO(), "svg": io.BytesIO()}
-    pixels = np.asarray(renderer.buffer_rgba())[..., :3]
-    Image.fromarray(pixels).save(found["png"], format="png", dpi=(DPI, DPI), compress_level=3)
+    picture = Image.frombuffer("RGBA", canvas.get_width_height(), renderer.buffer_rgba()).convert("RGB")
+    picture.save(found["png"], format="png", dpi=(DPI, DPI), compress_level=3)
     for kind, names in (("pdf", ("Creator", "Producer", "CreationDate")), ("svg", ("Creator", "Date"))):
         again.savefig(found[kind], format=kind, metadata=dict.fromkeys(names))
     written = {kind: content.getvalue() for kind, content in found.items()}
