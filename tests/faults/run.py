@@ -61,7 +61,7 @@ PATIENCE, SLOWER = 60.0, 10.0
 """A fault is killed by time after so many seconds, and so many times what the tests take without a fault."""
 
 LEFT_OUT = shutil.ignore_patterns(
-    ".git", ".venv*", ".hypothesis", ".*_cache", "__pycache__", "build", "dist", "runs", "*.egg-info"
+    ".git", ".venv*", ".hypothesis", ".*_cache", "__pycache__", "build", "dist", "*.egg-info"
 )
 FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/.+?)(?: - .*)?$", re.MULTILINE)
 
@@ -166,7 +166,12 @@ def _parses(text: str) -> bool:
 
 def copied(to: Path, tests_from: Path) -> Path:
     """A copy of the project to plant faults in, with tests, and all that these need, from a checkout."""
-    shutil.copytree(tests_from, to, ignore=LEFT_OUT, symlinks=True)
+    own_runs = shutil.ignore_patterns("runs")
+
+    def left_out(folder: str, names: list[str]) -> set[str]:
+        return LEFT_OUT(folder, names) | (own_runs(folder, names) if Path(folder) == tests_from else set())
+
+    shutil.copytree(tests_from, to, ignore=left_out, symlinks=True)
     shutil.rmtree(to / "src")
     shutil.copytree(ROOT / "src", to / "src", ignore=LEFT_OUT, symlinks=True)
     # Bytecode is checked by the content of its source: a fault may have the size and time of what was there.
