@@ -9,7 +9,7 @@ import polars as pl
 from codebotler.simulator.robot import resolve_room
 from roboeval.analysis.metrics import Estimate, completions_of, prompt_scores, task_scores
 from roboeval.analysis.statistics import by_formula
-from roboeval.analysis.summary import failures
+from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import RowData
 from roboeval.suites.load import Suite
@@ -30,12 +30,14 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
         share of their completions that fail, by class.
     """
     scores = {one.task: [p.pass_at(1) for p in one.prompts] for one in task_scores(table, suite.tasks)}
+    counted = completions_of(table).group_by("task", "failure_class").len()
+    ends = {(task, name): count for task, name, count in counted.iter_rows()}
     for ability in dict.fromkeys(ability for task in suite.tasks.values() for ability in task.abilities):
         tasks = [name for name in scores if name in suite.tasks and ability in suite.tasks[name].abilities]
+        total = sum(count for (task, _), count in ends.items() if task in tasks)
+        shares = {name: sum(ends.get((task, name), 0) for task in tasks) / (total or 1) for name in CLASSES}
         if tasks:
-            causes = failures(table.filter(pl.col("task").is_in(tasks)))
-            at = by_formula([scores[name] for name in tasks])
-            yield ability, len(tasks), at, {one.name: one.share for one in causes}
+            yield ability, len(tasks), by_formula([scores[name] for name in tasks]), shares
 
 
 def coming_back(results: Results) -> pl.DataFrame:

@@ -17,8 +17,8 @@ import polars as pl
 from codebotler.badinput import BadInput
 from codebotler.files import read_rows
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
-from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, read_lines_of
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
+from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, read_lines_of
 from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.suites.load import ABLATED, Suite, load_suite
 

@@ -1,4 +1,4 @@
-"""The one table of a judged run: its columns, how rows of an evaluation become rows of it, and tables as files."""
+"""The one table of a judged run: its columns, how rows of an evaluation become its rows, tables as files."""
 
 from __future__ import annotations
 

@@ -18,11 +18,11 @@ from typer.testing import CliRunner
 from codebotler.badinput import BadInput
 from codebotler.files import read_rows, to_line
 from roboeval.cli.app import app
-from roboeval.evaluation.runs.completions import Completion, read_completions, recorded_completions
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.judge import TimeLimitExceeded, time_limit
-from roboeval.evaluation.runs.rows import JudgedRow
+from roboeval.evaluation.runs.completions import Completion, read_completions, recorded_completions
 from roboeval.evaluation.runs.folder import Run, open_source, tasks_to_judge
+from roboeval.evaluation.runs.rows import JudgedRow
 from roboeval.suites.load import Suite, load_suite
 from seals import unseal
 
@@ -101,7 +101,8 @@ def test_the_same_bytes_with_one_and_four_workers_and_in_another_start(tmp_path:
         run = a_run(tmp_path / f"run{workers}", programs)
         script = (
             "import sys, pathlib\n"
-            "from roboeval.evaluation.evaluate import evaluate_run\nfrom roboeval.evaluation.runs.folder import Run\n"
+            "from roboeval.evaluation.evaluate import evaluate_run\n"
+            "from roboeval.evaluation.runs.folder import Run\n"
             "from roboeval.suites.load import load_suite\n"
             f"run = Run(pathlib.Path({str(run.path)!r}))\n"
             "for row in evaluate_run(run, load_suite(), ablated=False, tasks=None, redo=False, "
@@ -121,7 +122,8 @@ def test_kill_minus_nine_loses_doubles_and_tears_nothing(tmp_path: Path, paper: 
     run = careful_run(tmp_path / "killed", paper)
     script = (
         "import pathlib\n"
-        "from roboeval.evaluation.evaluate import evaluate_run\nfrom roboeval.evaluation.runs.folder import Run\n"
+        "from roboeval.evaluation.evaluate import evaluate_run\n"
+        "from roboeval.evaluation.runs.folder import Run\n"
         "from roboeval.suites.load import load_suite\n"
         f"run = Run(pathlib.Path({str(run.path)!r}))\n"
         "print('on', flush=True)\n"
@@ -327,7 +329,8 @@ def test_a_full_disk_leaves_whole_rows_only(tmp_path: Path, paper: Suite) -> Non
     run = a_run(tmp_path / "run", [GREETS, GREETS + "#"])
     script = (
         "import pathlib, resource, signal\n"
-        "from roboeval.evaluation.evaluate import evaluate_run\nfrom roboeval.evaluation.runs.folder import Run\n"
+        "from roboeval.evaluation.evaluate import evaluate_run\n"
+        "from roboeval.evaluation.runs.folder import Run\n"
         "from roboeval.suites.load import load_suite\n"
         f"run = Run(pathlib.Path({str(run.path)!r}))\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"

@@ -14,9 +14,9 @@ from codebotler.badinput import BadInput
 from codebotler.files import to_line
 from roboeval.analysis.search import Question, Search
 from roboeval.evaluation.evaluate import evaluate_run
+from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.evaluation.runs.rows import JudgedRow
-from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import Suite
 from seals import unseal
 

@@ -15,10 +15,10 @@ from codebotler.world import Room, World
 from made_results import table_of
 from roboeval.analysis.search import Question, answer
 from roboeval.cli.views.completions import completion_view
-from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import evaluation, judgement
+from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import MOST, MOST_OF_WORLD, Row
 from roboeval.suites.load import Suite, load_suite
 

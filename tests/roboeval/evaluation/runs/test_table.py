@@ -13,10 +13,9 @@ import pytest
 
 from codebotler.badinput import BadInput
 from made_results import results_of
-from roboeval.evaluation.runs.table import kind_of, write_table
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import RowData
-from roboeval.evaluation.runs.table import COMPLETION_COLUMNS, WORLD_COLUMNS
+from roboeval.evaluation.runs.table import COMPLETION_COLUMNS, WORLD_COLUMNS, kind_of, write_table
 
 PROGRAM = "def task_program():\n    go_to('x')\n"
 COMPLETION = Completion(task="Visit", prompt=1, index=2, program=PROGRAM, model="recorded:careful")
