@@ -295,6 +295,7 @@ def test_data_can_be_read() -> None:
 
 
 SHOWN_ELSEWHERE = {  # texts that no command of their page prints, and the tests that compare them
+    "architecture.md": ["roboeval\n  cli/"],
     "index.md": ["abc argparse", "runs/hasty/"],
     "roboeval-plus.md": ["task   "],
     "ros.md": ["string location"],
@@ -309,6 +310,14 @@ def test_what_a_page_says_is_printed_is_printed(followed: Callable[[str], Reader
     for text in told:
         if not (elsewhere and text.startswith(elsewhere)):
             assert any(is_printed(text, printed) for printed in followed(page).printed), text
+
+
+def test_the_architecture_names_every_room() -> None:
+    (rooms,) = (block.text for block in blocks("architecture.md") if block.language == "text")
+    roboeval, codebotler = rooms.split("\n\n")
+    for package, named in (("roboeval", roboeval), ("codebotler", codebotler)):
+        folders = {path.parent.name for path in (ROOT / "src" / package).glob("*/__init__.py")}
+        assert {name for name in folders if f"{name}/" not in named} == set()
 
 
 @pytest.mark.parametrize("page", ["robots.md"])
