@@ -2,15 +2,15 @@
 
 import json
 import os
+import select
 import sys
-import time
 
 sys.path.insert(0, sys.argv[1])
 
 import rospy
 from ros1_worker import picture_types
 
-topic, kind, fields, seconds = sys.argv[2], sys.argv[3], json.loads(sys.argv[4]), float(sys.argv[5])
+topic, kind, fields = sys.argv[2], sys.argv[3], json.loads(sys.argv[4])
 rospy.init_node("camera", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
 if kind in picture_types():
     fields["data"] = bytes.fromhex(fields["data"])
@@ -22,9 +22,6 @@ else:
 publisher = rospy.Publisher(topic, type(message), queue_size=1, latch=True)
 publisher.publish(message)
 print('["ready"]', flush=True)
-until = time.monotonic() + seconds
-while time.monotonic() < until:
-    time.sleep(0.05)
+while not select.select([sys.stdin], [], [], 0.05)[0]:
     publisher.publish(message)
-sys.stdin.read()
 os._exit(0)

@@ -104,14 +104,12 @@ def looking(graph: Graph, model: Server, *arguments: str) -> Iterator[None]:
     assert status == 0
 
 
-def camera(
-    graph: Graph, kind: str, fields: dict[str, Any], seconds: float = 600.0, topic: str = TOPIC
-) -> None:
-    """A camera that publishes for so many seconds."""
-    arguments = (str(SCRIPT.parent), topic, kind, json.dumps(fields), str(seconds))
-    process = Process(CAMERA, *arguments, master=graph.uri)
+def camera(graph: Graph, kind: str, fields: dict[str, Any], topic: str = TOPIC) -> Process:
+    """A camera that publishes until it is ended."""
+    process = Process(CAMERA, str(SCRIPT.parent), topic, kind, json.dumps(fields), master=graph.uri)
     graph.processes.append(process)
     process.expect("ready")
+    return process
 
 
 def asked(graph: Graph, label: str) -> tuple[bool, list[str | Picture]]:
@@ -218,14 +216,15 @@ def test_picture_may_come_from_a_file(graph: Graph, model: Server, tmp_path: Pat
 
 
 def test_no_picture_yet_and_no_picture_any_more_are_said(graph: Graph, model: Server) -> None:
-    with looking(graph, model, "--topic", TOPIC, "--oldest", "1"):
+    with looking(graph, model, "--topic", TOPIC, "--oldest", "3"):
         with pytest.raises(RobotError) as error:
             asked(graph, "mug")
         assert error.value.kind == "IsInRoomFailed"
         assert f"no picture has come on {TOPIC}" in str(error.value)
-        camera(graph, "sensor_msgs/Image", raw("rgb8"), seconds=1.0)
+        filming = camera(graph, "sensor_msgs/Image", raw("rgb8"))
         assert asked(graph, "mug")[0]
-        time.sleep(2.0)
+        filming.end()
+        time.sleep(3.0)
         with pytest.raises(RobotError, match=rf"{TOPIC} came \d s ago"):
             asked(graph, "mug")
 
