@@ -9,9 +9,9 @@
 #     test-ros1            robots on ROS 1, for which the system's Python must have rospy (`codebotler robots` tells)
 #     test-browser         the page in Chromium, also with a robot on ROS 1; SHOTS names a folder for screenshots
 #     test-faulty-server   4,000 completions of a server that fails one request in ten
-#     test-transformers    models and detectors on this machine, in an environment of its own, with torch
-#     test-pyrobosim       the robot in pyrobosim, in an environment of its own
-#     test-inspect, -ray   the benchmark in Inspect and on a Ray cluster, which share an environment
+#     test-transformers, -pyrobosim, -inspect, -ray
+#                          models and detectors on this machine, the robot in pyrobosim, the benchmark in Inspect and on
+#                          a Ray cluster, in one environment with all extras, EXTRAS_VENV
 #
 # `make faults` tries 60 deliberate faults, which the tests must notice. `make messages` writes every sentence that
 # an error says in a test into build/messages.md, once, and which ones no test has seen. `make fuzz` runs
@@ -21,8 +21,6 @@
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
-TORCH_VENV ?= .venv-transformers
-PYROBOSIM_VENV ?= .venv-pyrobosim
 EXTRAS_VENV ?= .venv-extras
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
@@ -90,12 +88,12 @@ pictures: $(VENV)/tested
 	$(BIN)/roboeval report "$$shots/hasty" "$$shots/careful" --no-check --out "$$shots/report" && \
 	$(BIN)/python tests/browser/pictures.py "$$shots" docs/pictures && rm -r "$$shots"
 
-test-transformers: $(TORCH_VENV)/tested
-	$(TORCH_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py \
+test-transformers: $(EXTRAS_VENV)/tested
+	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/codebotler/models/test_local.py \
 		tests/codebotler/perception/test_zeroshot.py
 
-test-pyrobosim: $(PYROBOSIM_VENV)/tested
-	$(PYROBOSIM_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py
+test-pyrobosim: $(EXTRAS_VENV)/tested
+	$(EXTRAS_VENV)/bin/python -m pytest --no-skips tests/codebotler/robots/test_pyrobosim*.py
 
 test-inspect: $(EXTRAS_VENV)/tested
 	$(EXTRAS_VENV)/bin/python -m pytest --no-skips $(if $(SHOTS),--shots "$(SHOTS)") tests/roboeval/evaluation/test_inspect.py
@@ -160,32 +158,14 @@ $(VENV)/tested: $(VENV)/installed
 	@$(PIP) install --constraint constraints.txt --group test | { $(DOTS); }
 	@touch $@
 
-# Of what is installed for one test file, most is never imported: --no-compile saves minutes.
-$(TORCH_VENV)/tested: $(SOURCES) constraints-transformers.txt
-	@$(CHECK_PYTHON)
-	@echo "making an environment with torch in $(TORCH_VENV), which takes some minutes"
-	@$(PYTHON) -m venv --clear $(TORCH_VENV)
-	@$(TORCH_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(TORCH_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
-		--constraint constraints-transformers.txt "$(PACKAGE)[transformers]" --group test | { $(DOTS); }
-	@touch $@
-
-$(PYROBOSIM_VENV)/tested: $(SOURCES) constraints-pyrobosim.txt
-	@$(CHECK_PYTHON)
-	@echo "making an environment with pyrobosim in $(PYROBOSIM_VENV), which takes a minute"
-	@$(PYTHON) -m venv --clear $(PYROBOSIM_VENV)
-	@$(PYROBOSIM_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
-	@$(PYROBOSIM_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
-		--constraint constraints-pyrobosim.txt "$(PACKAGE)[pyrobosim]" --group test | { $(DOTS); }
-	@touch $@
-
+# Of what is installed here, most is never imported: --no-compile saves minutes.
 $(EXTRAS_VENV)/tested: $(SOURCES) constraints-extras.txt
 	@$(CHECK_PYTHON)
-	@echo "making an environment with Inspect and Ray in $(EXTRAS_VENV), which takes a minute"
+	@echo "making an environment with all extras in $(EXTRAS_VENV), which takes a minute"
 	@$(PYTHON) -m venv --clear $(EXTRAS_VENV)
 	@$(EXTRAS_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 	@$(EXTRAS_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
-		--constraint constraints-extras.txt "$(PACKAGE)[inspect,ray]" --group test | { $(DOTS); }
+		--constraint constraints-extras.txt "$(PACKAGE)[inspect,pyrobosim,ray,transformers]" --group test | { $(DOTS); }
 	@touch $@
 
 $(VENV)/linted: $(VENV)/tested
@@ -199,5 +179,5 @@ $(VENV)/documented: $(VENV)/installed
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(TORCH_VENV) $(PYROBOSIM_VENV) $(EXTRAS_VENV) build dist .hypothesis .mypy_cache \
+	rm -rf $(VENV) $(EXTRAS_VENV) build dist .hypothesis .mypy_cache \
 		.pytest_cache .ruff_cache .import_linter_cache

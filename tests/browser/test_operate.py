@@ -192,6 +192,16 @@ def test_checks_take_nothing_away_that_is_typed_meanwhile(server: PageServer, op
     assert text_of(page).endswith(typed)
 
 
+def agree(server: PageServer, first: Page, second: Page) -> None:
+    """Wait until two pages show the program that the tool has."""
+    for _ in range(600):
+        shown = {page.evaluate("programEditor.text()") for page in (first, second)}
+        if shown == {server.call("GET", "/api/missions/current").data["program"]}:
+            return
+        first.wait_for_timeout(50)
+    raise AssertionError(shown)
+
+
 def test_two_who_type_at_once_end_with_the_same_text(server: PageServer, opened: OpenPage) -> None:
     first, second = opened(server), opened(server)
     checked(first, TEA)
@@ -203,10 +213,10 @@ def test_two_who_type_at_once_end_with_the_same_text(server: PageServer, opened:
         first.keyboard.type(f"# first {number}\n")
         second.keyboard.type(f"# second {number}\n")
         first.wait_for_timeout(150 * (number % 4))
+    agree(server, first, second)
     first.keyboard.type("# the end of it\n")
     expect(second.locator(".cm-content")).to_contain_text("the end of it")
-    program = server.call("GET", "/api/missions/current").data["program"]
-    assert first.evaluate("programEditor.text()") == second.evaluate("programEditor.text()") == program
+    agree(server, first, second)
 
 
 def test_who_was_slower_at_the_same_moment_is_told(server: PageServer, opened: OpenPage) -> None:
