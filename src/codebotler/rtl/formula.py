@@ -184,8 +184,8 @@ class ActAtSome(_ActAtPlace):
 
 
 @dataclass(frozen=True)
-class Count:
-    """Exactly so many events of the trace match.
+class _Counting:
+    """How many events of the trace match.
 
     Args:
         element: what the events must match.
@@ -198,25 +198,15 @@ class Count:
     cuts: Cuts = ()
 
     def __str__(self) -> str:
-        return f"{_cut_trace(self.cuts)}.Count({self.element}, {self.number})"
+        return f"{_cut_trace(self.cuts)}.{type(self).__name__}({self.element}, {self.number})"
 
 
-@dataclass(frozen=True)
-class AtLeast:
-    """So many events of the trace match, or more.
+class Count(_Counting):
+    """Exactly so many events of the trace match."""
 
-    Args:
-        element: what the events must match.
-        number: how many, 0 or more.
-        cuts: how the trace is cut before, in order.
-    """
 
-    element: Element
-    number: int
-    cuts: Cuts = ()
-
-    def __str__(self) -> str:
-        return f"{_cut_trace(self.cuts)}.AtLeast({self.element}, {self.number})"
+class AtLeast(_Counting):
+    """So many events of the trace match, or more."""
 
 
 @dataclass(frozen=True)
