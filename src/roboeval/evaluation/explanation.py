@@ -27,13 +27,7 @@ EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or
 
 
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
-    """Why a completion fails: the world that decided, and its error or failed check, explained.
-
-    Args:
-        row: of the evaluation; of its verdicts only that of the world that decided is looked at closely.
-        suite: by which it was judged; None if it is not at hand, and then nothing is explained.
-        ablated: whether common sense only was required.
-    """
+    """Why a completion fails: the world that decided, and its error or failed check, explained."""
     why = row["failure"]
     if why is None:
         return {"passed": True, "failure": None}
@@ -49,14 +43,7 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
 def completion_data(
     row: Mapping[str, Any], completion: Completion | None, suite: Suite | None, *, ablated: bool = False
 ) -> dict[str, Any]:
-    """One completion: what was asked, the program, and each world with every step and failed check.
-
-    Args:
-        row: of the evaluation.
-        completion: that was judged; None if it is not there.
-        suite: by which it was judged; None if it is not at hand, and then nothing is explained.
-        ablated: whether common sense only was required.
-    """
+    """A completion: its instruction, its program, and each world with every step and failed check."""
     patience = Patience()
     return {
         **{key: row[key] for key in ("task", "prompt", "index", "passed", "failure")},
@@ -75,7 +62,7 @@ class Patience:
         self._left = MOST_COMPARED
 
     def reaches_for(self, trace: Trace) -> bool:
-        """Whether a check on a trace is still explained; if so, that is taken into account."""
+        """Take a trace into account; whether a check on it is still explained."""
         self._left -= sum(map(_weight, trace))
         return self._left >= 0
 
@@ -86,7 +73,7 @@ def _weight(event: Event) -> int:
 
 
 def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablated: bool) -> Scenario | None:
-    """The scenario in which a verdict was reached; None if the suite has it no more."""
+    """The scenario of a verdict; None if the suite no longer has it."""
     task = None if suite is None else suite.tasks.get(row["task"])
     scenarios = () if task is None else task.judged_in(ablated=ablated)
     about = row["verdicts"][number]["world"]
@@ -118,7 +105,7 @@ def _rooms_of(world: World) -> Callable[[str], str | None]:
 def _explained(
     check: str, scenario: Scenario | None, trace: Trace, patience: Patience, cut: object
 ) -> dict[str, Any]:
-    """Why a check fails, with the step that makes it fail if it is one."""
+    """Why a check fails, and the number of the step, from 1, that makes it fail, if it is one."""
     if cut is not None:
         return {"explanation": CUT, "step": None}
     require = () if scenario is None else scenario.require

@@ -190,7 +190,7 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_commands_write_the_same_bytes(local: Path, tmp_path: Path) -> None:
     assert roboeval(*EVALUATE, "run", cwd=tmp_path).status == 0
     assert roboeval("resample", "run", "--engine", "ray", cwd=tmp_path).status == 0
-    for name in ("evaluations/paper.jsonl", "evaluations/paper.sha256", "evaluations/paper.json"):
+    for name in ("evaluations/paper.jsonl", "evaluations/paper.json"):
         assert (tmp_path / "run" / name).read_bytes() == (local / name).read_bytes()
     checks = (tmp_path / "run" / "checks" / "paper.jsonl").read_bytes()
     assert checks == (local / "checks" / "paper.jsonl").read_bytes() != b""

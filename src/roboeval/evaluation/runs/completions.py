@@ -1,4 +1,4 @@
-"""Rows of completions and of evaluations: read with line numbers, written so that no crash loses one."""
+"""Rows of completions: read with line numbers, and named."""
 
 from __future__ import annotations
 
@@ -167,11 +167,7 @@ def _expect_new(key: Key, seen: dict[tuple[str, int], dict[int, int]], number: i
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
-    """Refuse what would be too long to be read again once it is copied into a run.
-
-    Raises:
-        BadInput: it is.
-    """
+    """Raise BadInput if a row would be too long to be read again once it is copied into a run."""
     if len(to_line(row)) > MAX_ROW:
         sentence = f"as a row this is longer than {MAX_ROW:,} bytes; shorten the program"
         raise BadInput(sentence, file=str(file), line=line)

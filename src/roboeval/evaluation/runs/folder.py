@@ -28,17 +28,11 @@ from roboeval.suites.load import ABLATED, Suite
 
 @dataclass(frozen=True)
 class Source:
-    """Completions that somebody names.
+    """Completions that somebody names."""
 
-    Args:
-        completions: all of them; each is one that the suite knows.
-        run: the run folder they stand in, if they do.
-        left_aside: what is to be said of files that are none; None if there is nothing to say.
-    """
-
-    completions: Sequence[Completion]
-    run: Run | None = None
-    left_aside: str | None = None
+    completions: Sequence[Completion]  # each known to the suite
+    run: Run | None = None  # in which they stand
+    left_aside: str | None = None  # a warning about files that are none
 
     def of(self, tasks: frozenset[str] | None) -> list[Completion]:
         """Those of some tasks, or all."""
@@ -46,16 +40,7 @@ class Source:
 
 
 def open_source(text: str, suite: Suite) -> Source:
-    """Read the completions that a person names.
-
-    Args:
-        text: a run folder, a .jsonl file or a pipe, a folder or zip of published .py files, or
-            `recorded:NAME`.
-        suite: whose tasks and prompts they are of.
-
-    Raises:
-        BadInput: there is no such thing, or a completion is wrong or unknown to the suite.
-    """
+    """Read a run folder, a .jsonl file or pipe, a folder or zip of published .py, or `recorded:NAME`."""
     if not text:
         raise BadInput("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
@@ -76,47 +61,39 @@ def open_source(text: str, suite: Suite) -> Source:
 
 @dataclass(frozen=True)
 class Run:
-    """The folder of a run.
-
-    Args:
-        path: where it is.
-    """
+    """The folder of a run."""
 
     path: Path
 
     @property
     def completions(self) -> Path:
-        """The file of its completions."""
+        """The programs, a row each."""
         return self.path / COMPLETIONS
 
     @property
     def about(self) -> Path:
-        """The file that says who wrote the completions, and how they were asked for."""
+        """Who wrote the completions, and how they were asked for."""
         return self.path / "run.json"
 
     @property
     def in_flight(self) -> Path:
-        """The file that notes requests for completions while they are under way."""
+        """Requests that are under way."""
         return self.path / "inflight.jsonl"
 
     def rows(self, key: str) -> Path:
-        """The file of an evaluation's rows; `key` is the suite's name, with -ablation where ablated."""
+        """The rows of an evaluation; `key` is the suite's name, with -ablation where ablated."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
-    def programs(self, key: str) -> Path:
-        """The file that says, line by line, the hash of the program that each row judges."""
-        return self.path / "evaluations" / f"{key}.sha256"
-
     def head(self, key: str) -> Path:
-        """The file that says by what the rows of an evaluation were judged."""
+        """By what the rows of an evaluation were judged."""
         return self.path / "evaluations" / f"{key}.json"
 
     def checks(self, key: str) -> Path:
-        """The file of what a check said of its programs; `key` is the suite's name."""
+        """The problems of its programs; `key` is the suite's name."""
         return self.path / "checks" / f"{key}.jsonl"
 
     def checks_head(self, key: str) -> Path:
-        """The file that says how they were checked."""
+        """How they were checked."""
         return self.path / "checks" / f"{key}.json"
 
     def judged_by(self) -> list[str]:
@@ -130,11 +107,7 @@ class Run:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Keep other processes from writing this run.
-
-        Raises:
-            BadInput: one is writing it, or the folder cannot be written, or is one of other things.
-        """
+        """Keep other processes from writing this run; raises BadInput if one is writing it."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
@@ -188,12 +161,7 @@ class Run:
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
-        """Make this the run of some completions: copy them, unless they are here already.
-
-        Raises:
-            BadInput: other completions are here; then nothing is changed.
-            OSError: they cannot be written; then nothing is changed either.
-        """
+        """Copy completions into this run; raises BadInput if it holds others. An error changes nothing."""
         models = {completion.model for completion in completions}
         lines = (to_line(completion.row) for completion in completions)
         with self.writing():
@@ -221,7 +189,7 @@ PAUSE = 0.05  # seconds between two
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock a file; what a killed process was just starting may hold it for a moment longer."""
+    """Lock a file; a process that is being killed may hold it for a moment longer."""
     for _ in range(PATIENCE):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -239,11 +207,7 @@ def _remove_empty(folders: list[Path]) -> None:
 
 
 def load_head(path: Path) -> dict[str, Any]:
-    """Read a KEY.json or run.json.
-
-    Raises:
-        BadInput: it is missing or no JSON object.
-    """
+    """Read a KEY.json or run.json."""
     try:
         data = json.loads(read_text(path))
     except BadInput:
@@ -263,15 +227,9 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """Which tasks a person means, and those left out because they have no ablation.
+    """The tasks of a list with commas, None for all, and those left out because they have no ablation.
 
-    Args:
-        suite: whose tasks.
-        names: separated by commas; None for all.
-        ablated: whether they need an ablation.
-
-    Raises:
-        BadInput: a task is unknown, or none of them has an ablation.
+    Raises BadInput if a task is unknown, or none of them has an ablation.
     """
     wanted = (
         tuple(suite.tasks)
