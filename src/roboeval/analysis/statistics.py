@@ -12,8 +12,8 @@ import numpy as np
 
 from roboeval.analysis.metrics import Estimate, t_quantile
 
+# Values, those that resemble each other together: a prompt's, or those of all prompts of a task.
 Clusters: TypeAlias = Sequence[Sequence[float]]
-"""Values, those that resemble each other together: a prompt's, or those of all prompts of a task."""
 
 SHARE = (0.0, 1.0)
 DIFFERENCE = (-1.0, 1.0)
@@ -28,19 +28,11 @@ CHUNK = 1_000  # draws that are held at one time
 
 
 def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE, level: float = LEVEL) -> Estimate:
-    """The mean of all values, with an interval that takes clusters as drawn at random.
+    """The mean of all values, with an interval that takes clusters as drawn at random, clipped to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
     clusters with N values, and the interval is Student's t with G - 1 degrees of freedom. Where every cluster
     has one value it is the ordinary interval of a mean. One cluster says nothing about others.
-
-    Args:
-        clusters: each with at least one value.
-        within: what a mean can be at least and at most; the interval is clipped to it.
-        level: how often such intervals shall hold the true mean, between 0 and 1.
-
-    Raises:
-        ValueError: there is no cluster, or an empty one.
     """
     mean, count = _mean(clusters), len(clusters)
     if count == 1:
@@ -66,16 +58,6 @@ def by_bootstrap(
     lies between two percentiles of these means. With few clusters, plain percentiles are too narrow; they are
     moved outwards, as far as Student's t is wider than the normal distribution (Hesterberg's expanded
     percentiles).
-
-    Args:
-        clusters: each with at least one value.
-        within: what a mean can be at least and at most.
-        level: how often such intervals shall hold the true mean, between 0 and 1.
-        seed: of the draws; the same seed gives the same interval.
-        draws: how many.
-
-    Raises:
-        ValueError: there is no cluster, or an empty one.
     """
     mean, count = _mean(clusters), len(clusters)
     if count == 1:
@@ -104,17 +86,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) ->
 
     If neither of two models were better, the differences of a cluster could as well have the other sign, all
     of them together. Up to 20 clusters, all signs are tried, and the answer is exact; else signs are drawn.
-
-    Args:
-        clusters: the differences, clusters of them.
-        seed: of the draws.
-        draws: how many, where they are drawn.
-
-    Returns:
-        a share from 0 to 1; at least 2 / 2**G for G clusters, so that few clusters cannot tell.
-
-    Raises:
-        ValueError: there is no cluster, or an empty one.
+    It is at least 2 / 2**G for G clusters, so that few clusters cannot tell.
     """
     _mean(clusters)
     sums = np.array([math.fsum(values) for values in clusters])
@@ -134,30 +106,18 @@ def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) ->
 
 @dataclass(frozen=True)
 class Needed:
-    """How much it would take to tell two models apart, four times in five.
+    """How much it would take to tell two models apart, four times in five; None where they do not differ."""
 
-    Args:
-        completions: of each model for each of these prompts, if only these prompts matter; None where they
-            do not differ at all.
-        prompts: like these, with as many completions each as now, if other prompts matter as well; None
-            where they do not differ.
-    """
-
-    completions: int | None
-    prompts: int | None
+    completions: int | None  # of each model for each of these prompts, if only these matter
+    prompts: int | None  # like these, with as many completions each, if others matter as well
 
 
 def needed(pairs: Sequence[tuple[float, float]], *, level: float = LEVEL, power: float = POWER) -> Needed:
-    """How many completions or prompts would tell a difference as large as the one that was seen.
+    """How many completions or prompts would tell a difference as large as that between pairs of pass@1.
 
     For n completions a prompt, the difference has the variance (w / n) / m on m given prompts, where w is the
     mean of a (1 - a) + b (1 - b); on m prompts drawn at random it has v / m, where v is the variance of the
     differences between prompts. It is told where it is at least (z(level) + z(power)) standard errors.
-
-    Args:
-        pairs: pass@1 of both models for each prompt, at least one.
-        level: of the interval that shall not hold 0.
-        power: how often it shall not.
     """
     m = len(pairs)
     differences = [b - a for a, b in pairs]

@@ -31,12 +31,7 @@ class RunGoneError(BadInput):
 
 
 class RunStore:
-    """The runs in a folder, for any thread.
-
-    Args:
-        folder: in which they lie, or one that is a run itself; it need not exist yet.
-        suites: by which runs may have been judged, besides those that ship or are installed.
-    """
+    """The runs in a folder, for any thread; the folder may be a run itself, and need not exist yet."""
 
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
@@ -45,31 +40,18 @@ class RunStore:
         self._lock = threading.Lock()
 
     def names(self) -> list[str]:
-        """The names of the runs, sorted.
-
-        Raises:
-            BadInput: the folder cannot be read.
-        """
+        """The names of the runs, sorted."""
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """A run as it is now, or was a moment ago.
+        """A run as it is now, or was a moment ago; raises BadInput if it cannot be read.
 
-        Args:
-            name: of the run.
-            key: of the evaluation; by default the first that requires everything, or none if there is none.
-
-        Raises:
-            BadInput: there is no such run or evaluation, or one of its files cannot be read.
+        The evaluation is by default the first that requires everything, or none if there is none.
         """
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
-        """The version that a run would have if it was opened now; it is not read.
-
-        Raises:
-            BadInput: as `open` does.
-        """
+        """The version that a run would have if it was opened now; it is not read."""
         return self._reader(name, None).version()
 
     def suite(self, name: str) -> Suite | None:

@@ -115,11 +115,7 @@ class RunList:
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
         """What is known of all runs; of one that cannot be read, why.
 
-        Args:
-            seconds: after which no further run is read.
-
-        Raises:
-            BadInput: the folder cannot be read.
+        After so many seconds no further run is read.
         """
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
@@ -169,11 +165,7 @@ def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, An
 
 
 def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A completion in short.
-
-    Args:
-        row: of `Snapshot.completions`.
-    """
+    """A completion in short, from a row of `Snapshot.completions`."""
     failure = {name: row[f"failure_{name}"] for name in ("class", "kind", "world", "check")}
     return {
         **{name: row[name] for name in (*KEY, "passed")},
@@ -187,12 +179,7 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
 def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     """A completion with its program, and with each world's steps, failed checks and explanations.
 
-    Args:
-        run: in which it is.
-        row: of `Snapshot.completions`.
-
-    Raises:
-        BadInput: its row in the file is damaged, or does not stand there any more.
+    Raises BadInput if its row in the file is damaged, or does not stand there any more.
     """
     results = run.results
     key: Key = row["task"], row["prompt"], row["index"]

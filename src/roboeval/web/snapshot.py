@@ -67,19 +67,12 @@ class Filter:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One evaluation of a run as it was last read.
-
-    Args:
-        results: the verdicts; what could not be read is among its faults.
-        evaluations: the names of all evaluations of the run.
-        is_written: whether a process is writing the run.
-        version: differs whenever something has changed.
-    """
+    """One evaluation of a run as it was last read."""
 
     results: Results
-    evaluations: tuple[str, ...]
-    is_written: bool
-    version: Hashable
+    evaluations: tuple[str, ...]  # names of all of the run
+    is_written: bool  # by a process, now
+    version: Hashable  # differs whenever something has changed
 
     @property
     def name(self) -> str:
@@ -139,10 +132,8 @@ class Snapshot:
     def prompts(self, chosen: Filter) -> list[dict[str, Any]]:
         """All prompts in order, and how many of their completions are `written`, `judged` and `counted`.
 
-        `share` is that of the counted ones among the judged; None where none is judged.
-
-        Args:
-            chosen: which completions are counted, of any task and prompt.
+        Those are counted that the filter means, whatever its task and prompt; `share` is theirs of the
+        judged, None where nothing is.
         """
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
