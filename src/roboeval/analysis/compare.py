@@ -23,6 +23,7 @@ from roboeval.analysis.statistics import (
 )
 from roboeval.suites.load import Suite
 
+LEVEL = 0.05  # p values above it tell nothing
 PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
 
 
@@ -93,16 +94,16 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
         yield TaskDifference(task, first, second, (second - first) * n / total, n)
 
 
-def verdict(comparison: Comparison, names: tuple[str, str], *, level: float = 0.05) -> str:
+def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
     """In a sentence, which is better, as far as these prompts can tell."""
     difference = comparison.over_tasks.mean
     if abs(difference) < ROUNDING:
         return f"{names[0]} and {names[1]} pass equally often."
     better, other = (names[1], names[0]) if difference > 0 else names
     by = f"{100 * abs(difference):.1f} points"
-    if comparison.p_tasks <= level:
+    if comparison.p_tasks <= LEVEL:
         return f"{better} is better than {other} by {by}; tasks drawn at random would hardly ever give that."
-    if comparison.p_prompts <= level:
+    if comparison.p_prompts <= LEVEL:
         return (
             f"{better} is better than {other} by {by} on prompts of these tasks; whether it would be "
             f"on other tasks, {len(comparison.tasks)} of them cannot tell."

@@ -8,7 +8,7 @@ are drawn with replacement; the first that is accepted is kept, or the last wher
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,14 +49,11 @@ def chances(trials: Sequence[Trial], retries: int) -> Chances:
     rejected = [trial for trial in trials if not trial.accepted]
     none = (len(rejected) / len(trials)) ** (retries + 1)
 
-    def chance(ends: Iterable[tuple[Sequence[bool], float]]) -> float:
-        return sum(weight * sum(good) / len(good) for good, weight in ends if good)
+    def chance(end: Callable[[Trial], bool]) -> float:
+        kept = (accepted, 1 - none), (rejected, none)
+        return sum(weight * sum(map(end, those)) / len(those) for those, weight in kept if those)
 
-    return Chances(
-        accepted=1 - none,
-        ran=chance((([t.ran for t in accepted], 1 - none), ([t.ran for t in rejected], none))),
-        passed=chance((([t.passed for t in accepted], 1 - none), ([t.passed for t in rejected], none))),
-    )
+    return Chances(1 - none, chance(lambda trial: trial.ran), chance(lambda trial: trial.passed))
 
 
 @dataclass(frozen=True)

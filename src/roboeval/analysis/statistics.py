@@ -18,7 +18,6 @@ Clusters: TypeAlias = Sequence[Sequence[float]]
 SHARE = (0.0, 1.0)
 DIFFERENCE = (-1.0, 1.0)
 SEED = 0
-DRAWS = 10_000
 LEVEL = 0.95
 POWER = 0.8
 FEW = 8  # clusters below which the bootstrap knows too few means, so that its interval is too narrow
@@ -27,7 +26,7 @@ ROUNDING = 1e-12
 CHUNK = 1_000  # draws that are held at one time
 
 
-def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE, level: float = LEVEL) -> Estimate:
+def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Estimate:
     """The mean of all values, with an interval that takes clusters as drawn at random, clipped to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
@@ -40,7 +39,7 @@ def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE, level
     residuals = [math.fsum(value - mean for value in values) for values in clusters]
     size = sum(map(len, clusters))
     variance = count / (count - 1) * math.fsum(r * r for r in residuals) / size**2
-    margin = t_quantile((1 + level) / 2, count - 1) * math.sqrt(variance)
+    margin = t_quantile((1 + LEVEL) / 2, count - 1) * math.sqrt(variance)
     return Estimate(mean, max(within[0], mean - margin), min(within[1], mean + margin))
 
 
@@ -48,9 +47,8 @@ def by_bootstrap(
     clusters: Clusters,
     *,
     within: tuple[float, float] = SHARE,
-    level: float = LEVEL,
     seed: int = SEED,
-    draws: int = DRAWS,
+    draws: int = 10_000,
 ) -> Estimate:
     """The mean of all values, with an interval from clusters drawn again, with replacement.
 
@@ -69,7 +67,7 @@ def by_bootstrap(
     for start in range(0, draws, CHUNK):
         drawn = dice.integers(count, size=(min(CHUNK, draws - start), count))
         means.append(sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1))
-    wider = math.sqrt(count / (count - 1)) * t_quantile((1 + level) / 2, count - 1)
+    wider = math.sqrt(count / (count - 1)) * t_quantile((1 + LEVEL) / 2, count - 1)
     tail = NormalDist().cdf(-wider)
     low, high = np.quantile(np.concatenate(means), [tail, 1 - tail])
     return Estimate(mean, max(within[0], float(low)), min(within[1], float(high)))
@@ -112,7 +110,7 @@ class Needed:
     prompts: int | None  # like these, with as many completions each, if others matter as well
 
 
-def needed(pairs: Sequence[tuple[float, float]], *, level: float = LEVEL, power: float = POWER) -> Needed:
+def needed(pairs: Sequence[tuple[float, float]]) -> Needed:
     """How many completions or prompts would tell a difference as large as that between pairs of pass@1.
 
     For n completions a prompt, the difference has the variance (w / n) / m on m given prompts, where w is the
@@ -125,7 +123,7 @@ def needed(pairs: Sequence[tuple[float, float]], *, level: float = LEVEL, power:
     if abs(mean) < ROUNDING:
         return Needed(None, None)
     normal = NormalDist()
-    factor = ((normal.inv_cdf((1 + level) / 2) + normal.inv_cdf(power)) / mean) ** 2
+    factor = ((normal.inv_cdf((1 + LEVEL) / 2) + normal.inv_cdf(POWER)) / mean) ** 2
     drawn = math.fsum(a * (1 - a) + b * (1 - b) for a, b in pairs) / m
     spread = math.fsum((d - mean) ** 2 for d in differences) / (m - 1) if m > 1 else None
     prompts = None if spread is None else max(2, math.ceil(factor * spread - ROUNDING))

@@ -119,12 +119,10 @@ def judgements(
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
-    if not isinstance(completion, Completion):
+    if not isinstance(completion, Completion):  # but a row, as it stands in a file
         kind = type(completion).__name__
-        raise BadInput(
-            f"a completion is of the type {kind}; "
-            "make it a Completion(task=..., prompt=..., index=..., program=...)"
-        )
+        what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
+        raise BadInput(f"a completion is of the type {kind}; {what}")
     if (problem := unknown(completion.key, suite)) is not None:
         raise BadInput(problem)
     if ablated and suite.tasks[completion.task].ablation is None:

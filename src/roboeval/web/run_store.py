@@ -114,7 +114,12 @@ class _Reader:
             stamps = self._stamps_now()
             is_new = stamps != self._stamps and time.monotonic() >= self._rests_until
             if self._results is None or is_new:
-                self._results, self._stamps = self._timed(stamps), stamps
+                began = time.monotonic()
+                self._results, self._stamps = self._read_files(), stamps
+                ended = time.monotonic()
+                # Faults of files that changed while they were read may be gone by now.
+                mixed = bool(self._results.faults) and self._stamps_now() != stamps
+                self._rests_until = ended + (0 if mixed else REST * (ended - began))
             version = self._version(self._stamps)
             if self._snapshot is None or self._snapshot.version != version:
                 self._snapshot = Snapshot(
@@ -135,16 +140,6 @@ class _Reader:
         within = self._store.folder.resolve()
         paths = (run.completions, run.about, run.rows(key), run.head(key), checks)
         return tuple(_stamp(path, within) for path in paths)
-
-    def _timed(self, stamps: Stamps) -> Results:
-        began = time.monotonic()
-        results = self._read_files()
-        ended = time.monotonic()
-        mixed = (
-            bool(results.faults) and self._stamps_now() != stamps
-        )  # its files changed while they were read
-        self._rests_until = ended + (0 if mixed else REST * (ended - began))
-        return results
 
     def _read_files(self) -> Results:
         faults: list[BadInput] = []

@@ -9,13 +9,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, SupportsIndex, TypeAlias
+from typing import Any, TypeAlias
 
 from codebotler.arguments import expect_text, expect_whole
 from codebotler.badinput import BadInput
 from codebotler.english import counted
 from codebotler.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.models.recorded import recorded_model
+from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
 
 COMPLETIONS = "completions.jsonl"
@@ -127,10 +128,7 @@ def read_completions(
                 _expect_new(completion.key, seen, number)
                 yield completion
         except BadInput as error:
-            fault = BadInput(error.sentence, file=name, line=number)
-            if faults is None:
-                raise fault from None
-            faults.append(fault)
+            add_or_raise(BadInput(error.sentence, file=name, line=number), faults)
     if not seen and faults is None:
         raise BadInput("there is no completion in it", file=name)
 
@@ -139,9 +137,7 @@ def _lines(path: Path, name: Path | str, faults: list[BadInput] | None) -> Itera
     try:
         yield from read_lines(path, name=name)
     except BadInput as error:
-        if faults is None:
-            raise
-        faults.append(error)
+        add_or_raise(error, faults)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
@@ -174,26 +170,13 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
 
 
 def unknown(key: Key, suite: Suite) -> str | None:
-    """What is wrong with a completion's task or prompt; None if the suite knows both.
-
-    Args:
-        key: the completion's, as a row or somebody who writes Python gives it.
-        suite: whose tasks and prompts are known.
-    """
-    task = suite.tasks.get(str(key[0]))
+    """What is wrong with a completion's task or prompt; None if the suite knows both."""
+    task = suite.tasks.get(key[0])
     if task is None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
-    there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
-    if not _is_whole(key[1]):
-        return f"the prompt is {key[1]!r}, not a whole number; {there_are}"
     if not 0 <= key[1] < len(task.prompts):
-        return f"{name_of(key)}: {there_are}"
+        return f"{name_of(key)}: the task has prompts 0 to {len(task.prompts) - 1}"
     return None
-
-
-def _is_whole(number: object) -> bool:
-    """Whether it is a whole number, of any library's kind."""
-    return isinstance(number, SupportsIndex) and not isinstance(number, bool)
 
 
 def name_of(key: Key) -> str:
@@ -212,7 +195,6 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     Raises:
         BadInput: there is no such model or suite, or the model knows none of its instructions.
     """
-    expect_text(name, "the model's name")
     model = recorded_model(name)
     found = False
     for task in suite.tasks.values():

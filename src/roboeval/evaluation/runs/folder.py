@@ -128,7 +128,9 @@ class Run:
         except BaseException:
             if made and list(self.path.iterdir()) == [lock]:
                 lock.unlink()
-                _remove_empty(made)
+                with contextlib.suppress(OSError):
+                    for folder in made:
+                        folder.rmdir()
             raise
         finally:
             os.close(descriptor)
@@ -200,18 +202,11 @@ def _locked(descriptor: int) -> bool:
     return False
 
 
-def _remove_empty(folders: list[Path]) -> None:
-    with contextlib.suppress(OSError):
-        for folder in folders:
-            folder.rmdir()
-
-
 def load_head(path: Path) -> dict[str, Any]:
     """Read a KEY.json or run.json."""
+    text = read_text(path)
     try:
-        data = json.loads(read_text(path))
-    except BadInput:
-        raise
+        data = json.loads(text)
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):

@@ -18,7 +18,7 @@ from codebotler.badinput import BadInput
 from codebotler.files import read_rows
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
-from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, read_lines_of
+from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, add_or_raise, read_lines_of
 from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
@@ -224,9 +224,7 @@ def _head(path: Path, faults: list[BadInput] | None) -> Mapping[str, Any]:
     try:
         return load_head(path)
     except BadInput as error:
-        if faults is None:
-            raise
-        faults.append(error)
+        add_or_raise(error, faults)
         return {}
 
 
@@ -284,7 +282,5 @@ def _accepted(run: Run, key: str | None, faults: list[BadInput] | None) -> Mappi
         for _, row in read_rows(path, growing=True):
             accepted[row["task"], row["program_sha256"]] = not row["problems"]
     except BadInput as error:
-        if faults is None:
-            raise
-        faults.append(error)
+        add_or_raise(error, faults)
     return accepted

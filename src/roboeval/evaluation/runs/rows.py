@@ -64,6 +64,13 @@ class Row(Judgement):
 RowData: TypeAlias = Mapping[str, Any]  # a row of an evaluation, or a part of one, as JSON has it
 
 
+def add_or_raise(fault: BadInput, faults: list[BadInput] | None) -> None:
+    """Add a fault to those that are collected; raise it where none are."""
+    if faults is None:
+        raise fault from None
+    faults.append(fault)
+
+
 def key_of(row: RowData) -> tuple[str, int, int]:
     """The task, prompt and index of a row."""
     return row["task"], row["prompt"], row["index"]
@@ -208,17 +215,10 @@ def read_lines_of(
         except BadInput as error:
             if not line.endswith(b"\n"):
                 break
-            fault = BadInput(f"{error.sentence}; --redo starts over", file=path, line=number)
-            if faults is None:
-                raise fault from None
-            faults.append(fault)
+            add_or_raise(BadInput(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
         at += len(line)
-    if seal.is_broken(head):
-        broken = BadInput(f"{BROKEN}; --redo starts over", file=path)
-        if faults is None:
-            raise broken
-        if not faults:
-            faults.append(broken)
+    if seal.is_broken(head) and not faults:
+        add_or_raise(BadInput(f"{BROKEN}; --redo starts over", file=path), faults)
 
 
 # --- the seal of a finished file
