@@ -68,10 +68,7 @@ def coming_back(results: Results) -> pl.DataFrame:
 
 
 def never_returned(row: RowData, suite: Suite) -> bool:
-    """Whether, in the world that decided, the robot left the room where it started and never went back.
-
-    Where the suite no longer has the world, or the trace was too long to be kept, the answer is no.
-    """
+    """Whether, in the world that decided, the robot left its first room for good; False if nobody knows."""
     task = suite.tasks.get(row["task"])
     number = row["failure"]["world"]
     scenarios = () if task is None else task.scenarios

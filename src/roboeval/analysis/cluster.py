@@ -136,11 +136,7 @@ def cluster_data(cluster: Cluster) -> dict[str, Any]:
 
 
 def shape(program: str) -> Lines:
-    """The lines of a program without comments, with the names that it chose replaced by numbers.
-
-    Two programs of one shape differ in nothing but names, comments and layout. Of a text that is no Python,
-    and of a very long one, the lines are taken as they stand.
-    """
+    """The lines of a program, alike for those that differ in names, comments and layout only."""
     tree = parsed(program) if len(program) <= LONGEST else None
     if not isinstance(tree, ast.Module):
         return _lines(program)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import polars as pl
@@ -39,10 +39,7 @@ class Chances:
 
 
 def chances(trials: Sequence[Trial], retries: int) -> Chances:
-    """What is to be expected of a prompt, exactly; raises ValueError without completions.
-
-    Each completion is drawn as often as any other, and again; a rejected one so many times at most.
-    """
+    """What is to be expected of a prompt, exactly, where each completion is drawn as often as any other."""
     if not trials or retries < 0:
         raise ValueError(f"there is nothing to expect of {len(trials)} completions and {retries} retries")
     accepted = [trial for trial in trials if trial.accepted]
@@ -66,11 +63,8 @@ class CheckedPrompt:
 
 
 def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
-    """The completions of each prompt as the check and the judge see them, in the order of tasks and prompts.
-
-    All programs of the table were checked. A completion runs if it ends without an error in every world; one
-    that waits where it may wait for ever has not erred.
-    """
+    """The completions of each prompt, all of them checked, in the order of tasks and prompts."""
+    # One that waits where it may wait for ever has not erred: there the requirements were looked at.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
     completions = table.group_by("task", "prompt", "index", maintain_order=True).agg(
         pl.col("accepted").first(),
@@ -125,7 +119,7 @@ def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[
         "limits": [
             {
                 "retries": limit.retries,
-                "pass@1": {"mean": limit.passed.mean, "low": limit.passed.low, "high": limit.passed.high},
+                "pass@1": asdict(limit.passed),
                 "accepted": limit.accepted,
                 "ran": limit.ran,
                 "prompts_at_least": {str(t): share for t, share in limit.prompts.items()},

@@ -13,6 +13,7 @@ from codebotler.rtl import CannotJudge, Formula, holds, parse
 from codebotler.trace import Trace
 from codebotler.tracefile import trace_from
 from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.rows import key_of
 
 BATCH = 100  # rows that a process looks through at a time
 SMALL = 20  # batches for which other processes are not worth their start
@@ -43,7 +44,8 @@ class Search:
 
     def __init__(self, question: Question, *, workers: int = 1) -> None:
         self._question, self._workers = question, workers
-        self._formula = None if question.formula is None else parse(question.formula)
+        if question.formula is not None:
+            parse(question.formula)  # a wrong one is refused before anything is read
         self._lines: list[bytes] = []
         self._pool: ProcessPoolExecutor | None = None
         self._waiting: list[Future[list[Found]]] = []
@@ -64,7 +66,7 @@ class Search:
     def found(self) -> Iterator[Found]:
         """The answers, in the order of the rows; ends the processes."""
         if self._pool is None:
-            yield from (answer(json.loads(line), self._question, self._formula) for line in self._lines)
+            yield from look_through(self._lines, self._question)
             return
         with self._pool:
             self._waiting.append(self._pool.submit(look_through, self._lines, self._question))
@@ -86,8 +88,7 @@ def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) 
             undecided.append((number, verdict["world"]))
         elif formula is None or _holds(formula, verdict["trace"]) != question.negated:
             worlds.append((number, verdict["world"]))
-    key = row["task"], row["prompt"], row["index"]
-    return Found(key, row["passed"], tuple(worlds), tuple(undecided))
+    return Found(key_of(row), row["passed"], tuple(worlds), tuple(undecided))
 
 
 def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Mapping[str, Any]]]:
@@ -100,9 +101,8 @@ def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Ma
 
 
 def _holds(formula: Formula, data: Iterable[object]) -> bool:
-    trace: Trace = _driven(trace_from(data, further=True))
     try:
-        return holds(formula, trace)
+        return holds(formula, _driven(trace_from(data, further=True)))
     except CannotJudge:
         return False
 

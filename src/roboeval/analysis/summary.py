@@ -150,7 +150,7 @@ def summary_data(summary: Summary) -> dict[str, Any]:
         "judged": judged_count(summary.prompts),
         "to_judge": summary.scope.total,
         **_counts(summary.prompts),
-        **{f"pass@{k}": {"mean": e.mean, "low": e.low, "high": e.high} for k, e in estimates},
+        **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
         "tasks": [_task_score_data(task, summary.k) for task in summary.tasks],
         "failures": [
             {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}

@@ -117,10 +117,7 @@ class Overtaking:
 
 
 def overtakings(found: Sequence[VerdictChanges]) -> list[Overtaking]:
-    """All pairs of runs that stand in another order under the second suite, or are tied under one only.
-
-    Where they are not judged on the same prompts, neither are their means.
-    """
+    """All pairs of runs that the suites put in another order, or of which one suite only has a tie."""
     pairs = (_overtaking(one, other) for one, other in combinations(found, 2))
     return [told for told in pairs if _sign(told.first) != _sign(told.second)]
 

@@ -24,10 +24,9 @@ ProgramKey: TypeAlias = tuple[str, str]  # a task and the hash of a program
 def check_programs(
     run: Run, suite: Suite, completions: Iterable[Completion], engine: OpenEngine, *, samples: int, seed: int
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Yield the problems of each program, checking those whose problems the run does not know.
+    """Yield the problems of each program, checking those that nobody has checked with these settings.
 
-    Of the world, a check knows the rooms: those of the first world of the task. Problems that were found with
-    other settings, or by another version, are forgotten.
+    Of the world, a check knows the rooms: those of the first world of the task.
     """
     metadata = {
         "suite": suite.name,

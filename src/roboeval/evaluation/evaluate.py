@@ -31,10 +31,7 @@ def evaluate_run(
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,  # those of the run, if they were read before
 ) -> Iterator[JudgedRow]:
-    """Judge a run's completions, going on where an earlier evaluation stopped; yield all rows in order.
-
-    Raises BadInput if the run is being written, was judged otherwise, or holds other completions than it did.
-    """
+    """Judge a run's completions, going on where an earlier evaluation stopped; yield all rows in order."""
     key = evaluation_key(suite, ablated=ablated)
     chosen = engine or Local(workers, require_isolation=require_isolation)
     with run.writing():

@@ -75,11 +75,7 @@ def generate_run(
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
-    """Request the completions that a run still lacks; each is on the disk before it counts. Closes the model.
-
-    Raises BadInput if another process writes the run, or its completions were generated otherwise, and
-    ModelError if there was no reply at all.
-    """
+    """Request the completions that a run lacks, each on the disk before it counts; close the model."""
     with run.writing():
         metadata = run_metadata(run, plan, model.name, settings)
         with contextlib.closing(Appender(run.completions)) as file:

@@ -151,11 +151,10 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
 
 def evaluation(completion: Completion, told: Judgement) -> Row:
     """The row of an evaluation."""
-    task, prompt, index = completion.key
     return {
-        "task": task,
-        "prompt": prompt,
-        "index": index,
+        "task": completion.task,
+        "prompt": completion.prompt,
+        "index": completion.index,
         "program_sha256": completion.program_sha256,
         **told,
     }
@@ -202,11 +201,7 @@ def head(suite: Suite) -> dict[str, Any]:
             "people": rules.people,
             **{name: list(words) for name in WORDS if (words := getattr(rules, name))},
             **({"events": rules.events} if rules.events != PAPER.events else {}),
-            "limits": {
-                "seconds": rules.limits.seconds,
-                "calls": rules.limits.calls,
-                "ticks": rules.limits.ticks,
-            },
+            "limits": {name: getattr(rules.limits, name) for name in ("seconds", "calls", "ticks")},
             "skill_seconds": 0,
             "clock_starts": rules.clock_starts.isoformat(),
         },
@@ -227,11 +222,8 @@ class TimeLimitExceeded(Exception):  # noqa: N818 - no mistake of the caller
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Limit the processor time of the block, in seconds of this thread, if it is the main one.
-
-    Only the main thread can be interrupted in the search for a regex: elsewhere there is no limit.
-    """
-    if threading.current_thread() is not threading.main_thread():
+    """Limit the processor time of the block, in seconds of this thread, if it is the main one."""
+    if threading.current_thread() is not threading.main_thread():  # which alone can be interrupted
         yield
         return
     end = time.thread_time() + seconds

@@ -68,10 +68,7 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 
 
 def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: Settings) -> dict[str, Any]:
-    """The content of run.json, whose earlier one is taken over where the run goes on.
-
-    Raises BadInput if the completions were generated with another model or other settings.
-    """
+    """The content of run.json; raises BadInput where completions are there that were generated otherwise."""
     fixed = {
         "model": model,
         "settings": {name: value for name, value in asdict(settings).items() if name not in WITHOUT_EFFECT},

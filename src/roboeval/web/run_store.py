@@ -44,10 +44,7 @@ class RunStore:
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """A run as it is now, or was a moment ago; raises BadInput if it cannot be read.
-
-        The evaluation is by default the first that requires everything, or none if there is none.
-        """
+        """A run as it is now, or was a moment ago; its first evaluation that is not ablated, unless named."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:

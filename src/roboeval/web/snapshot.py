@@ -130,18 +130,14 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: Filter) -> list[dict[str, Any]]:
-        """All prompts in order, and how many of their completions are `written`, `judged` and `counted`.
-
-        Those are counted that the filter means, whatever its task and prompt; `share` is theirs of the
-        judged, None where nothing is.
-        """
+        """All prompts with how many completions are `written`, `judged` and `counted`: meant by a filter."""
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
             written=pl.col("written").sum(),
             judged=pl.col("passed").count(),
-            counted=chosen.verdict.condition.sum(),
+            counted=chosen.verdict.condition.sum(),  # whatever its task and prompt
         )
-        share = pl.col("counted") / pl.when(judged > 0).then(judged)
+        share = pl.col("counted") / pl.when(judged > 0).then(judged)  # null where nothing was judged
         return counts.with_columns(share=share).to_dicts()
 
     @property

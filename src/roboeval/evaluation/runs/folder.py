@@ -7,7 +7,7 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -168,7 +168,11 @@ class Run:
         lines = (to_line(completion.row) for completion in completions)
         with self.writing():
             if self.completions.exists():
-                self._expect(lines)
+                with self.completions.open("rb") as file:
+                    same = all(file.read(len(line)) == line for line in lines)
+                    if not same or file.read(1):
+                        other = "this run holds other completions; name another folder"
+                        raise BadInput(other, file=self.path)
                 return
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
             write_whole(self.about, to_text(about))
@@ -178,12 +182,6 @@ class Run:
             except BaseException:
                 self.about.unlink()
                 raise
-
-    def _expect(self, lines: Iterable[bytes]) -> None:
-        with self.completions.open("rb") as file:
-            same = all(file.read(len(line)) == line for line in lines)
-            if not same or file.read(1):
-                raise BadInput("this run holds other completions; name another folder", file=self.path)
 
 
 PATIENCE = 20  # times that a lock is tried
@@ -222,10 +220,7 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """The tasks of a list with commas, None for all, and those left out because they have no ablation.
-
-    Raises BadInput if a task is unknown, or none of them has an ablation.
-    """
+    """The tasks of a list with commas, None for all, and those left out as they have no ablation."""
     wanted = (
         tuple(suite.tasks)
         if names is None

@@ -185,10 +185,7 @@ def read_results(
     see: Callable[[bytes], None] | None = None,  # gets the line of each row
     watch: Callable[[Iterator[Line], int], Iterable[Line]] = lambda lines, _: lines,  # gets the total, too
 ) -> Results:
-    """Read an evaluation of a run, each of its files once; raises BadInput if one is missing or damaged.
-
-    With `faults`, what is wrong with files and lines is added to these, and the rest is read.
-    """
+    """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
     head = {} if key is None else _head(run.head(key), faults)
     about = _head(run.about, faults) if run.about.exists() else {}
     tasks = selected_tasks(head, run.head(key or ""))
@@ -229,10 +226,7 @@ def _head(path: Path, faults: list[BadInput] | None) -> Mapping[str, Any]:
 
 
 class FailedRows(Mapping[Key, RowData]):
-    """The rows of completions that failed; of the verdicts only the deciding one is whole.
-
-    Most are never looked at, so that each is kept as it was read until somebody asks for it.
-    """
+    """The rows of completions that failed, of the verdicts only the deciding one; decoded when asked for."""
 
     def __init__(self) -> None:
         self._kept: dict[Key, tuple[JudgedRow, bytes]] = {}

@@ -197,11 +197,7 @@ def read_lines_of(
     see: Callable[[bytes], None] | None = None,
     faults: list[BadInput] | None = None,
 ) -> Iterator[Line]:
-    """Read an evaluation, once and in order; a torn last line is passed over.
-
-    Raises BadInput if the file is missing, a line is no row, or, once all were read, they are others than
-    those of the finished evaluation. With `faults`, what is wrong is added to these instead.
-    """
+    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
     seal = seal or Seal()
     at = 0
     for number, line in read_lines(path, limit=LONGEST_LINE):
@@ -253,11 +249,7 @@ def is_sealed(head: Mapping[str, Any]) -> bool:
 
 
 def bounded(judgement: Judgement) -> Judgement:
-    """A judgement that fits into a row: a longer one with its traces cut.
-
-    Each world has an equal share of the bytes. Of a trace that takes more, `cut` says how many events are
-    left out, and the SHA-256 of the JSON of all of it.
-    """
+    """A judgement that fits into a row: of a longer one each world has an equal share, and traces are cut."""
     verdicts = judgement["verdicts"]
     most = max(MOST, MOST_OF_WORLD * len(verdicts)) - NAMES
     if not verdicts or len(to_line(judgement)) <= most:

@@ -171,17 +171,14 @@ def kind_of(path: Path | None) -> str:
 
 
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
-    """Write a table to a file as csv or parquet; the same table gives the same bytes.
-
-    A spreadsheet takes a cell that starts with =, +, -, @, a tab or a line end for a formula, and texts here
-    come from models. So in CSV such a text gets a ' in front, as OWASP advises; parquet holds it as it is.
-    """
+    """Write a table to a file as csv or parquet; the same table gives the same bytes."""
     if kind not in FORMATS:
         raise BadInput(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
     if not path.parent.is_dir():
         raise BadInput("there is no such folder", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
+        # A spreadsheet takes a cell that begins so for a formula; OWASP advises the ' in front.
         frame.with_columns(pl.col(pl.String).str.replace(r"^([=+\-@\t\r\n])", "'${1}")).write_csv(content)
     else:
         frame.write_parquet(content)
