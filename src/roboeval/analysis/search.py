@@ -40,7 +40,7 @@ class Found:
 
 
 class Search:
-    """Tries a formula on rows while they are read, in so many processes where there are many rows."""
+    """Tries a formula on rows while they are read; where there are many, in `workers` processes."""
 
     def __init__(self, question: Question, *, workers: int = 1) -> None:
         self._question, self._workers = question, workers

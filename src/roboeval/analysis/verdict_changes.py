@@ -173,7 +173,8 @@ HOW_OFTEN = {1: "more often than", 0: "as often as", -1: "less often than"}
 def said_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
     """A warning where runs are about different prompts."""
     asked = {frozenset((task.task, task.prompts) for task in one.comparison.tasks) for one in found}
-    return ["Not all runs are about the same prompts, on which their order may rest."][: len(asked) - 1]
+    warning = "Not all runs are about the same prompts, on which their order may rest."
+    return [warning] if len(asked) > 1 else []
 
 
 # --- for machines

@@ -34,7 +34,7 @@ OpenEngine = AbstractContextManager[Engine]
 
 
 class Local:
-    """The cores of this machine: worker processes of its own, ended with the context, or given ones, kept."""
+    """The cores of this machine: given lanes, or some of its own, which end with the context."""
 
     def __init__(self, lanes: Lanes | int, *, require_isolation: bool = False) -> None:
         if not isinstance(lanes, Lanes):

@@ -19,6 +19,7 @@ from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 
 KEY = ("task", "prompt", "index")
+# How a program did in a world: + satisfied, - not, ! ended by an error.
 SIGN = (
     pl.when("satisfied")
     .then(pl.lit("+"))
@@ -26,8 +27,6 @@ SIGN = (
     .then(pl.lit("-"))
     .otherwise(pl.lit("!"))
 )
-"""How a program did in a world: + satisfied, - not, ! ended by an error."""
-
 MOST = 2**63
 
 

@@ -226,7 +226,7 @@ def _head(path: Path, faults: list[BadInput] | None) -> Mapping[str, Any]:
 
 
 class FailedRows(Mapping[Key, RowData]):
-    """The rows of completions that failed, of the verdicts only the deciding one; decoded when asked for."""
+    """Rows of completions that failed, with the deciding verdict only, decoded on demand."""
 
     def __init__(self) -> None:
         self._kept: dict[Key, tuple[JudgedRow, bytes]] = {}
