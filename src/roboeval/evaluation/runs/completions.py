@@ -122,22 +122,18 @@ def read_completions(
     path = Path(path)
     name = name or path
     seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
-    for number, line in _lines(path, name, faults):
-        try:
-            if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
-                _expect_new(completion.key, seen, number)
-                yield completion
-        except BadInput as error:
-            add_or_raise(BadInput(error.sentence, file=name, line=number), faults)
-    if not seen and faults is None:
-        raise BadInput("there is no completion in it", file=name)
-
-
-def _lines(path: Path, name: Path | str, faults: list[BadInput] | None) -> Iterator[tuple[int, bytes]]:
     try:
-        yield from read_lines(path, name=name)
+        for number, line in read_lines(path, name=name):
+            try:
+                if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
+                    _expect_new(completion.key, seen, number)
+                    yield completion
+            except BadInput as error:
+                add_or_raise(BadInput(error.sentence, file=name, line=number), faults)
     except BadInput as error:
         add_or_raise(error, faults)
+    if not seen and faults is None:
+        raise BadInput("there is no completion in it", file=name)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
