@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, SupportsIndex, TypeAlias
 
 from codebotler.arguments import expect_text, expect_whole
 from codebotler.badinput import BadInput
@@ -166,13 +166,15 @@ def check_length(row: Mapping[str, Any], file: object, line: int | None = None) 
 
 
 def unknown(key: Key, suite: Suite) -> str | None:
-    """What is wrong with a completion's task or prompt; None if the suite knows both."""
-    task = suite.tasks.get(key[0])
+    """What is wrong with a completion's task or prompt, as a user of Python may give it; None if nothing."""
+    task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
-    if not 0 <= key[1] < len(task.prompts):
-        return f"{name_of(key)}: the task has prompts 0 to {len(task.prompts) - 1}"
-    return None
+    there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
+    prompt: object = key[1]
+    if isinstance(prompt, bool) or not isinstance(prompt, SupportsIndex):  # numbers of NumPy are right
+        return f"the prompt is {prompt!r}, not a whole number; {there_are}"
+    return None if 0 <= key[1] < len(task.prompts) else f"{name_of(key)}: {there_are}"
 
 
 def name_of(key: Key) -> str:
