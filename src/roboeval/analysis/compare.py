@@ -23,7 +23,7 @@ from roboeval.analysis.statistics import (
 )
 from roboeval.suites.load import Suite
 
-LEVEL = 0.05  # p values above it tell nothing
+LEVEL = 0.05  # a larger p may well be chance
 PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
 
 

@@ -63,7 +63,7 @@ class CheckedPrompt:
 
 
 def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
-    """The completions of each prompt, all of them checked, in the order of tasks and prompts."""
+    """The completions of each prompt, which were all checked, in the order of tasks and prompts."""
     # One that waits where it may wait for ever has not erred: there the requirements were looked at.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
     completions = table.group_by("task", "prompt", "index", maintain_order=True).agg(

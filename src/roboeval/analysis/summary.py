@@ -88,7 +88,7 @@ def _missing(tasks: Sequence[str], scope: Scope) -> Missing:
 
 
 def failures(table: pl.DataFrame) -> tuple[Failures, ...]:
-    """How many of at least one completion failed by each class and kind (paper, section V.B)."""
+    """How many completions, of one or more, failed by each class and kind (paper, section V.B)."""
     completions = completions_of(table)
     counted = completions.drop_nulls("failure_class").group_by("failure_class", "failure_kind").len()
     failed: dict[str, Counter[str]] = defaultdict(Counter)
@@ -119,7 +119,7 @@ class Causes:
 
 
 def causes(table: pl.DataFrame) -> Causes:
-    """How the completions of a run, at least one, ended (paper, section V.B)."""
+    """How the completions of a run, one or more, ended (paper, section V.B)."""
     found = failures(table)
     failed = sum(one.count for one in found)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}

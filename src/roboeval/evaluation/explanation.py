@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache, partial
 from typing import Any
 
@@ -12,7 +12,6 @@ from codebotler.simulator.robot import located, resolve_room
 from codebotler.storyboard import steps_of
 from codebotler.trace import Event, Trace
 from codebotler.tracefile import trace_from
-from codebotler.world import World
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite
 
@@ -87,19 +86,16 @@ def _trace(verdict: Mapping[str, Any], scenario: Scenario | None) -> Trace:
 
 def _world_data(verdict: Mapping[str, Any], scenario: Scenario | None, patience: Patience) -> dict[str, Any]:
     trace, cut = _trace(verdict, scenario), verdict.get("cut")
+    names = [] if scenario is None else [room.name for room in scenario.world.rooms]
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
-        "steps": steps_of(trace, None if scenario is None else _rooms_of(scenario.world)),
+        "steps": steps_of(trace, None if scenario is None else cache(partial(resolve_room, names))),
         **({} if cut is None else {"cut": cut}),
         "failed_checks": [
             {"check": check, **_explained(check, scenario, trace, patience, cut)}
             for check in verdict["failed_checks"]
         ],
     }
-
-
-def _rooms_of(world: World) -> Callable[[str], str | None]:
-    return cache(partial(resolve_room, [room.name for room in world.rooms]))
 
 
 def _explained(

@@ -119,7 +119,7 @@ def judgements(
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
-    if not isinstance(completion, Completion):  # but a row, as it stands in a file
+    if not isinstance(completion, Completion):  # such as a row of a file
         kind = type(completion).__name__
         what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
         raise BadInput(f"a completion is of the type {kind}; {what}")

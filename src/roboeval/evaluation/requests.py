@@ -130,7 +130,7 @@ class RequestLog:
     interruption at any moment has none counted twice. The file goes when a run ends in order.
     """
 
-    def __init__(self, path: Path, done: set[Key], lost: int) -> None:  # as many as run.json knows of
+    def __init__(self, path: Path, done: set[Key], lost: int) -> None:  # `lost` as run.json has it
         self.path = path
         earlier, noted = self._read()
         self.interrupted = len(noted - done)  # at the last interruption

@@ -22,7 +22,7 @@ from roboeval.evaluation.judge import is_met, may_satisfy
 from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite
 
-ERRED = 0.5  # of what a run did before an error remains: it had better returned at that line
+ERRED = 0.5  # the part of what a run did before an error that counts: it had better returned there
 
 REMEMBERED = 100_000  # rewards; a policy that learns writes the same program again and again
 

@@ -138,10 +138,9 @@ class Run:
     @property
     def is_being_written(self) -> bool:
         """Whether a process writes it. Our hold lasts a moment, for which a writer has patience."""
+        flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
-            descriptor = os.open(
-                self.path / ".lock", os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-            )
+            descriptor = os.open(self.path / ".lock", flags)
         except OSError:
             return False
         try:
@@ -189,7 +188,7 @@ PAUSE = 0.05  # seconds between two
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock a file; a process that is being killed may hold it for a moment longer."""
+    """Lock a file; children of a process that was killed may hold it for a moment longer."""
     for _ in range(PATIENCE):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -221,11 +220,7 @@ def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
     """The tasks of a list with commas, None for all, and those left out as they have no ablation."""
-    wanted = (
-        tuple(suite.tasks)
-        if names is None
-        else tuple(suite.task(name.strip()).name for name in names.split(","))
-    )
+    wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()
     left = tuple(name for name in wanted if suite.tasks[name].ablation is None)
