@@ -129,7 +129,7 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: Filter) -> list[dict[str, Any]]:
-        """All prompts, with how many completions are `written`, `judged` and `counted` (meant by a filter)."""
+        """All prompts, and how many completions are `written`, `judged` and `counted` (meant by a filter)."""
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
             written=pl.col("written").sum(),
