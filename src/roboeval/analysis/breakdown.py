@@ -21,13 +21,8 @@ LOST = "GoToInvalidLocation"
 def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Estimate, Mapping[str, float]]]:
     """How programs do, by the abilities that tasks take (paper, section V.B).
 
-    Args:
-        table: as `load_results` gives it.
-        suite: whose tasks say what they take.
-
-    Yields:
-        an ability, how many of the judged tasks take it, their pass@1 with its interval over tasks, and the
-        share of their completions that fail, by class.
+    Yields an ability, how many of the judged tasks take it, their pass@1 with its interval over tasks, and
+    the share of their completions that fail, by class.
     """
     scores = {one.task: [p.pass_at(1) for p in one.prompts] for one in task_scores(table, suite.tasks)}
     counted = completions_of(table).group_by("task", "failure_class").len()
@@ -43,14 +38,10 @@ def by_ability(table: pl.DataFrame, suite: Suite) -> Iterator[tuple[str, int, Es
 def coming_back(results: Results) -> pl.DataFrame:
     """How programs do in tasks with "come back and tell me", and in the others (paper, section V.B).
 
-    Args:
-        results: by a suite that is at hand.
-
-    Returns:
-        two rows, or one where all tasks are of one kind, or none where no task asks for a report: whether
-        the tasks end with `reports`, how many `completions` there are, their `pass@1`, how many `failed`,
-        and of these how many left the room where they started and `never_returned`, and how many went to a
-        room that does not exist (`lost`).
+    A row for each kind of task that was judged, none where no task asks for a report: whether the task ends
+    with `reports`, how many `completions` there are, their `pass@1`, how many `failed`, how many of these
+    left the room where they started and `never_returned`, and how many went to a room that does not exist
+    (`lost`).
     """
     suite = results.suite
     assert suite is not None, "its tasks say which ask for a report"
@@ -77,13 +68,7 @@ def coming_back(results: Results) -> pl.DataFrame:
 
 
 def never_returned(row: RowData, suite: Suite) -> bool:
-    """Whether, in the world that decided, the robot left the room where it started and never went back.
-
-    Args:
-        row: of a completion that failed.
-        suite: whose worlds have the rooms; where it has the world no more, the answer is no, as it is where
-            the trace was too long to be kept.
-    """
+    """Whether, in the world that decided, the robot left its first room for good; False if nobody knows."""
     task = suite.tasks.get(row["task"])
     number = row["failure"]["world"]
     scenarios = () if task is None else task.scenarios
@@ -100,12 +85,8 @@ def never_returned(row: RowData, suite: Suite) -> bool:
 def spread(table: pl.DataFrame) -> pl.DataFrame:
     """How far the prompts of each task lie apart (paper, section V.A); tasks with one are left out.
 
-    Args:
-        table: as `load_results` gives it.
-
-    Returns:
-        `task`, `spread` of pass@1, `worst_prompt` with its pass@1 `worst`, `best_prompt` with its `best`; of
-        several prompts that do alike the first.
+    Columns `task`, `spread` of pass@1, `worst_prompt` with its pass@1 `worst`, `best_prompt` with its
+    `best`; of several prompts that do alike the first.
     """
     prompt, score = pl.col("prompt"), pl.col("pass@1")
     return (
@@ -126,12 +107,8 @@ def spread(table: pl.DataFrame) -> pl.DataFrame:
 def phrasing(scores: pl.DataFrame) -> pl.DataFrame:
     """How each prompt does beside the others of its task (paper, section V.A).
 
-    Args:
-        scores: `model`, `task`, `prompt` and `pass@1` of one run or of several.
-
-    Returns:
-        `task`, `prompt`, by how much it does `better` than its task on average, how many of the `models` it
-        `hurts`; prompts that are alone in their task are left out.
+    Of `model`, `task`, `prompt` and `pass@1`: by how much a prompt does `better` than its task on average,
+    and how many of the `models` it `hurts`. Prompts that are alone in their task are left out.
     """
     several = scores.filter(pl.col("prompt").n_unique().over("task") > 1)
     means = several.group_by("model", "task").agg("pass@1").with_columns(mean=pl.col("pass@1").list.mean())

@@ -23,27 +23,19 @@ from roboeval.analysis.statistics import (
 )
 from roboeval.suites.load import Suite
 
-PromptScores = Mapping[tuple[str, int], float]
-"""pass@1 by task and prompt."""
+LEVEL = 0.05  # a larger p may well be chance
+PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
 
 
 @dataclass(frozen=True)
 class TaskDifference:
-    """How two models differ in one task.
-
-    Args:
-        task: its name.
-        first: the mean pass@1 of the first over the prompts that both have.
-        second: the same of the second.
-        share: what the task adds to the difference over all prompts.
-        prompts: how many prompts both have.
-    """
+    """How two models differ in one task."""
 
     task: str
-    first: float
+    first: float  # mean pass@1 over the prompts that both have
     second: float
-    share: float
-    prompts: int
+    share: float  # of the difference over all prompts
+    prompts: int  # that both have
 
     @property
     def difference(self) -> float:
@@ -53,45 +45,23 @@ class TaskDifference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """How two models differ, the second minus the first, over the prompts that both have.
+    """How two models differ, the second minus the first, over the prompts that both have."""
 
-    Args:
-        first: the mean pass@1 of the first.
-        second: the same of the second.
-        prompts: how many prompts both have.
-        left_out: how many prompts only one has.
-        over_prompts: the difference with its interval where prompts are drawn at random.
-        over_tasks: with its interval where tasks are.
-        bootstrap: the same by drawing tasks again.
-        p_prompts: how often signs drawn for each prompt give a difference as large.
-        p_tasks: the same with one sign for all prompts of a task.
-        needed: how much it would take to tell.
-        tasks: those that made the difference first.
-    """
-
-    first: float
+    first: float  # mean pass@1
     second: float
-    prompts: int
-    left_out: int
-    over_prompts: Estimate
-    over_tasks: Estimate
-    bootstrap: Estimate
-    p_prompts: float
-    p_tasks: float
+    prompts: int  # that both have
+    left_out: int  # prompts that only one has
+    over_prompts: Estimate  # the difference, with prompts drawn at random
+    over_tasks: Estimate  # with tasks drawn at random
+    bootstrap: Estimate  # the same by drawing tasks again
+    p_prompts: float  # how often signs drawn for each prompt give a difference as large
+    p_tasks: float  # the same with one sign for each task
     needed: Needed
-    tasks: tuple[TaskDifference, ...]
+    tasks: tuple[TaskDifference, ...]  # those that made the difference first
 
 
 def compared(first: PromptScores, second: PromptScores) -> Comparison:
-    """Compare two models prompt by prompt.
-
-    Args:
-        first: pass@1 of the one.
-        second: pass@1 of the other.
-
-    Raises:
-        BadInput: there is no prompt that both have.
-    """
+    """Compare two models prompt by prompt; raises BadInput if they have none in common."""
     keys = [key for key in first if key in second]
     if not keys:
         raise BadInput("the runs have no prompt in common, so there is nothing to compare")
@@ -124,16 +94,16 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
         yield TaskDifference(task, first, second, (second - first) * n / total, n)
 
 
-def verdict(comparison: Comparison, names: tuple[str, str], *, level: float = 0.05) -> str:
+def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
     """In a sentence, which is better, as far as these prompts can tell."""
     difference = comparison.over_tasks.mean
     if abs(difference) < ROUNDING:
         return f"{names[0]} and {names[1]} pass equally often."
     better, other = (names[1], names[0]) if difference > 0 else names
     by = f"{100 * abs(difference):.1f} points"
-    if comparison.p_tasks <= level:
+    if comparison.p_tasks <= LEVEL:
         return f"{better} is better than {other} by {by}; tasks drawn at random would hardly ever give that."
-    if comparison.p_prompts <= level:
+    if comparison.p_prompts <= LEVEL:
         return (
             f"{better} is better than {other} by {by} on prompts of these tasks; whether it would be "
             f"on other tasks, {len(comparison.tasks)} of them cannot tell."
@@ -142,12 +112,12 @@ def verdict(comparison: Comparison, names: tuple[str, str], *, level: float = 0.
 
 
 def told_of(about: Mapping[str, Any], head: Mapping[str, Any]) -> dict[str, Any]:
-    """What run.json says of how completions were asked for, and KEY.json of how they were judged."""
+    """How completions were asked for, of a run.json, and judged, of a KEY.json."""
     return {**about, **{name: head.get(name) for name in ("python", "codebotler")}}
 
 
 def unlike(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
-    """What two runs differ in that may explain a difference beside the model."""
+    """What differs between two runs, other than the model, and may explain a difference."""
     told = []
     for name, words in WORDS.items():
         a, b = first.get(name), second.get(name)
@@ -175,11 +145,7 @@ def _said(value: object) -> str:
 
 
 def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, again: Mapping[str, str]) -> None:
-    """Refuse runs that were judged by suites of different content.
-
-    Raises:
-        BadInput: the hashes of their suites differ.
-    """
+    """Raise BadInput if runs were judged by suites of different content."""
     digests = {path: str(head.get("digest")) for path, head in heads.items()}
     if len({*digests.values()}) < 2:  # noqa: PLR2004 - two that differ
         return
@@ -216,7 +182,7 @@ def _ends(estimate: Estimate) -> dict[str, float]:
 
 
 def prompts(count: int) -> str:
-    """Such as `1 prompt` or `20 prompts`."""
+    """How many: `1 prompt`, `20 prompts`."""
     return counted(count, "prompt")
 
 

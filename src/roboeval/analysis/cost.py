@@ -40,12 +40,7 @@ class Spent(NamedTuple):
 
 
 def spent(table: pl.DataFrame, price: Price | None = None) -> Spent:
-    """What the completions of a run took.
-
-    Args:
-        table: as `load_results` gives it.
-        price: of tokens.
-    """
+    """What the completions of a run took."""
     took = completions_of(table)
     passed = int(took["passed"].sum())
     there, back = _tokens(took)
@@ -65,31 +60,17 @@ def _tokens(completions: pl.DataFrame) -> tuple[int, int] | tuple[None, None]:
 
 
 class Budget(NamedTuple):
-    """What a budget gives where rejected programs are asked for again; None where that is not known.
-
-    Args:
-        retries: how often at most.
-        requests: that a program takes on average.
-        per_thousand_requests: how many programs that pass come of so many.
-        per_million_tokens: how many come of so many.
-        per_money: how many come of one unit of money.
-    """
+    """What a budget gives where rejected programs are asked for again."""
 
     retries: int
-    requests: float
-    per_thousand_requests: float
-    per_million_tokens: float | None
-    per_money: float | None
+    requests: float  # for a program, on average
+    per_thousand_requests: float  # programs that pass
+    per_million_tokens: float | None  # None where tokens were not recorded
+    per_money: float | None  # for one unit of money
 
 
 def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LIMITS) -> Iterator[Budget]:
-    """What a budget gives, by limit of retries (paper, section VI).
-
-    Args:
-        table: as `load_results` gives it, of a run whose programs were all checked.
-        price: of tokens.
-        limits: of retries.
-    """
+    """What a budget gives, by limit of retries (paper, section VI); all programs were checked."""
     completions, prompts = completions_of(table), trials_by_prompt(table)
     means = completions.group_by("task", "prompt").agg(pl.col("input_tokens", "output_tokens").mean())
     tokens = {} if None in _tokens(completions) else {row[:2]: row[2:] for row in means.iter_rows()}
@@ -108,12 +89,7 @@ def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LI
 
 
 def requests(prompt: CheckedPrompt, retries: int) -> float:
-    """How many requests a program of a prompt takes on average: until one is accepted, or none is left.
-
-    Args:
-        prompt: its completions, checked.
-        retries: how often a rejected one is asked for again.
-    """
+    """The requests that a program takes on average: until one is accepted, or no retry is left."""
     rejected = sum(not trial.accepted for trial in prompt.trials) / len(prompt.trials)
     return sum(rejected**n for n in range(retries + 1))
 

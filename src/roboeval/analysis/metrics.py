@@ -64,14 +64,7 @@ class PromptScore:
     c: int
 
     def pass_at(self, k: int) -> float:
-        """The prompt's pass@k.
-
-        Args:
-            k: how many tries there are.
-
-        Raises:
-            ValueError: the prompt has fewer than k completions.
-        """
+        """The prompt's pass@k; raises ValueError if it has fewer than k completions."""
         if k > self.n:
             raise ValueError(
                 f"{self.task}, prompt {self.prompt}: pass@{k} cannot be estimated from {self.n} completions"
@@ -94,43 +87,22 @@ class TaskScore:
     def pass_at(self, k: int) -> Estimate:
         """The mean pass@k over prompts, with its 95 % interval.
 
-        Args:
-            k: how many tries there are.
-
         Raises:
             ValueError: a prompt, which is named, has fewer than k completions.
         """
         return overall([self], k)
 
     def lowest(self, k: int) -> float:
-        """The pass@k of the worst prompt, the lower end of the paper's error bars.
-
-        Args:
-            k: how many tries there are.
-
-        Raises:
-            ValueError: a prompt, which is named, has fewer than k completions.
-        """
+        """The worst prompt's pass@k, the lower end of the paper's error bars; raises as `pass_at` does."""
         return min(prompt.pass_at(k) for prompt in self.prompts)
 
     def highest(self, k: int) -> float:
-        """The pass@k of the best prompt, the upper end of the paper's error bars.
-
-        Args:
-            k: how many tries there are.
-
-        Raises:
-            ValueError: a prompt, which is named, has fewer than k completions.
-        """
+        """The best prompt's pass@k, the upper end of the paper's error bars; raises as `pass_at` does."""
         return max(prompt.pass_at(k) for prompt in self.prompts)
 
 
 def completions_of(table: pl.DataFrame) -> pl.DataFrame:
-    """One row for each judged completion of a table of results.
-
-    Args:
-        table: as `load_results` gives it.
-    """
+    """One row for each judged completion of a table that `load_results` gives."""
     return table.filter(pl.col("world_number") == 0)
 
 
@@ -162,20 +134,12 @@ def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskSco
 
 
 def pass_at_1(table: pl.DataFrame) -> dict[tuple[str, int], float]:
-    """pass@1 by task and prompt.
-
-    Args:
-        table: as `load_results` gives it.
-    """
+    """pass@1 by task and prompt, of a table that `load_results` gives."""
     return {(p.task, p.prompt): p.pass_at(1) for score in task_scores(table) for p in score.prompts}
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
     """The mean pass@k over all prompts of all tasks, with its 95 % interval.
-
-    Args:
-        tasks: the tasks, with at least one prompt among them.
-        k: how many tries there are.
 
     Raises:
         ValueError: a prompt, which is named, has fewer than k completions; or there is no prompt.
@@ -184,21 +148,12 @@ def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
 
 
 def share_at_least(values: Sequence[float], threshold: float) -> float:
-    """The share of values that reach a threshold.
-
-    Args:
-        values: at least one.
-        threshold: above 0.
-    """
+    """The share of values, at least one, that reach a threshold above 0."""
     return sum(value >= threshold - ROUNDING for value in values) / len(values)
 
 
 def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
-    """The share of prompts that reach each threshold at which it changes, from 1 down (paper, section V.A).
-
-    Args:
-        values: pass@1 of each prompt.
-    """
+    """The share of prompts that reach each pass@1 at which it changes, from 1 down (paper, section V.A)."""
     thresholds = sorted({1.0, *(value for value in values if value > ROUNDING)}, reverse=True)
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 

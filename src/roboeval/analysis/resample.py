@@ -8,8 +8,8 @@ are drawn with replacement; the first that is accepted is kept, or the last wher
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import polars as pl
@@ -22,58 +22,35 @@ THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
 
 @dataclass(frozen=True)
 class Trial:
-    """One completion, checked and judged.
+    """One completion, checked and judged."""
 
-    Args:
-        accepted: whether the check found no problem in it.
-        ran: whether it ended without an error in every true world.
-        passed: whether it did what was asked in every true world.
-    """
-
-    accepted: bool
-    ran: bool
-    passed: bool
+    accepted: bool  # the check found no problem
+    ran: bool  # without an error in every true world
+    passed: bool  # in every true world
 
 
 @dataclass(frozen=True)
 class Chances:
-    """What becomes of a prompt, each a chance from 0 to 1.
+    """What becomes of a prompt, each a chance from 0 to 1."""
 
-    Args:
-        accepted: that the program that is kept is one that the check accepts.
-        ran: that it runs without an error in every true world.
-        passed: that it does what was asked: pass@1.
-    """
-
-    accepted: float
-    ran: float
-    passed: float
+    accepted: float  # that the check accepts the program that is kept
+    ran: float  # without an error in every true world
+    passed: float  # pass@1
 
 
 def chances(trials: Sequence[Trial], retries: int) -> Chances:
-    """What is to be expected of a prompt, exactly.
-
-    Args:
-        trials: its completions, at least one; each is drawn as often as any other, and again.
-        retries: how many times a rejected program is asked for again, at least 0.
-
-    Raises:
-        ValueError: there is no completion, or a negative number of retries.
-    """
+    """What is to be expected of a prompt, exactly, where each completion is drawn as often as any other."""
     if not trials or retries < 0:
         raise ValueError(f"there is nothing to expect of {len(trials)} completions and {retries} retries")
     accepted = [trial for trial in trials if trial.accepted]
     rejected = [trial for trial in trials if not trial.accepted]
     none = (len(rejected) / len(trials)) ** (retries + 1)
 
-    def chance(ends: Iterable[tuple[Sequence[bool], float]]) -> float:
-        return sum(weight * sum(good) / len(good) for good, weight in ends if good)
+    def chance(end: Callable[[Trial], bool]) -> float:
+        kept = (accepted, 1 - none), (rejected, none)
+        return sum(weight * sum(map(end, those)) / len(those) for those, weight in kept if those)
 
-    return Chances(
-        accepted=1 - none,
-        ran=chance((([t.ran for t in accepted], 1 - none), ([t.ran for t in rejected], none))),
-        passed=chance((([t.passed for t in accepted], 1 - none), ([t.passed for t in rejected], none))),
-    )
+    return Chances(1 - none, chance(lambda trial: trial.ran), chance(lambda trial: trial.passed))
 
 
 @dataclass(frozen=True)
@@ -86,14 +63,8 @@ class CheckedPrompt:
 
 
 def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
-    """The completions of each prompt as the check and the judge see them, in the order of tasks and prompts.
-
-    A completion runs if it ends without an error in every world; one that waits where it may wait for ever
-    has not erred.
-
-    Args:
-        table: as `load_results` gives it, of a run whose programs were all checked.
-    """
+    """The completions of each prompt, which were all checked, in the order of tasks and prompts."""
+    # One that waits where it may wait for ever has not erred: there the requirements were looked at.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
     completions = table.group_by("task", "prompt", "index", maintain_order=True).agg(
         pl.col("accepted").first(),
@@ -108,32 +79,18 @@ def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
 
 @dataclass(frozen=True)
 class Limit:
-    """What one limit of retries gives, over all prompts.
-
-    Args:
-        retries: the limit.
-        passed: the mean pass@1, with its 95 % interval.
-        accepted: the share of programs kept that the check accepts.
-        ran: the share of programs kept that run without an error in every true world.
-        prompts: the share of prompts whose pass@1 is at least some threshold, by threshold.
-        by_prompt: what each prompt comes to, in the order of the prompts.
-    """
+    """What one limit of retries gives, over all prompts."""
 
     retries: int
-    passed: Estimate
-    accepted: float
-    ran: float
-    prompts: Mapping[float, float]
-    by_prompt: tuple[Chances, ...]
+    passed: Estimate  # pass@1
+    accepted: float  # share of the programs kept
+    ran: float  # without an error in every true world
+    prompts: Mapping[float, float]  # share of prompts with pass@1 at least the threshold
+    by_prompt: tuple[Chances, ...]  # in the order of the prompts
 
 
 def resampled(prompts: Sequence[CheckedPrompt], retries: int) -> Limit:
-    """What a limit of retries would have given.
-
-    Args:
-        prompts: at least one.
-        retries: at least 0.
-    """
+    """What a limit of retries would have given."""
     each = tuple(chances(prompt.trials, retries) for prompt in prompts)
     return Limit(
         retries=retries,
@@ -150,29 +107,19 @@ def _mean(values: Sequence[float]) -> float:
 
 
 def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
-    """The share of programs that the check accepts after 0, 1, ... retries.
-
-    Args:
-        prompts: at least one.
-        most: the last number of retries.
-    """
+    """The share of programs that the check accepts after 0, 1, ... `most` retries."""
     rejected = [sum(not t.accepted for t in prompt.trials) / len(prompt.trials) for prompt in prompts]
     return [_mean([1 - share ** (n + 1) for share in rejected]) for n in range(most + 1)]
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:
-    """The data of the paper's two figures, for machines.
-
-    Args:
-        prompts: at least one.
-        limits: numbers of retries.
-    """
+    """The data of the paper's two figures (section VI)."""
     of_limits = [resampled(prompts, retries) for retries in limits]
     return {
         "limits": [
             {
                 "retries": limit.retries,
-                "pass@1": {"mean": limit.passed.mean, "low": limit.passed.low, "high": limit.passed.high},
+                "pass@1": asdict(limit.passed),
                 "accepted": limit.accepted,
                 "ran": limit.ran,
                 "prompts_at_least": {str(t): share for t, share in limit.prompts.items()},

@@ -13,6 +13,7 @@ from codebotler.rtl import CannotJudge, Formula, holds, parse
 from codebotler.trace import Trace
 from codebotler.tracefile import trace_from
 from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.rows import key_of
 
 BATCH = 100  # rows that a process looks through at a time
 SMALL = 20  # batches for which other processes are not worth their start
@@ -20,52 +21,31 @@ SMALL = 20  # batches for which other processes are not worth their start
 
 @dataclass(frozen=True)
 class Question:
-    """What is looked for.
+    """What is looked for."""
 
-    Args:
-        formula: an RTL formula; None matches every trace.
-        negated: whether it shall not hold.
-        task: only completions of this task.
-        world: only in the world of this number, counted from 1, or whose `about` this is.
-    """
-
-    formula: str | None = None
-    negated: bool = False
-    task: str | None = None
-    world: str | None = None
+    formula: str | None = None  # of RTL; None matches every trace
+    negated: bool = False  # whether it shall not hold
+    task: str | None = None  # None: any
+    world: str | None = None  # its number from 1, or its `about`; None: any
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a completion says to a question.
-
-    Args:
-        key: the completion.
-        passed: whether it passed.
-        worlds: numbers, from 1, and names of the worlds in which it does what is looked for.
-        undecided: those of the worlds in which nobody knows, since the trace was too long to be kept.
-    """
+    """A completion, and the worlds, by number from 1 and name, in which it does what is looked for."""
 
     key: Key
     passed: bool
     worlds: tuple[tuple[int, str], ...]
-    undecided: tuple[tuple[int, str], ...] = ()
+    undecided: tuple[tuple[int, str], ...] = ()  # whose trace was too long to be kept
 
 
 class Search:
-    """Tries a formula on rows while they are read, in other processes where there are many rows.
-
-    Args:
-        question: what is looked for.
-        workers: how many processes look.
-
-    Raises:
-        RtlSyntaxError: the formula is none.
-    """
+    """Tries a formula on rows while they are read; where there are many, in `workers` processes."""
 
     def __init__(self, question: Question, *, workers: int = 1) -> None:
         self._question, self._workers = question, workers
-        self._formula = None if question.formula is None else parse(question.formula)
+        if question.formula is not None:
+            parse(question.formula)  # a wrong one is refused before anything is read
         self._lines: list[bytes] = []
         self._pool: ProcessPoolExecutor | None = None
         self._waiting: list[Future[list[Found]]] = []
@@ -84,9 +64,9 @@ class Search:
             self._waiting.append(self._pool.submit(look_through, batch, self._question))
 
     def found(self) -> Iterator[Found]:
-        """What each row says, in their order; ends the processes."""
+        """The answers, in the order of the rows; ends the processes."""
         if self._pool is None:
-            yield from (answer(json.loads(line), self._question, self._formula) for line in self._lines)
+            yield from look_through(self._lines, self._question)
             return
         with self._pool:
             self._waiting.append(self._pool.submit(look_through, self._lines, self._question))
@@ -95,21 +75,20 @@ class Search:
 
 
 def look_through(lines: Sequence[bytes], question: Question) -> list[Found]:
-    """What some rows say; the work of one process."""
+    """Answer for some rows; the work of one process."""
     formula = None if question.formula is None else parse(question.formula)
     return [answer(json.loads(line), question, formula) for line in lines]
 
 
 def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) -> Found:
-    """What one row says."""
+    """Answer for one row."""
     worlds, undecided = [], []
     for number, verdict in _asked(row, question):
         if formula is not None and "cut" in verdict:
             undecided.append((number, verdict["world"]))
         elif formula is None or _holds(formula, verdict["trace"]) != question.negated:
             worlds.append((number, verdict["world"]))
-    key = row["task"], row["prompt"], row["index"]
-    return Found(key, row["passed"], tuple(worlds), tuple(undecided))
+    return Found(key_of(row), row["passed"], tuple(worlds), tuple(undecided))
 
 
 def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Mapping[str, Any]]]:
@@ -122,15 +101,14 @@ def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Ma
 
 
 def _holds(formula: Formula, data: Iterable[object]) -> bool:
-    trace: Trace = _driven(trace_from(data, further=True))
     try:
-        return holds(formula, trace)
+        return holds(formula, _driven(trace_from(data, further=True)))
     except CannotJudge:
         return False
 
 
 def _driven(trace: Trace) -> Trace:
-    """The trace with each event where the last drive was asked to lead; before the first nobody knows."""
+    """The trace with each event where the last drive was to lead; before the first nobody knows."""
     here, events = "", []
     for event in trace:
         events.append(replace(event, place=here))

@@ -12,13 +12,12 @@ import numpy as np
 
 from roboeval.analysis.metrics import Estimate, t_quantile
 
+# Values, those that resemble each other together: a prompt's, or those of all prompts of a task.
 Clusters: TypeAlias = Sequence[Sequence[float]]
-"""Values, those that resemble each other together: a prompt's, or those of all prompts of a task."""
 
 SHARE = (0.0, 1.0)
 DIFFERENCE = (-1.0, 1.0)
 SEED = 0
-DRAWS = 10_000
 LEVEL = 0.95
 POWER = 0.8
 FEW = 8  # clusters below which the bootstrap knows too few means, so that its interval is too narrow
@@ -27,20 +26,12 @@ ROUNDING = 1e-12
 CHUNK = 1_000  # draws that are held at one time
 
 
-def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE, level: float = LEVEL) -> Estimate:
-    """The mean of all values, with an interval that takes clusters as drawn at random.
+def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Estimate:
+    """The mean of all values, with an interval that takes clusters as drawn at random, clipped to `within`.
 
     The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
     clusters with N values, and the interval is Student's t with G - 1 degrees of freedom. Where every cluster
     has one value it is the ordinary interval of a mean. One cluster says nothing about others.
-
-    Args:
-        clusters: each with at least one value.
-        within: what a mean can be at least and at most; the interval is clipped to it.
-        level: how often such intervals shall hold the true mean, between 0 and 1.
-
-    Raises:
-        ValueError: there is no cluster, or an empty one.
     """
     mean, count = _mean(clusters), len(clusters)
     if count == 1:
@@ -48,7 +39,7 @@ def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE, level
     residuals = [math.fsum(value - mean for value in values) for values in clusters]
     size = sum(map(len, clusters))
     variance = count / (count - 1) * math.fsum(r * r for r in residuals) / size**2
-    margin = t_quantile((1 + level) / 2, count - 1) * math.sqrt(variance)
+    margin = t_quantile((1 + LEVEL) / 2, count - 1) * math.sqrt(variance)
     return Estimate(mean, max(within[0], mean - margin), min(within[1], mean + margin))
 
 
@@ -56,9 +47,8 @@ def by_bootstrap(
     clusters: Clusters,
     *,
     within: tuple[float, float] = SHARE,
-    level: float = LEVEL,
     seed: int = SEED,
-    draws: int = DRAWS,
+    draws: int = 10_000,
 ) -> Estimate:
     """The mean of all values, with an interval from clusters drawn again, with replacement.
 
@@ -66,16 +56,6 @@ def by_bootstrap(
     lies between two percentiles of these means. With few clusters, plain percentiles are too narrow; they are
     moved outwards, as far as Student's t is wider than the normal distribution (Hesterberg's expanded
     percentiles).
-
-    Args:
-        clusters: each with at least one value.
-        within: what a mean can be at least and at most.
-        level: how often such intervals shall hold the true mean, between 0 and 1.
-        seed: of the draws; the same seed gives the same interval.
-        draws: how many.
-
-    Raises:
-        ValueError: there is no cluster, or an empty one.
     """
     mean, count = _mean(clusters), len(clusters)
     if count == 1:
@@ -87,7 +67,7 @@ def by_bootstrap(
     for start in range(0, draws, CHUNK):
         drawn = dice.integers(count, size=(min(CHUNK, draws - start), count))
         means.append(sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1))
-    wider = math.sqrt(count / (count - 1)) * t_quantile((1 + level) / 2, count - 1)
+    wider = math.sqrt(count / (count - 1)) * t_quantile((1 + LEVEL) / 2, count - 1)
     tail = NormalDist().cdf(-wider)
     low, high = np.quantile(np.concatenate(means), [tail, 1 - tail])
     return Estimate(mean, max(within[0], float(low)), min(within[1], float(high)))
@@ -104,17 +84,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) ->
 
     If neither of two models were better, the differences of a cluster could as well have the other sign, all
     of them together. Up to 20 clusters, all signs are tried, and the answer is exact; else signs are drawn.
-
-    Args:
-        clusters: the differences, clusters of them.
-        seed: of the draws.
-        draws: how many, where they are drawn.
-
-    Returns:
-        a share from 0 to 1; at least 2 / 2**G for G clusters, so that few clusters cannot tell.
-
-    Raises:
-        ValueError: there is no cluster, or an empty one.
+    It is at least 2 / 2**G for G clusters, so that few clusters cannot tell.
     """
     _mean(clusters)
     sums = np.array([math.fsum(values) for values in clusters])
@@ -134,30 +104,18 @@ def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) ->
 
 @dataclass(frozen=True)
 class Needed:
-    """How much it would take to tell two models apart, four times in five.
+    """How much it would take to tell two models apart, four times in five; None where they do not differ."""
 
-    Args:
-        completions: of each model for each of these prompts, if only these prompts matter; None where they
-            do not differ at all.
-        prompts: like these, with as many completions each as now, if other prompts matter as well; None
-            where they do not differ.
-    """
-
-    completions: int | None
-    prompts: int | None
+    completions: int | None  # of each model for each of these prompts, if only these matter
+    prompts: int | None  # like these, with as many completions each, if others matter as well
 
 
-def needed(pairs: Sequence[tuple[float, float]], *, level: float = LEVEL, power: float = POWER) -> Needed:
-    """How many completions or prompts would tell a difference as large as the one that was seen.
+def needed(pairs: Sequence[tuple[float, float]]) -> Needed:
+    """How many completions or prompts would tell a difference as large as that between pairs of pass@1.
 
     For n completions a prompt, the difference has the variance (w / n) / m on m given prompts, where w is the
     mean of a (1 - a) + b (1 - b); on m prompts drawn at random it has v / m, where v is the variance of the
     differences between prompts. It is told where it is at least (z(level) + z(power)) standard errors.
-
-    Args:
-        pairs: pass@1 of both models for each prompt, at least one.
-        level: of the interval that shall not hold 0.
-        power: how often it shall not.
     """
     m = len(pairs)
     differences = [b - a for a, b in pairs]
@@ -165,7 +123,7 @@ def needed(pairs: Sequence[tuple[float, float]], *, level: float = LEVEL, power:
     if abs(mean) < ROUNDING:
         return Needed(None, None)
     normal = NormalDist()
-    factor = ((normal.inv_cdf((1 + level) / 2) + normal.inv_cdf(power)) / mean) ** 2
+    factor = ((normal.inv_cdf((1 + LEVEL) / 2) + normal.inv_cdf(POWER)) / mean) ** 2
     drawn = math.fsum(a * (1 - a) + b * (1 - b) for a, b in pairs) / m
     spread = math.fsum((d - mean) ** 2 for d in differences) / (m - 1) if m > 1 else None
     prompts = None if spread is None else max(2, math.ceil(factor * spread - ROUNDING))

@@ -20,42 +20,25 @@ from roboeval.suites.load import Suite
 
 @dataclass(frozen=True)
 class Failures:
-    """How many completions failed by one class or one kind of it.
-
-    Args:
-        name: of the class or kind.
-        count: of completions.
-        share: of all completions.
-        kinds: of a class; the known ones come first, also where nothing failed by them.
-    """
+    """How many completions failed by one class or one kind of it."""
 
     name: str
     count: int
-    share: float
-    kinds: tuple[Failures, ...] = ()
+    share: float  # of all completions
+    kinds: tuple[Failures, ...] = ()  # of a class; the known ones first, also where nothing failed by them
 
 
 @dataclass(frozen=True)
 class Summary:
-    """An evaluation in numbers.
-
-    Args:
-        k: of the pass@k that were asked for.
-        tasks: those that have completions, in the suite's order.
-        overall: pass@k over all prompts with a 95 % interval, for each k.
-        failures: by class.
-        scope: what there is to judge.
-        missing: tasks of the suite that have no score.
-        ablated: whether common sense only was required.
-    """
+    """An evaluation in numbers."""
 
     k: tuple[int, ...]
-    tasks: tuple[TaskScore, ...]
-    overall: tuple[Estimate, ...]
+    tasks: tuple[TaskScore, ...]  # those that have completions, in the suite's order
+    overall: tuple[Estimate, ...]  # pass@k for each k
     failures: tuple[Failures, ...]
     scope: Scope
-    missing: Missing
-    ablated: bool = False
+    missing: Missing  # tasks of the suite without a score
+    ablated: bool = False  # common sense only was required
 
     @property
     def prompts(self) -> list[PromptScore]:
@@ -65,13 +48,7 @@ class Summary:
 
 @dataclass(frozen=True)
 class Missing:
-    """Tasks of a suite that have no score, by the reason.
-
-    Args:
-        no_completions: nobody wrote a program for them.
-        not_judged: there are completions, and none has been judged yet.
-        not_selected: they were not asked for.
-    """
+    """Tasks of a suite that have no score, by the reason."""
 
     no_completions: tuple[str, ...] = ()
     not_judged: tuple[str, ...] = ()
@@ -86,18 +63,7 @@ def summary(
     k: Sequence[int] = (1,),
     ablated: bool = False,
 ) -> Summary:
-    """Count how the completions of an evaluation did.
-
-    Args:
-        table: as `load_results` gives it.
-        suite: by which they were judged.
-        scope: what there is to judge.
-        k: how many tries pass@k allows.
-        ablated: whether common sense only was required; then tasks without an ablation are not missed.
-
-    Raises:
-        BadInput: the table is empty, or pass@k cannot be estimated for some prompt.
-    """
+    """Count how completions did; raises BadInput where there is none, or k is too large for a prompt."""
     tasks = task_scores(table, suite.tasks)
     if not tasks:
         raise BadInput(f"0 of {how_many(scope.total)} judged, so there is nothing to count")
@@ -122,11 +88,7 @@ def _missing(tasks: Sequence[str], scope: Scope) -> Missing:
 
 
 def failures(table: pl.DataFrame) -> tuple[Failures, ...]:
-    """How many completions failed by each class and kind (paper, section V.B).
-
-    Args:
-        table: as `load_results` gives it, with at least one row.
-    """
+    """How many completions, of one or more, failed by each class and kind (paper, section V.B)."""
     completions = completions_of(table)
     counted = completions.drop_nulls("failure_class").group_by("failure_class", "failure_kind").len()
     failed: dict[str, Counter[str]] = defaultdict(Counter)
@@ -149,26 +111,15 @@ PASSED, ALL = "passed", "all"
 
 @dataclass(frozen=True)
 class Causes:
-    """How completions ended, in shares.
+    """How completions ended, in shares."""
 
-    Args:
-        classes: the share of all completions by class of failure, and of those that passed.
-        kinds: by class, the share of its failures by kind.
-        counts: of completions by class and kind, which is `ALL` for the class; empty where only shares are
-            known.
-    """
-
-    classes: Mapping[str, float]
-    kinds: Mapping[str, Mapping[str, float]]
-    counts: Mapping[tuple[str, str], int]
+    classes: Mapping[str, float]  # of all completions; also those that passed
+    kinds: Mapping[str, Mapping[str, float]]  # of the failures of a class
+    counts: Mapping[tuple[str, str], int]  # by class and kind, ALL for the class; may be empty
 
 
 def causes(table: pl.DataFrame) -> Causes:
-    """How the completions of a run ended (paper, section V.B).
-
-    Args:
-        table: as `load_results` gives it, with at least one row.
-    """
+    """How the completions of a run, one or more, ended (paper, section V.B)."""
     found = failures(table)
     failed = sum(one.count for one in found)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
@@ -199,7 +150,7 @@ def summary_data(summary: Summary) -> dict[str, Any]:
         "judged": judged_count(summary.prompts),
         "to_judge": summary.scope.total,
         **_counts(summary.prompts),
-        **{f"pass@{k}": {"mean": e.mean, "low": e.low, "high": e.high} for k, e in estimates},
+        **{f"pass@{k}": asdict(estimate) for k, estimate in estimates},
         "tasks": [_task_score_data(task, summary.k) for task in summary.tasks],
         "failures": [
             {**_failure_data(each, "class"), "kinds": [_failure_data(kind, "kind") for kind in each.kinds]}

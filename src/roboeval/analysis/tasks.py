@@ -33,13 +33,7 @@ def task_data(results: Results, task: str) -> dict[str, Any]:
 
 
 def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
-    """A prompt, program by program, with the one reason why each fails; equal programs stand together.
-
-    Args:
-        results: that have completions of the prompt.
-        task: its name.
-        prompt: counted from 0.
-    """
+    """A judged prompt, program by program, with why each fails; equal programs stand together."""
     of_prompt = completions_of(results.table).filter(pl.col("task") == task, pl.col("prompt") == prompt)
     programs = results.programs
     together: dict[object, list[Key]] = defaultdict(list)
@@ -67,7 +61,6 @@ def _reason(results: Results, key: Key) -> dict[str, Any]:
 
 
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
-    """What a prompt told the model, and how many of its completions passed."""
     keys = [*of_prompt.filter(~pl.col("stale")).select("task", "prompt", "index").iter_rows()]
     written = [results.completions[key] for key in keys]
     return {
@@ -100,7 +93,7 @@ def _failure_kinds(of_prompt: pl.DataFrame) -> list[dict[str, Any]]:
 
 
 def by_hand(models: Collection[str | None]) -> str:
-    """What a title adds if recorded programs are among those of some models, which stand for no real one."""
+    """What a title adds if some models are recorded programs, which stand for no real model."""
     recorded = [model for model in models if model is not None and model.startswith("recorded:")]
     if not recorded:
         return ""
@@ -112,13 +105,7 @@ def by_hand(models: Collection[str | None]) -> str:
 
 @dataclass(frozen=True)
 class Selection:
-    """A part of a run: all of it, a task, a prompt or one completion; what is None is not narrowed.
-
-    Args:
-        task: the task's name.
-        prompt: counted from 0.
-        index: counted from 0.
-    """
+    """A part of a run: all of it, a task, a prompt or one completion; what is None is not narrowed."""
 
     task: str | None = None
     prompt: int | None = None
@@ -128,11 +115,7 @@ class Selection:
         return "/".join(str(part) for part in (self.task, self.prompt, self.index) if part is not None)
 
     def expect_judged(self, results: Results) -> None:
-        """Refuse a part of which nothing was judged.
-
-        Raises:
-            BadInput: so it is.
-        """
+        """Raise BadInput if nothing of this part was judged."""
         wanted = self.task, self.prompt, self.index
         if not any(all(w in {None, h} for w, h in zip(wanted, key, strict=True)) for key in results.places):
             what = f"completion {self}" if self.index is not None else f"completion of {self}"
@@ -140,11 +123,7 @@ class Selection:
 
 
 def parse_selection(text: str | None, suite: Suite) -> Selection:
-    """Read what a user wants to see: nothing for the whole run, TASK, TASK/PROMPT or TASK/PROMPT/INDEX.
-
-    Raises:
-        BadInput: it is none of these, or the suite has no such task or prompt.
-    """
+    """Read TASK, TASK/PROMPT or TASK/PROMPT/INDEX, or nothing for the whole run."""
     if not text:
         return Selection()
     name, *numbers = text.removesuffix("/").split("/")

@@ -31,27 +31,16 @@ class TaskChanges:
 
 @dataclass(frozen=True)
 class VerdictChanges:
-    """What a second suite changes for one run.
-
-    Args:
-        name: of the run.
-        suites: the names of both.
-        comparison: pass@1 under the second beside that under the first, prompt by prompt.
-        tasks: in the order of the first suite.
-        first_only: what passes under the first only, in groups, with what the second says against them.
-        second_only: what passes under the second only, in groups, with what the first says against them.
-        programs: how many different programs have another verdict.
-        left_out: how many completions only one suite has judged.
-    """
+    """What a second suite changes for one run."""
 
     name: str
     suites: tuple[str, str]
-    comparison: Comparison
-    tasks: tuple[TaskChanges, ...]
-    first_only: tuple[Cluster, ...]
-    second_only: tuple[Cluster, ...]
-    programs: int
-    left_out: int
+    comparison: Comparison  # the second suite minus the first
+    tasks: tuple[TaskChanges, ...]  # in the order of the first suite
+    first_only: tuple[Cluster, ...]  # what passes so, with what the second says against it
+    second_only: tuple[Cluster, ...]  # with what the first says against it
+    programs: int  # different ones with another verdict
+    left_out: int  # completions that only one suite has judged
 
     @property
     def completions(self) -> int:
@@ -65,11 +54,7 @@ class VerdictChanges:
 
 
 def verdict_changes(name: str, first: Results, second: Results) -> VerdictChanges:
-    """Find the completions whose verdicts differ.
-
-    Raises:
-        BadInput: no completion was judged by both.
-    """
+    """Find the completions whose verdicts differ; raises BadInput if none was judged by both."""
     both = first.places.keys() & second.places.keys()
     if not both:
         raise BadInput("no completion was judged by both suites", file=name)
@@ -123,27 +108,16 @@ def place(name: str, scores: Mapping[str, float]) -> int:
 
 @dataclass(frozen=True)
 class Overtaking:
-    """Two runs of which the suites say something else.
+    """Two runs that two suites put in another order, or tie under one only."""
 
-    Args:
-        one: which is better under the second suite, or was under the first if it is not.
-        other: which is not.
-        first: by how much the one passes more often under the first suite.
-        second: by how much it does under the second.
-    """
-
-    one: str
+    one: str  # better under the second suite, or else under the first
     other: str
-    first: float
-    second: float
+    first: float  # by how much it passes more often under the first suite
+    second: float  # and under the second
 
 
 def overtakings(found: Sequence[VerdictChanges]) -> list[Overtaking]:
-    """All pairs of runs that stand in another order under the second suite, or are tied under one only.
-
-    Args:
-        found: the runs, named apart. Where they are not judged on the same prompts, so are their means.
-    """
+    """All pairs of runs that the suites put in another order, or of which one suite only has a tie."""
     pairs = (_overtaking(one, other) for one, other in combinations(found, 2))
     return [told for told in pairs if _sign(told.first) != _sign(told.second)]
 
@@ -179,7 +153,7 @@ def said(found: VerdictChanges) -> str:
 
 
 def said_of_order(found: Sequence[VerdictChanges]) -> list[str]:
-    """Whether models change places, in sentences; nothing is said of one alone."""
+    """Whether models change places, in sentences; of one run alone, none."""
     if len(found) < 2:  # noqa: PLR2004 - an order takes two
         return []
     first, second = found[0].suites
@@ -197,9 +171,10 @@ HOW_OFTEN = {1: "more often than", 0: "as often as", -1: "less often than"}
 
 
 def said_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
-    """A word of warning where runs are about different prompts."""
+    """A warning where runs are about different prompts."""
     asked = {frozenset((task.task, task.prompts) for task in one.comparison.tasks) for one in found}
-    return ["Not all runs are about the same prompts, on which their order may rest."][: len(asked) - 1]
+    warning = "Not all runs are about the same prompts, on which their order may rest."
+    return [warning] if len(asked) > 1 else []
 
 
 # --- for machines

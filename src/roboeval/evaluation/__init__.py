@@ -1,4 +1,4 @@
 """From a reply to a verdict: completions are generated, kept in a run, simulated and judged.
 
-Start with `judge.py`, which says what is right and wrong; `run.py` describes the folder of a run.
+Start with `judge.py`, which decides what is right and wrong; `runs/` describes the folder of a run.
 """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import platform
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any, TypeAlias
@@ -14,35 +13,20 @@ from codebotler.checker import Check, Settings, check_on
 from codebotler.files import Appender, read_rows, to_line, to_text, write_whole
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.lane import Lane
-from roboeval.evaluation.engines import OpenEngine, Work
+from roboeval.evaluation.engines import PYTHON, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
 
-ProgramKey: TypeAlias = tuple[str, str]
-"""A task and the hash of a program."""
+ProgramKey: TypeAlias = tuple[str, str]  # a task and the hash of a program
 
 
 def check_programs(
     run: Run, suite: Suite, completions: Iterable[Completion], engine: OpenEngine, *, samples: int, seed: int
 ) -> Iterator[tuple[ProgramKey, list[str]]]:
-    """Check the programs of completions, and yield the problems of each program once.
+    """Yield the problems of each program, checking those that nobody has checked with these settings.
 
-    Of the world, a check knows the rooms: those of the first world of the task. Problems that were found with
-    other settings, or by another version, are forgotten.
-
-    Args:
-        run: where results are kept.
-        suite: the tasks of the completions, and rules.
-        completions: of the run.
-        engine: where programs run.
-        samples: how many worlds to imagine for each.
-        seed: from which they are drawn.
-
-    Raises:
-        BadInput: another process writes the run, or the file of checks is broken.
-        EngineError: no isolated process can be started.
-        OSError: the disk is full; what was checked before stays.
+    Of the world, a check knows the rooms: those of the first world of the task.
     """
     metadata = {
         "suite": suite.name,
@@ -50,7 +34,7 @@ def check_programs(
         "samples": samples,
         "seed": seed,
         "codebotler": __version__,
-        "python": ".".join(platform.python_version_tuple()[:2]),
+        "python": PYTHON,
     }
     with run.writing(), contextlib.closing(_open(run, metadata)) as file:
         known = dict(_read(file))
@@ -68,13 +52,12 @@ def check_programs(
                 yield key, problems
 
 
-def _open(run: Run, metadata: Mapping[str, Any]) -> Appender:
-    """The file of a run's checks, empty if they were made otherwise."""
+def _open(run: Run, metadata: dict[str, Any]) -> Appender:
     rows, about = run.checks(metadata["suite"]), run.checks_head(metadata["suite"])
     about.parent.mkdir(exist_ok=True)
     if not about.exists() or load_head(about) != metadata:
         rows.unlink(missing_ok=True)
-        write_whole(about, to_text(dict(metadata)))
+        write_whole(about, to_text(metadata))
     return Appender(rows)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from typing import Protocol, Self, TypeAlias, TypeVar
@@ -10,9 +11,8 @@ from codebotler.arguments import expect_whole
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.lane import Lane
 
-Work: TypeAlias = tuple[str, str]
-"""The name of a task, and a program."""
-
+PYTHON = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
+Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
 Ran = TypeVar("Ran")
 Value = TypeVar("Value")
 
@@ -23,15 +23,9 @@ class Engine(Protocol):
     def map_distinct(
         self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
-        """The results for programs, in their order; equal ones are one call, and they are read as needed.
+        """The values of `then`, in the order of the programs, which are read as needed; equal ones run once.
 
-        Args:
-            function: what to call with each program; it and its results can be pickled.
-            works: the programs.
-            then: what to call with each result, in the main thread of a process where that is possible.
-
-        Raises:
-            EngineError: no isolated process can be started, or none is left.
+        `function` and its results can be pickled; `then` runs in the main thread of a process if possible.
         """
         ...
 
@@ -40,15 +34,7 @@ OpenEngine = AbstractContextManager[Engine]
 
 
 class Local:
-    """The cores of this machine; use as a context manager.
-
-    Args:
-        lanes: those that run programs, or how many to start and end.
-        require_isolation: whether to refuse where programs are not fully isolated, rather than warn.
-
-    Raises:
-        BadInput: there are to be less than 1.
-    """
+    """The cores of this machine: given lanes, or some of its own, which end with the context."""
 
     def __init__(self, lanes: Lanes | int, *, require_isolation: bool = False) -> None:
         if not isinstance(lanes, Lanes):
@@ -67,7 +53,7 @@ class Local:
     def map_distinct(
         self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
-        """The results for programs, in their order."""
+        """See `Engine`."""
         here = self._lanes.here
         return self._lanes.map_distinct(
             lambda work: function(here(), work), works, name=lambda work: digest(*work), then=then

@@ -24,29 +24,14 @@ def evaluate_run(
     suite: Suite,
     *,
     ablated: bool,
-    tasks: frozenset[str] | None,
+    tasks: frozenset[str] | None,  # None for all
     redo: bool,
     workers: int = 1,
     require_isolation: bool = False,
     engine: OpenEngine | None = None,
-    completions: Iterable[Completion] | None = None,
+    completions: Iterable[Completion] | None = None,  # those of the run, if they were read before
 ) -> Iterator[JudgedRow]:
-    """Judge a run's completions, going on where an earlier evaluation stopped; yields all rows in order.
-
-    Args:
-        run: whose folder gets the rows.
-        suite: by which to judge.
-        ablated: whether to require common sense only.
-        tasks: which tasks to judge; all by default.
-        redo: whether to start over.
-        workers: how many programs are run at the same time.
-        require_isolation: whether to refuse where a wall around programs is missing.
-        engine: where programs are run; by default on so many cores of this machine.
-        completions: those of the run, if they were read before.
-
-    Raises:
-        BadInput: the run is being written, or was judged otherwise or holds other completions than it did.
-    """
+    """Judge a run's completions, going on where an earlier evaluation stopped; yield all rows in order."""
     key = evaluation_key(suite, ablated=ablated)
     chosen = engine or Local(workers, require_isolation=require_isolation)
     with run.writing():
@@ -75,7 +60,7 @@ def evaluate_run(
 def _judge(
     judged: Iterable[tuple[Completion, Any]], rows: Appender, seal: Seal, left_out: LeftOut
 ) -> Generator[JudgedRow, None, bool]:
-    """Add the rows of completions, and say whether each has one."""
+    """Add the rows of completions; return whether each has one."""
     is_whole = True
     for completion, judgement in judged:
         if judgement is None:
@@ -89,12 +74,11 @@ def _judge(
     return is_whole
 
 
-class LeftOut:
-    """The completions that once had no row since judging them took too long; their rows come at the end.
+LEFT_OUT = "took_too_long"
 
-    Args:
-        head: KEY.json, which keeps their names.
-    """
+
+class LeftOut:
+    """The completions that once had no row since judging them took too long; their rows come at the end."""
 
     def __init__(self, head: Path) -> None:
         self._head = head
@@ -111,17 +95,14 @@ class LeftOut:
             write_whole(self._head, to_text({**load_head(self._head), **self.data()}))
 
     def data(self) -> dict[str, Any]:
-        """As KEY.json names them; nothing where there are none."""
+        """What KEY.json keeps of them."""
         return {LEFT_OUT: self._names} if self._names else {}
-
-
-LEFT_OUT = "took_too_long"
 
 
 def _judged_before(
     rows: Appender, completions: Iterator[Completion], was: Mapping[str, Any], left_out: LeftOut
 ) -> Generator[JudgedRow, None, Seal]:
-    """The rows that are there, and their seal; completions go on behind the last one."""
+    """Yield the rows of the file and return their seal; `completions` goes on behind the last one."""
     seal, waiting = Seal(), left_out.waiting
     for line in read_lines_of(rows.path, was, seal=seal):
         row = line.row
@@ -141,7 +122,7 @@ def _judged_before(
 
 
 def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> dict[str, Any]:
-    """What KEY.json says, if what is there was judged alike."""
+    """The content of KEY.json; raises BadInput if the rows were judged otherwise."""
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise BadInput(
@@ -150,12 +131,10 @@ def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> dict[str,
         write_whole(path, to_text(about))
         return about
     was = load_head(path)
-    changed = [name for name in about if was.get(name) != about[name]]
-    if changed:
-        name = changed[0]
-        then, now = _brief(name, was.get(name)), _brief(name, about[name])
-        what = f"{CALLED.get(name, name)} ({then}, now {now})"
-        raise BadInput(f"was judged with another {what}; --redo starts over", file=path)
+    for name, now in about.items():
+        if was.get(name) != now:
+            what = f"{CALLED.get(name, name)} ({_brief(name, was.get(name))}, now {_brief(name, now)})"
+            raise BadInput(f"was judged with another {what}; --redo starts over", file=path)
     return was
 
 

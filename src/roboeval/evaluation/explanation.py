@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache, partial
 from typing import Any
 
@@ -12,7 +12,6 @@ from codebotler.simulator.robot import located, resolve_room
 from codebotler.storyboard import steps_of
 from codebotler.trace import Event, Trace
 from codebotler.tracefile import trace_from
-from codebotler.world import World
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite
 
@@ -27,13 +26,7 @@ EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or
 
 
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
-    """Why a completion fails: the world that decided, and its error or failed check, explained.
-
-    Args:
-        row: of the evaluation; of its verdicts only that of the world that decided is looked at closely.
-        suite: by which it was judged; None if it is not at hand, and then nothing is explained.
-        ablated: whether common sense only was required.
-    """
+    """Why a completion fails: the world that decided, and its error or failed check, explained."""
     why = row["failure"]
     if why is None:
         return {"passed": True, "failure": None}
@@ -49,14 +42,7 @@ def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dic
 def completion_data(
     row: Mapping[str, Any], completion: Completion | None, suite: Suite | None, *, ablated: bool = False
 ) -> dict[str, Any]:
-    """One completion: what was asked, the program, and each world with every step and failed check.
-
-    Args:
-        row: of the evaluation.
-        completion: that was judged; None if it is not there.
-        suite: by which it was judged; None if it is not at hand, and then nothing is explained.
-        ablated: whether common sense only was required.
-    """
+    """A completion: its instruction, its program, and each world with every step and failed check."""
     patience = Patience()
     return {
         **{key: row[key] for key in ("task", "prompt", "index", "passed", "failure")},
@@ -75,7 +61,7 @@ class Patience:
         self._left = MOST_COMPARED
 
     def reaches_for(self, trace: Trace) -> bool:
-        """Whether a check on a trace is still explained; if so, that is taken into account."""
+        """Take a trace into account; whether a check on it is still explained."""
         self._left -= sum(map(_weight, trace))
         return self._left >= 0
 
@@ -86,7 +72,7 @@ def _weight(event: Event) -> int:
 
 
 def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablated: bool) -> Scenario | None:
-    """The scenario in which a verdict was reached; None if the suite has it no more."""
+    """The scenario of a verdict; None if the suite no longer has it."""
     task = None if suite is None else suite.tasks.get(row["task"])
     scenarios = () if task is None else task.judged_in(ablated=ablated)
     about = row["verdicts"][number]["world"]
@@ -100,9 +86,10 @@ def _trace(verdict: Mapping[str, Any], scenario: Scenario | None) -> Trace:
 
 def _world_data(verdict: Mapping[str, Any], scenario: Scenario | None, patience: Patience) -> dict[str, Any]:
     trace, cut = _trace(verdict, scenario), verdict.get("cut")
+    names = [] if scenario is None else [room.name for room in scenario.world.rooms]
     return {
         **{key: verdict[key] for key in ("world", "satisfied", "status", "error", "line")},
-        "steps": steps_of(trace, None if scenario is None else _rooms_of(scenario.world)),
+        "steps": steps_of(trace, None if scenario is None else cache(partial(resolve_room, names))),
         **({} if cut is None else {"cut": cut}),
         "failed_checks": [
             {"check": check, **_explained(check, scenario, trace, patience, cut)}
@@ -111,14 +98,10 @@ def _world_data(verdict: Mapping[str, Any], scenario: Scenario | None, patience:
     }
 
 
-def _rooms_of(world: World) -> Callable[[str], str | None]:
-    return cache(partial(resolve_room, [room.name for room in world.rooms]))
-
-
 def _explained(
     check: str, scenario: Scenario | None, trace: Trace, patience: Patience, cut: object
 ) -> dict[str, Any]:
-    """Why a check fails, with the step that makes it fail if it is one."""
+    """Why a check fails, and the number of the step, from 1, that makes it fail, if it is one."""
     if cut is not None:
         return {"explanation": CUT, "step": None}
     require = () if scenario is None else scenario.require

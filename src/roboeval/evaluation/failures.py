@@ -16,19 +16,12 @@ PYTHON, ROBOT, TASK = "PythonError", "RobotExecutionError", "TaskCompletionError
 
 @dataclass(frozen=True)
 class FailureClass:
-    """A class of failures.
+    """A class of failures."""
 
-    Args:
-        name: as rows of evaluations call it.
-        label: what people read, of one of them.
-        plural: what people read, of several.
-        kinds: those that tables always show; others appear as they come.
-    """
-
-    name: str
-    label: str
+    name: str  # in rows
+    label: str  # for people
     plural: str
-    kinds: tuple[str, ...]
+    kinds: tuple[str, ...]  # those that tables always show; others appear as they come
 
 
 CLASSES: Mapping[str, FailureClass] = {
@@ -71,29 +64,22 @@ CLASSES: Mapping[str, FailureClass] = {
 
 
 def label_of(name: str) -> str:
-    """What people read of a class; of one that is unknown its name."""
+    """The label of a class; of an unknown one its name."""
     return CLASSES[name].label if name in CLASSES else name
 
 
 def plural_of(name: str) -> str:
-    """What people read of several of a class; of one that is unknown its name."""
+    """The plural label of a class; of an unknown one its name."""
     return CLASSES[name].plural if name in CLASSES else name
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """How a program did in one world.
+    """How a program did in one world."""
 
-    Args:
-        world: what the world is about.
-        outcome: how the run ended.
-        failed: the requirements that do not hold, in the task's order.
-        satisfied: whether it did what was asked.
-    """
-
-    world: str
+    world: str  # what the world is about
     outcome: Outcome
-    failed: tuple[Requirement, ...]
+    failed: tuple[Requirement, ...]  # in the task's order
     satisfied: bool
 
 

@@ -39,25 +39,15 @@ class Pace:
 
 @dataclass
 class Progress:
-    """How much of a run is generated.
-
-    Args:
-        total: how many completions it should have.
-        found: how many of them it had at the start.
-        interrupted: how many requests were under way at the last interruption, and may be paid twice.
-        usage: the tokens of all its completions.
-        under_way: how many requests were under way at the end, if this was an interruption.
-        failures: for each completion that the model failed to give, an error message.
-        stopped: why no further request is sent; None while there is no reason.
-    """
+    """How much of a run is generated."""
 
     total: int
-    found: int
-    interrupted: int
-    usage: Counter[str]
-    under_way: int = 0
-    failures: dict[Key, str] = field(default_factory=dict)
-    stopped: str | None = None
+    found: int  # of these, at the start
+    interrupted: int  # requests under way at the last interruption, which may be paid twice
+    usage: Counter[str]  # tokens of all completions
+    under_way: int = 0  # requests at the end, if this was an interruption
+    failures: dict[Key, str] = field(default_factory=dict)  # error messages
+    stopped: str | None = None  # why no further request is sent
 
     def __post_init__(self) -> None:
         self.done = self.found
@@ -85,21 +75,7 @@ def generate_run(
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
-    """Request the completions that a run still lacks; each is on the disk before it counts.
-
-    Args:
-        run: a run to complete, or a new folder.
-        plan: which completions it should have.
-        model: the model, which is closed at the end.
-        settings: those with which it was opened.
-        pace: how many requests to send.
-        on_progress: called before the first request, and after each completion.
-
-    Raises:
-        BadInput: another process writes the run, or it holds completions that were generated otherwise.
-        ModelError: there was no reply at all, so that there is nothing to keep.
-        OSError: the disk is full; what was written before stays.
-    """
+    """Request the completions that a run lacks, each on the disk before it counts; close the model."""
     with run.writing():
         metadata = run_metadata(run, plan, model.name, settings)
         with contextlib.closing(Appender(run.completions)) as file:
@@ -136,7 +112,7 @@ _KEY: ContextVar[Key] = ContextVar("_KEY")
 
 @dataclass(frozen=True)
 class _LoggedModel:
-    """A model each of whose requests is noted before it is sent, further tries as well."""
+    """A model that notes each request before it is sent, further tries as well."""
 
     model: Model
     log: RequestLog
@@ -178,11 +154,6 @@ class _Generation:
         self._syncing = asyncio.Lock()
 
     async def generate(self, keys: list[Key]) -> None:
-        """Request all of them, or until there is a reason to stop.
-
-        Raises:
-            OSError: a completion cannot be written.
-        """
         waiting = iter(keys)
         try:
             async with asyncio.TaskGroup() as group:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import platform
 import signal
 import threading
 import time
@@ -24,7 +23,7 @@ from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
 from codebotler.trace import Outcome, Status, Trace
 from codebotler.tracefile import outcome_data
-from roboeval.evaluation.engines import Local, OpenEngine
+from roboeval.evaluation.engines import PYTHON, Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown
 from roboeval.evaluation.runs.rows import Judgement, Row, bounded
@@ -32,19 +31,14 @@ from roboeval.suites.load import Requirement, Scenario, Suite
 
 LOG = logging.getLogger("roboeval.evaluation.judge")
 
-BUDGET = 60
-"""Seconds of processor time that judging one program may take, in all its worlds."""
+BUDGET = 60  # seconds of processor time that judging one program may take, in all its worlds
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
-    """Say whether a run did what its world requires.
+    """Judge how a run ended in a world.
 
     A run that ended in an error is unsatisfied whatever it did; one that reached a limit is judged by the
     requirements only in a world that may wait for ever.
-
-    Args:
-        outcome: of the run.
-        scenario: the world in which it ran, with its requirements.
     """
     if not may_satisfy(outcome, scenario):
         return Verdict(scenario.world.about, outcome, (), satisfied=False)
@@ -53,7 +47,7 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
 
 
 def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
-    """Whether a run ended so that the requirements decide: by itself, or waiting where that is allowed."""
+    """Whether the requirements decide: the run ended by itself, or waits where that is allowed."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
 
@@ -100,14 +94,7 @@ def evaluate(
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
 ) -> Iterator[tuple[Completion, Judgement | None]]:
-    """What is said of each completion, in their order; None, and a warning, where that takes too long.
-
-    Args:
-        completions: whose tasks the suite knows; read as they are needed.
-        suite: tasks and rules.
-        ablated: whether to require common sense only.
-        engine: where programs are run.
-    """
+    """Each completion, in order, with its judgement; None, and a warning, where judging takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -132,12 +119,10 @@ def judgements(
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
-    if not isinstance(completion, Completion):
+    if not isinstance(completion, Completion):  # such as a row of a file
         kind = type(completion).__name__
-        raise BadInput(
-            f"a completion is of the type {kind}; "
-            "make it a Completion(task=..., prompt=..., index=..., program=...)"
-        )
+        what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
+        raise BadInput(f"a completion is of the type {kind}; {what}")
     if (problem := unknown(completion.key, suite)) is not None:
         raise BadInput(problem)
     if ablated and suite.tasks[completion.task].ablation is None:
@@ -147,14 +132,14 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
 def run_in_worlds(
     suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool
 ) -> tuple[str, Sequence[Outcome]]:
-    """A task, the first of the two, and how a program, the second, ends in each of its worlds."""
+    """Run a program in each world of its task; return the task and how each run ended."""
     task, program = work
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
     return task, [lane.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios]
 
 
 def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> Judgement | None:
-    """What is said of a program that ran in all worlds of a task; None where that takes too long."""
+    """The judgement on a program that ran in all worlds of a task; None where judging takes too long."""
     task, outcomes = ran
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
     try:
@@ -165,19 +150,18 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
 
 
 def evaluation(completion: Completion, told: Judgement) -> Row:
-    """The row of an evaluation: which completion, and what is said of its program."""
-    task, prompt, index = completion.key
+    """The row of an evaluation."""
     return {
-        "task": task,
-        "prompt": prompt,
-        "index": index,
+        "task": completion.task,
+        "prompt": completion.prompt,
+        "index": completion.index,
         "program_sha256": completion.program_sha256,
         **told,
     }
 
 
 def judgement(verdicts: list[Verdict]) -> Judgement:
-    """What the row of an evaluation says of a program."""
+    """The judgement on a program, as a row writes it."""
     why = failure(verdicts)
     return bounded(
         {
@@ -200,12 +184,11 @@ def verdict_data(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-WORDS = ("words_for_people", "words_for_yes", "words_for_no")
-"""Rules that are lists of words, and left out where they are empty."""
+WORDS = ("words_for_people", "words_for_yes", "words_for_no")  # rules that are left out where empty
 
 
 def head(suite: Suite) -> dict[str, Any]:
-    """What KEY.json says beside the rows: by what they were judged."""
+    """The content of KEY.json: by what the rows are judged."""
     rules = suite.rules
     return {
         "suite": suite.name,
@@ -218,24 +201,19 @@ def head(suite: Suite) -> dict[str, Any]:
             "people": rules.people,
             **{name: list(words) for name in WORDS if (words := getattr(rules, name))},
             **({"events": rules.events} if rules.events != PAPER.events else {}),
-            "limits": {
-                "seconds": rules.limits.seconds,
-                "calls": rules.limits.calls,
-                "ticks": rules.limits.ticks,
-            },
+            "limits": {name: getattr(rules.limits, name) for name in ("seconds", "calls", "ticks")},
             "skill_seconds": 0,
             "clock_starts": rules.clock_starts.isoformat(),
         },
         "codebotler": __version__,
-        "python": ".".join(platform.python_version_tuple()[:2]),
+        "python": PYTHON,
     }
 
 
 # --- how long judging may take
 
 
-LOOKS = 100
-"""How often the clock is looked at within a limit; then other threads have their turn, too."""
+LOOKS = 100  # times that the clock is looked at within a limit; then other threads have their turn, too
 
 
 class TimeLimitExceeded(Exception):  # noqa: N818 - no mistake of the caller
@@ -244,17 +222,8 @@ class TimeLimitExceeded(Exception):  # noqa: N818 - no mistake of the caller
 
 @contextlib.contextmanager
 def time_limit(seconds: float) -> Iterator[None]:
-    """Let what is inside use no more than so much processor time of this thread, if it is the main one.
-
-    Only the main thread can be interrupted in the search for a regex: elsewhere there is no limit.
-
-    Args:
-        seconds: how much, more than 0.
-
-    Raises:
-        TimeLimitExceeded: it used more.
-    """
-    if threading.current_thread() is not threading.main_thread():
+    """Limit the processor time of the block, in seconds of this thread, if it is the main one."""
+    if threading.current_thread() is not threading.main_thread():  # which alone can be interrupted
         yield
         return
     end = time.thread_time() + seconds

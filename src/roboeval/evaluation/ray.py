@@ -18,10 +18,10 @@ from codebotler.badinput import BadInput
 from codebotler.simulator.distinct import MOST_AHEAD, Done
 from codebotler.simulator.engine import NO_SECCOMP, digest
 from codebotler.simulator.lane import EngineError, Lane
-from roboeval.evaluation.engines import Ran, Value, Work
+from roboeval.evaluation.engines import PYTHON, Ran, Value, Work
 
 LOG = logging.getLogger("roboeval.ray")
-VERSIONS = f"codebotler {__version__} with Python {'.'.join(platform.python_version_tuple()[:2])}"
+VERSIONS = f"codebotler {__version__} with Python {PYTHON}"
 
 LARGEST = 16  # programs of a shard: some tens of milliseconds, beside which Ray's one or two are little
 AHEAD = 2  # shards for each core that are under way, so that none waits for this process
@@ -31,18 +31,12 @@ CONNECT_S = 5  # until something must have accepted a connection
 
 
 class RayCluster:
-    """The cores of a Ray cluster; use as a context manager.
+    """The cores of the Ray cluster that RAY_ADDRESS names, or else that this machine is part of.
 
-    The cluster is the one that RAY_ADDRESS names, or else the one that this machine is part of. Where there
-    is none, or RAY_ADDRESS is "local", one is started on this machine, which no other machine reaches, and
-    ended again.
+    Where there is none, or RAY_ADDRESS is "local", one is started on this machine, which no other machine
+    reaches, and ended again. By default twice as many shards are under way as the cluster has cores.
 
-    Args:
-        workers: how many shards are under way at the same time; twice the cores of the cluster by default.
-        require_isolation: whether to refuse where programs are not fully isolated, rather than warn.
-
-    Raises:
-        BadInput: Ray is not installed, or no cluster answers at the address.
+    Raises BadInput if Ray is not installed, or no cluster answers at the address.
     """
 
     def __init__(self, workers: int | None = None, *, require_isolation: bool = False) -> None:
@@ -72,7 +66,7 @@ class RayCluster:
     def map_distinct(
         self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
-        """The results for programs, in their order.
+        """See `Engine`.
 
         Shards that are under way when no more results are wanted run to their end: Ray 2.60 can abort this
         process when a shard is cancelled that has just ended.
@@ -108,8 +102,7 @@ class RayCluster:
                         done[name] = value
                 most = self._most()
 
-    def _most(self) -> int:
-        """How many shards may be under way."""
+    def _most(self) -> int:  # shards under way
         return self._workers or AHEAD * max(1, self._cores())
 
     def _cores(self) -> int:
@@ -155,14 +148,10 @@ def shard_size(sent: int, most: int) -> int:
 def run_shard(
     functions: tuple[Callable[[Lane, Work], Ran], Callable[[Ran], Value]],
     works: Sequence[Work],
-    versions: str,
+    versions: str,  # others might judge otherwise
     require_isolation: bool,  # noqa: FBT001 - Ray passes positions
 ) -> tuple[list[Value], str | None]:
-    """The results for programs, and a warning if they are not fully isolated; in a process of Ray's.
-
-    Raises:
-        EngineError: no isolated process can be started, or the versions here might judge otherwise.
-    """
+    """The results for programs, and a warning if they are not fully isolated; in a process of Ray's."""
     machine = platform.node()
     if versions != VERSIONS:
         raise EngineError(f"{machine} has {VERSIONS}, and not {versions}")
@@ -177,7 +166,7 @@ def run_shard(
 
 @cache
 def own_lane(*, require_isolation: bool) -> Lane:
-    """The lane of this process, which stays for the next shard."""
+    """The lane of this process, kept for the next shard."""
     lane = Lane()
     if require_isolation and not lane.has_seccomp:
         lane.close()

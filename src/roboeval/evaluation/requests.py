@@ -43,11 +43,7 @@ class GenerationPlan:
         return self.suite.tasks[key[0]].prompts[key[1]]
 
     def completed(self, run: Run) -> Iterator[Completion]:
-        """The completions that a run has already.
-
-        Raises:
-            BadInput: one is for another instruction than the suite has now.
-        """
+        """The completions that a run has; raises BadInput if one's instruction is no longer the suite's."""
         if not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
@@ -72,11 +68,7 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 
 
 def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: Settings) -> dict[str, Any]:
-    """The content of run.json, which a run that goes on has already.
-
-    Raises:
-        BadInput: the run holds completions that were generated with another model or other settings.
-    """
+    """The content of run.json; raises BadInput where completions are there that were generated otherwise."""
     fixed = {
         "model": model,
         "settings": {name: value for name, value in asdict(settings).items() if name not in WITHOUT_EFFECT},
@@ -135,18 +127,10 @@ class RequestLog:
 
     A request that is noted, and has neither failed nor left a completion, was under way when the run was
     interrupted, and may be paid twice. The first line counts those of earlier interruptions, so that an
-    interruption at any moment has none counted twice.
-
-    Args:
-        path: the file, which exists only while the run is written, and after an interruption.
-        done: the completions that the run has.
-        lost: how many requests were under way at the interruptions that run.json knows of.
-
-    Raises:
-        BadInput: a line of the file notes no request.
+    interruption at any moment has none counted twice. The file goes when a run ends in order.
     """
 
-    def __init__(self, path: Path, done: set[Key], lost: int) -> None:
+    def __init__(self, path: Path, done: set[Key], lost: int) -> None:  # `lost` as run.json has it
         self.path = path
         earlier, noted = self._read()
         self.interrupted = len(noted - done)  # at the last interruption
@@ -166,11 +150,7 @@ class RequestLog:
             self.path.unlink()
 
     def sent(self, key: Key) -> None:
-        """Note a request that is about to be sent.
-
-        Raises:
-            OSError: the disk is full; nothing may be sent then.
-        """
+        """Note a request before it is sent; if the disk is full, the OSError keeps it from being sent."""
         self._file.append(to_line({"sent": key}))
         self.under_way.add(key)
 
@@ -181,7 +161,7 @@ class RequestLog:
             self._file.append(to_line({"failed": key}))
 
     def kept(self, key: Key) -> None:
-        """Note nothing: the completion, which is in its file now, says that the request has ended."""
+        """Forget a request; its completion, which is in its file now, shows that it has ended."""
         self.under_way.remove(key)
 
     def _read(self) -> tuple[int, set[Key]]:

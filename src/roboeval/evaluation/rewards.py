@@ -22,8 +22,7 @@ from roboeval.evaluation.judge import is_met, may_satisfy
 from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite
 
-ERRED = 0.5
-"""The part that remains of what a run did before an error: it had better returned at that line."""
+ERRED = 0.5  # the part of what a run did before an error that counts: it had better returned there
 
 REMEMBERED = 100_000  # rewards; a policy that learns writes the same program again and again
 
@@ -71,16 +70,10 @@ def reward(
 
 @dataclass(frozen=True)
 class Share:
-    """How much a program did in one world.
+    """How much a program did in one world."""
 
-    Args:
-        gained: the share of the requirements that did not hold before it began, and do now; None if there are
-            none.
-        kept: the share of the others that still hold, halved by an error.
-    """
-
-    gained: float | None
-    kept: float
+    gained: float | None  # of the requirements that did not hold at the start; None without any
+    kept: float  # of the others, halved by an error
 
     @classmethod
     def of(cls, outcome: Outcome, scenario: Scenario) -> Share:
@@ -114,11 +107,7 @@ class Rewards:
         os.register_at_fork(before=self._lock.acquire, after_in_parent=release, after_in_child=release)
 
     def of(self, suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
-        """The rewards of programs, in their order.
-
-        Raises:
-            EngineError: a process was lost twice.
-        """
+        """The rewards of programs, in their order."""
         names = [digest(suite.digest, task, program) for program in programs]
         with self._lock:
             rewards = {name: self._known[name] for name in names if name in self._known}

@@ -54,13 +54,7 @@ def failure_text(chosen: Filter) -> str | None:
 
 
 class TaskCells:
-    """The part of a run in a heat map of tasks by prompts.
-
-    Args:
-        run: as it was last read.
-        chosen: what is counted, by default what passed, and which cell is marked.
-        evaluation: as addresses are to name it.
-    """
+    """The part of a run in a heat map of tasks by prompts, where one cell may be marked."""
 
     def __init__(self, run: Snapshot, chosen: Filter, evaluation: str | None = None) -> None:
         self._run, self._filter, self._evaluation = run, chosen, evaluation

@@ -27,11 +27,7 @@ STATIC = Path(__file__).with_name("static")
 
 
 def pages(suites: Sequence[Suite] = ()) -> Pages:
-    """The pages.
-
-    Args:
-        suites: by which runs may have been judged, besides those that ship with the package.
-    """
+    """The pages; runs may have been judged by these suites, besides those that ship with the package."""
 
     def add(site: Site) -> None:
         store = RunStore(site.runs, suites)

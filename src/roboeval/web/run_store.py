@@ -31,12 +31,7 @@ class RunGoneError(BadInput):
 
 
 class RunStore:
-    """The runs in a folder, for any thread.
-
-    Args:
-        folder: in which they lie, or one that is a run itself; it need not exist yet.
-        suites: by which runs may have been judged, besides those that ship or are installed.
-    """
+    """The runs in a folder, for any thread; the folder may be a run itself, and need not exist yet."""
 
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
@@ -45,31 +40,15 @@ class RunStore:
         self._lock = threading.Lock()
 
     def names(self) -> list[str]:
-        """The names of the runs, sorted.
-
-        Raises:
-            BadInput: the folder cannot be read.
-        """
+        """The names of the runs, sorted."""
         return sorted(name for name, path in self._folders().items() if _is_run(path))
 
     def open(self, name: str, key: str | None = None) -> Snapshot:
-        """A run as it is now, or was a moment ago.
-
-        Args:
-            name: of the run.
-            key: of the evaluation; by default the first that requires everything, or none if there is none.
-
-        Raises:
-            BadInput: there is no such run or evaluation, or one of its files cannot be read.
-        """
+        """A run as it is now, or was a moment ago; its first evaluation that is not ablated, unless named."""
         return self._reader(name, key).read()
 
     def version(self, name: str) -> Hashable:
-        """The version that a run would have if it was opened now; it is not read.
-
-        Raises:
-            BadInput: as `open` does.
-        """
+        """The version that a run would have if it was opened now; it is not read."""
         return self._reader(name, None).version()
 
     def suite(self, name: str) -> Suite | None:
@@ -132,7 +111,12 @@ class _Reader:
             stamps = self._stamps_now()
             is_new = stamps != self._stamps and time.monotonic() >= self._rests_until
             if self._results is None or is_new:
-                self._results, self._stamps = self._timed(stamps), stamps
+                began = time.monotonic()
+                self._results, self._stamps = self._read_files(), stamps
+                ended = time.monotonic()
+                # Faults of files that changed while they were read may be gone by now.
+                mixed = bool(self._results.faults) and self._stamps_now() != stamps
+                self._rests_until = ended + (0 if mixed else REST * (ended - began))
             version = self._version(self._stamps)
             if self._snapshot is None or self._snapshot.version != version:
                 self._snapshot = Snapshot(
@@ -153,16 +137,6 @@ class _Reader:
         within = self._store.folder.resolve()
         paths = (run.completions, run.about, run.rows(key), run.head(key), checks)
         return tuple(_stamp(path, within) for path in paths)
-
-    def _timed(self, stamps: Stamps) -> Results:
-        began = time.monotonic()
-        results = self._read_files()
-        ended = time.monotonic()
-        mixed = (
-            bool(results.faults) and self._stamps_now() != stamps
-        )  # its files changed while they were read
-        self._rests_until = ended + (0 if mixed else REST * (ended - began))
-        return results
 
     def _read_files(self) -> Results:
         faults: list[BadInput] = []

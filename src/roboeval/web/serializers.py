@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Hashable, Mapping
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -69,7 +70,7 @@ def run_data(run: Snapshot) -> dict[str, Any]:
         "judged": run.judged,
         "to_judge": results.scope.total,
         "passed": run.passed,
-        "pass@1": None if mean is None else {"mean": mean.mean, "low": mean.low, "high": mean.high},
+        "pass@1": None if mean is None else asdict(mean),
         "notes": notes(run),
     }
 
@@ -113,14 +114,7 @@ class RunList:
         self._known: dict[str, tuple[Hashable, dict[str, Any]]] = {}
 
     def data(self, seconds: float = math.inf) -> list[dict[str, Any]]:
-        """What is known of all runs; of one that cannot be read, why.
-
-        Args:
-            seconds: after which no further run is read.
-
-        Raises:
-            BadInput: the folder cannot be read.
-        """
+        """All runs in short, or why one cannot be read; after so many seconds no further one is read."""
         until = time.monotonic() + seconds
         return [self._run_data(name, may_read=time.monotonic() < until) for name in self._store.names()]
 
@@ -169,11 +163,7 @@ def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, An
 
 
 def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A completion in short.
-
-    Args:
-        row: of `Snapshot.completions`.
-    """
+    """A completion in short, from a row of `Snapshot.completions`."""
     failure = {name: row[f"failure_{name}"] for name in ("class", "kind", "world", "check")}
     return {
         **{name: row[name] for name in (*KEY, "passed")},
@@ -185,15 +175,7 @@ def entry_data(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
-    """A completion with its program, and with each world's steps, failed checks and explanations.
-
-    Args:
-        run: in which it is.
-        row: of `Snapshot.completions`.
-
-    Raises:
-        BadInput: its row in the file is damaged, or does not stand there any more.
-    """
+    """A completion with its program, and with each world's steps, failed checks and explanations."""
     results = run.results
     key: Key = row["task"], row["prompt"], row["index"]
     completion = results.completions.get(key)

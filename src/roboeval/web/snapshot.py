@@ -19,6 +19,7 @@ from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 
 KEY = ("task", "prompt", "index")
+# How a program did in a world: + satisfied, - not, ! ended by an error.
 SIGN = (
     pl.when("satisfied")
     .then(pl.lit("+"))
@@ -26,8 +27,6 @@ SIGN = (
     .then(pl.lit("-"))
     .otherwise(pl.lit("!"))
 )
-"""How a program did in a world: + satisfied, - not, ! ended by an error."""
-
 MOST = 2**63
 
 
@@ -67,19 +66,12 @@ class Filter:
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One evaluation of a run as it was last read.
-
-    Args:
-        results: the verdicts; what could not be read is among its faults.
-        evaluations: the names of all evaluations of the run.
-        is_written: whether a process is writing the run.
-        version: differs whenever something has changed.
-    """
+    """One evaluation of a run as it was last read."""
 
     results: Results
-    evaluations: tuple[str, ...]
-    is_written: bool
-    version: Hashable
+    evaluations: tuple[str, ...]  # names of all of the run
+    is_written: bool  # by a process, now
+    version: Hashable  # differs whenever something has changed
 
     @property
     def name(self) -> str:
@@ -137,20 +129,14 @@ class Snapshot:
         return (None, None) if at is None else (keys[at - 1], keys[at + 1])
 
     def prompts(self, chosen: Filter) -> list[dict[str, Any]]:
-        """All prompts in order, and how many of their completions are `written`, `judged` and `counted`.
-
-        `share` is that of the counted ones among the judged; None where none is judged.
-
-        Args:
-            chosen: which completions are counted, of any task and prompt.
-        """
+        """All prompts, and how many completions are `written`, `judged` and `counted` (meant by a filter)."""
         judged = pl.col("judged")
         counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
             written=pl.col("written").sum(),
             judged=pl.col("passed").count(),
-            counted=chosen.verdict.condition.sum(),
+            counted=chosen.verdict.condition.sum(),  # whatever its task and prompt
         )
-        share = pl.col("counted") / pl.when(judged > 0).then(judged)
+        share = pl.col("counted") / pl.when(judged > 0).then(judged)  # null where nothing was judged
         return counts.with_columns(share=share).to_dicts()
 
     @property

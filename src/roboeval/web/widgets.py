@@ -46,12 +46,7 @@ class _DataElement(Element):
 
 
 class HeatMap(_DataElement, component="static/heat.js"):
-    """A table of shares, each cell with a shade.
-
-    Args:
-        label: what it is, for those who do not see it.
-        corner: what its rows are.
-        chosen: called with the task and the prompt of a cell that is clicked; by default cells are links.
+    """A table of shares, each cell with a shade; cells are links unless `chosen` takes their task and prompt.
 
     It shows `groups` of columns, with `name`, `href` and `columns`, each of these with `name`, `title` and
     `href`; and `rows` with `name` and `cells`, each of these with `text`, `shade`, `title`, `href` and `at`.
@@ -69,18 +64,13 @@ class HeatMap(_DataElement, component="static/heat.js"):
 class CompletionList(_DataElement, component="static/rows.js"):
     """A list of completions, of which the browser fetches those in view.
 
-    It shows those that the API lists at the address `source`; they have their pages below the address `base`,
-    with the `query`; `version` differs when they have changed.
+    The API lists them at the address `source`; they have their pages below the address `base`, with the
+    `query`; `version` differs when they have changed.
     """
 
 
 class ProgramView(Element, component="static/code.js"):
-    """A program.
-
-    Args:
-        program: its source; any text.
-        marked: the lines that are marked, counted from 1.
-    """
+    """A program, any text, with some lines marked, counted from 1."""
 
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()

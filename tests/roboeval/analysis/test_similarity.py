@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from roboeval.analysis.similarity import LONGEST, passing, shape, shortest_fix, similarity
+from roboeval.analysis.cluster import LONGEST, passing, shape, shortest_fix, similarity
 
 ONE = """\
 def task_program():

@@ -11,10 +11,9 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.terminal import shortened, visible
-from roboeval.analysis.cluster import Cluster
+from roboeval.analysis.cluster import Change, Cluster
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found
-from roboeval.analysis.similarity import Change
 from roboeval.cli.views.results import kind_view
 from roboeval.evaluation.explanation import GONE
 from roboeval.evaluation.runs.completions import how_many, name_of

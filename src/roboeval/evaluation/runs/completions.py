@@ -1,4 +1,4 @@
-"""Rows of completions and of evaluations: read with line numbers, written so that no crash loses one."""
+"""Rows of completions: read with line numbers, and named."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from codebotler.badinput import BadInput
 from codebotler.english import counted
 from codebotler.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.models.recorded import recorded_model
+from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite
 
 COMPLETIONS = "completions.jsonl"
@@ -121,27 +122,18 @@ def read_completions(
     path = Path(path)
     name = name or path
     seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
-    for number, line in _lines(path, name, faults):
-        try:
-            if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
-                _expect_new(completion.key, seen, number)
-                yield completion
-        except BadInput as error:
-            fault = BadInput(error.sentence, file=name, line=number)
-            if faults is None:
-                raise fault from None
-            faults.append(fault)
+    try:
+        for number, line in read_lines(path, name=name):
+            try:
+                if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
+                    _expect_new(completion.key, seen, number)
+                    yield completion
+            except BadInput as error:
+                add_or_raise(BadInput(error.sentence, file=name, line=number), faults)
+    except BadInput as error:
+        add_or_raise(error, faults)
     if not seen and faults is None:
         raise BadInput("there is no completion in it", file=name)
-
-
-def _lines(path: Path, name: Path | str, faults: list[BadInput] | None) -> Iterator[tuple[int, bytes]]:
-    try:
-        yield from read_lines(path, name=name)
-    except BadInput as error:
-        if faults is None:
-            raise
-        faults.append(error)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
@@ -167,37 +159,22 @@ def _expect_new(key: Key, seen: dict[tuple[str, int], dict[int, int]], number: i
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
-    """Refuse what would be too long to be read again once it is copied into a run.
-
-    Raises:
-        BadInput: it is.
-    """
+    """Raise BadInput if a row would be too long to be read again once it is copied into a run."""
     if len(to_line(row)) > MAX_ROW:
         sentence = f"as a row this is longer than {MAX_ROW:,} bytes; shorten the program"
         raise BadInput(sentence, file=str(file), line=line)
 
 
 def unknown(key: Key, suite: Suite) -> str | None:
-    """What is wrong with a completion's task or prompt; None if the suite knows both.
-
-    Args:
-        key: the completion's, as a row or somebody who writes Python gives it.
-        suite: whose tasks and prompts are known.
-    """
+    """What is wrong with a completion's task or prompt, as a user of Python may give it; None if nothing."""
     task = suite.tasks.get(str(key[0]))
     if task is None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
     there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
-    if not _is_whole(key[1]):
-        return f"the prompt is {key[1]!r}, not a whole number; {there_are}"
-    if not 0 <= key[1] < len(task.prompts):
-        return f"{name_of(key)}: {there_are}"
-    return None
-
-
-def _is_whole(number: object) -> bool:
-    """Whether it is a whole number, of any library's kind."""
-    return isinstance(number, SupportsIndex) and not isinstance(number, bool)
+    prompt: object = key[1]
+    if isinstance(prompt, bool) or not isinstance(prompt, SupportsIndex):  # numbers of NumPy are right
+        return f"the prompt is {prompt!r}, not a whole number; {there_are}"
+    return None if 0 <= key[1] < len(task.prompts) else f"{name_of(key)}: {there_are}"
 
 
 def name_of(key: Key) -> str:
@@ -216,7 +193,6 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     Raises:
         BadInput: there is no such model or suite, or the model knows none of its instructions.
     """
-    expect_text(name, "the model's name")
     model = recorded_model(name)
     found = False
     for task in suite.tasks.values():

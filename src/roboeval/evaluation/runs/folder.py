@@ -7,7 +7,7 @@ import fcntl
 import json
 import os
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,17 +28,11 @@ from roboeval.suites.load import ABLATED, Suite
 
 @dataclass(frozen=True)
 class Source:
-    """Completions that somebody names.
+    """Completions that somebody names."""
 
-    Args:
-        completions: all of them; each is one that the suite knows.
-        run: the run folder they stand in, if they do.
-        left_aside: what is to be said of files that are none; None if there is nothing to say.
-    """
-
-    completions: Sequence[Completion]
-    run: Run | None = None
-    left_aside: str | None = None
+    completions: Sequence[Completion]  # each known to the suite
+    run: Run | None = None  # in which they stand
+    left_aside: str | None = None  # a warning about files that are none
 
     def of(self, tasks: frozenset[str] | None) -> list[Completion]:
         """Those of some tasks, or all."""
@@ -46,16 +40,7 @@ class Source:
 
 
 def open_source(text: str, suite: Suite) -> Source:
-    """Read the completions that a person names.
-
-    Args:
-        text: a run folder, a .jsonl file or a pipe, a folder or zip of published .py files, or
-            `recorded:NAME`.
-        suite: whose tasks and prompts they are of.
-
-    Raises:
-        BadInput: there is no such thing, or a completion is wrong or unknown to the suite.
-    """
+    """Read a run folder, a .jsonl file or pipe, a folder or zip of published .py, or `recorded:NAME`."""
     if not text:
         raise BadInput("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
@@ -76,47 +61,39 @@ def open_source(text: str, suite: Suite) -> Source:
 
 @dataclass(frozen=True)
 class Run:
-    """The folder of a run.
-
-    Args:
-        path: where it is.
-    """
+    """The folder of a run."""
 
     path: Path
 
     @property
     def completions(self) -> Path:
-        """The file of its completions."""
+        """The programs, a row each."""
         return self.path / COMPLETIONS
 
     @property
     def about(self) -> Path:
-        """The file that says who wrote the completions, and how they were asked for."""
+        """Who wrote the completions, and how they were asked for."""
         return self.path / "run.json"
 
     @property
     def in_flight(self) -> Path:
-        """The file that notes requests for completions while they are under way."""
+        """Requests that are under way."""
         return self.path / "inflight.jsonl"
 
     def rows(self, key: str) -> Path:
-        """The file of an evaluation's rows; `key` is the suite's name, with -ablation where ablated."""
+        """The rows of an evaluation; `key` is the suite's name, with -ablation where ablated."""
         return self.path / "evaluations" / f"{key}.jsonl"
 
-    def programs(self, key: str) -> Path:
-        """The file that says, line by line, the hash of the program that each row judges."""
-        return self.path / "evaluations" / f"{key}.sha256"
-
     def head(self, key: str) -> Path:
-        """The file that says by what the rows of an evaluation were judged."""
+        """By what the rows of an evaluation were judged."""
         return self.path / "evaluations" / f"{key}.json"
 
     def checks(self, key: str) -> Path:
-        """The file of what a check said of its programs; `key` is the suite's name."""
+        """The problems of its programs; `key` is the suite's name."""
         return self.path / "checks" / f"{key}.jsonl"
 
     def checks_head(self, key: str) -> Path:
-        """The file that says how they were checked."""
+        """How they were checked."""
         return self.path / "checks" / f"{key}.json"
 
     def judged_by(self) -> list[str]:
@@ -130,11 +107,7 @@ class Run:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Keep other processes from writing this run.
-
-        Raises:
-            BadInput: one is writing it, or the folder cannot be written, or is one of other things.
-        """
+        """Keep other processes from writing this run; raises BadInput if one is writing it."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
@@ -155,7 +128,9 @@ class Run:
         except BaseException:
             if made and list(self.path.iterdir()) == [lock]:
                 lock.unlink()
-                _remove_empty(made)
+                with contextlib.suppress(OSError):
+                    for folder in made:
+                        folder.rmdir()
             raise
         finally:
             os.close(descriptor)
@@ -163,10 +138,9 @@ class Run:
     @property
     def is_being_written(self) -> bool:
         """Whether a process writes it. Our hold lasts a moment, for which a writer has patience."""
+        flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
         try:
-            descriptor = os.open(
-                self.path / ".lock", os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
-            )
+            descriptor = os.open(self.path / ".lock", flags)
         except OSError:
             return False
         try:
@@ -188,17 +162,16 @@ class Run:
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
-        """Make this the run of some completions: copy them, unless they are here already.
-
-        Raises:
-            BadInput: other completions are here; then nothing is changed.
-            OSError: they cannot be written; then nothing is changed either.
-        """
+        """Copy completions into this run; raises BadInput if it holds others. An error changes nothing."""
         models = {completion.model for completion in completions}
         lines = (to_line(completion.row) for completion in completions)
         with self.writing():
             if self.completions.exists():
-                self._expect(lines)
+                with self.completions.open("rb") as file:
+                    same = all(file.read(len(line)) == line for line in lines)
+                    if not same or file.read(1):
+                        other = "this run holds other completions; name another folder"
+                        raise BadInput(other, file=self.path)
                 return
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
             write_whole(self.about, to_text(about))
@@ -209,19 +182,13 @@ class Run:
                 self.about.unlink()
                 raise
 
-    def _expect(self, lines: Iterable[bytes]) -> None:
-        with self.completions.open("rb") as file:
-            same = all(file.read(len(line)) == line for line in lines)
-            if not same or file.read(1):
-                raise BadInput("this run holds other completions; name another folder", file=self.path)
-
 
 PATIENCE = 20  # times that a lock is tried
 PAUSE = 0.05  # seconds between two
 
 
 def _locked(descriptor: int) -> bool:
-    """Lock a file; what a killed process was just starting may hold it for a moment longer."""
+    """Lock a file; children of a process that was killed may hold it for a moment longer."""
     for _ in range(PATIENCE):
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -232,22 +199,11 @@ def _locked(descriptor: int) -> bool:
     return False
 
 
-def _remove_empty(folders: list[Path]) -> None:
-    with contextlib.suppress(OSError):
-        for folder in folders:
-            folder.rmdir()
-
-
 def load_head(path: Path) -> dict[str, Any]:
-    """Read a KEY.json or run.json.
-
-    Raises:
-        BadInput: it is missing or no JSON object.
-    """
+    """Read a KEY.json or run.json."""
+    text = read_text(path)
     try:
-        data = json.loads(read_text(path))
-    except BadInput:
-        raise
+        data = json.loads(text)
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):
@@ -263,21 +219,8 @@ def evaluation_key(suite: Suite, *, ablated: bool) -> str:
 def tasks_to_judge(
     suite: Suite, names: str | None, *, ablated: bool
 ) -> tuple[frozenset[str] | None, tuple[str, ...]]:
-    """Which tasks a person means, and those left out because they have no ablation.
-
-    Args:
-        suite: whose tasks.
-        names: separated by commas; None for all.
-        ablated: whether they need an ablation.
-
-    Raises:
-        BadInput: a task is unknown, or none of them has an ablation.
-    """
-    wanted = (
-        tuple(suite.tasks)
-        if names is None
-        else tuple(suite.task(name.strip()).name for name in names.split(","))
-    )
+    """The tasks of a list with commas, None for all, and those left out as they have no ablation."""
+    wanted = [*suite.tasks] if names is None else [suite.task(name.strip()).name for name in names.split(",")]
     if not ablated:
         return (None if names is None else frozenset(wanted)), ()
     left = tuple(name for name in wanted if suite.tasks[name].ablation is None)

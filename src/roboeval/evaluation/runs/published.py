@@ -23,18 +23,14 @@ NAME = re.compile(r"(?P<task>[A-Za-z]\w*?)_(?P<prompt>\d{1,9})_(?P<index>\d{1,9}
 NAMED = "TASK_PROMPT_INDEX.py, such as LunchTime_0_1.py"
 UNREADABLE = (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError, ValueError)
 
-File: TypeAlias = tuple[str, Callable[[], str]]
-"""A file's name, and what reads its text."""
+File: TypeAlias = tuple[str, Callable[[], str]]  # its name, and what reads its text
 
 
 def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Completion]:
     """The completions in a folder or zip of `TASK_PROMPT_INDEX.py`, of prompts that a suite knows.
 
-    The files assign texts to `prompt` and `completion`; they are parsed and never imported.
-
-    Raises:
-        BadInput: it holds no such file, one of them is wrong or unknown to the suite, or a zip is damaged,
-            encrypted or too large.
+    The files assign texts to `prompt` and `completion`; they are parsed and never imported. Raises BadInput
+    if there is none, one is wrong or unknown to the suite, or a zip is damaged, encrypted or too large.
     """
     with _files(path) as files:
         for key, (name, read) in sorted(_by_key(files, path).items()):

@@ -18,7 +18,7 @@ from codebotler.badinput import BadInput
 from codebotler.files import read_rows
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
-from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, read_lines_of
+from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, add_or_raise, read_lines_of
 from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
@@ -63,11 +63,7 @@ def load_results(
 
 
 def expect_judged(run: Run, key: str) -> None:
-    """Refuse what is no run, and one without an evaluation.
-
-    Raises:
-        BadInput: so it is.
-    """
+    """Raise BadInput if a folder is no run, or lacks an evaluation."""
     if not run.completions.is_file():
         raise BadInput("is no run: it holds no completions.jsonl", file=run.path)
     if not run.rows(key).is_file():
@@ -79,21 +75,15 @@ def expect_judged(run: Run, key: str) -> None:
 
 @dataclass(frozen=True)
 class Scope:
-    """What there is to judge.
+    """What there is to judge."""
 
-    Args:
-        completions: how many there are by task, also of tasks that were not selected.
-        tasks: which were selected; None for all.
-        models: who wrote the completions of those; None where nobody recorded it.
-    """
-
-    completions: Mapping[str, int]
-    tasks: frozenset[str] | None = None
-    models: frozenset[str | None] = frozenset()
+    completions: Mapping[str, int]  # by task, also of tasks that were not selected
+    tasks: frozenset[str] | None = None  # those selected; None for all
+    models: frozenset[str | None] = frozenset()  # of the selected; None: not recorded
 
     @classmethod
     def of(cls, completions: Iterable[Completion], tasks: frozenset[str] | None) -> Scope:
-        """Look through completions once."""
+        """Count completions, in one pass."""
         counts: Counter[str] = Counter()
         models: set[str | None] = set()
         for completion in completions:
@@ -114,31 +104,17 @@ class Scope:
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """One evaluation of a run.
-
-    Args:
-        run: whose.
-        key: the name of its files.
-        suite: by which it was judged, if it is at hand.
-        head: what KEY.json says: by what was judged.
-        about: what run.json says: how the completions were asked for.
-        completions: those that stand in the run now, in order.
-        table: as `load_results` gives it.
-        failed: the rows of the completions that failed, without the traces of worlds that did not decide;
-            empty where they were not kept.
-        places: where the row of each completion lies in the file: its first byte, and how many.
-        faults: what is wrong with lines of the files, if it was not raised.
-    """
+    """One evaluation of a run."""
 
     run: Run
     key: str | None
-    suite: Suite | None
-    head: Mapping[str, Any]
-    about: Mapping[str, Any]
-    completions: Mapping[Key, Completion]
-    table: pl.DataFrame
-    failed: Mapping[Key, RowData] = field(repr=False)
-    places: Mapping[Key, tuple[int, int]] = field(repr=False)
+    suite: Suite | None  # None if it is not at hand
+    head: Mapping[str, Any]  # KEY.json: by what was judged
+    about: Mapping[str, Any]  # run.json: how the completions were asked for
+    completions: Mapping[Key, Completion]  # those in the run now, in order
+    table: pl.DataFrame  # as `load_results` gives it
+    failed: Mapping[Key, RowData] = field(repr=False)  # without traces of worlds that did not decide
+    places: Mapping[Key, tuple[int, int]] = field(repr=False)  # first byte and size of each row in the file
     faults: tuple[BadInput, ...] = ()
 
     @property
@@ -177,11 +153,7 @@ class Results:
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
     def row(self, key: Key) -> Row:
-        """The row of a completion with all its traces, read again from its place in the file.
-
-        Raises:
-            BadInput: it does not stand there any more.
-        """
+        """Read a row again, with all its traces; raises BadInput if the file was written anew."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
         try:
@@ -196,11 +168,7 @@ class Results:
 
 
 def selected_tasks(head: Mapping[str, Any], path: Path) -> frozenset[str] | None:
-    """The tasks that a KEY.json names; None for all.
-
-    Raises:
-        BadInput: somebody wrote something else there.
-    """
+    """The tasks that a KEY.json names; None for all. Raises BadInput if somebody wrote something else."""
     tasks = head.get("tasks")
     if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) for task in tasks)):
         raise BadInput('"tasks" is no list of names; --redo starts over', file=path)
@@ -212,26 +180,12 @@ def read_results(
     key: str | None,
     suite: Suite | None = None,
     *,
-    keep_failed: bool = True,
+    keep_failed: bool = True,  # may take much memory
     faults: list[BadInput] | None = None,
-    see: Callable[[bytes], None] | None = None,
-    watch: Callable[[Iterator[Line], int], Iterable[Line]] = lambda lines, _: lines,
+    see: Callable[[bytes], None] | None = None,  # gets the line of each row
+    watch: Callable[[Iterator[Line], int], Iterable[Line]] = lambda lines, _: lines,  # gets the total, too
 ) -> Results:
-    """Read an evaluation of a run; each of its files is read once.
-
-    Args:
-        run: whose.
-        key: the name of the evaluation's files; None where nothing has been judged.
-        suite: by which it was judged, for the categories of failed checks; none are given without it.
-        keep_failed: whether to keep the rows of the completions that failed, which may take much memory.
-        faults: gets what is wrong with files and lines, which are then left out, rather than that it is
-            raised.
-        see: sees each row's line.
-        watch: passes the lines of the rows on as they are read, and is given how many there are to be.
-
-    Raises:
-        BadInput: a file is missing or damaged.
-    """
+    """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
     head = {} if key is None else _head(run.head(key), faults)
     about = _head(run.about, faults) if run.about.exists() else {}
     tasks = selected_tasks(head, run.head(key or ""))
@@ -267,17 +221,12 @@ def _head(path: Path, faults: list[BadInput] | None) -> Mapping[str, Any]:
     try:
         return load_head(path)
     except BadInput as error:
-        if faults is None:
-            raise
-        faults.append(error)
+        add_or_raise(error, faults)
         return {}
 
 
 class FailedRows(Mapping[Key, RowData]):
-    """The rows of completions that failed; of the verdicts only the deciding one is whole.
-
-    Most are never looked at, so that each is kept as it was read until somebody asks for it.
-    """
+    """Rows of completions that failed, with the deciding verdict only, decoded on demand."""
 
     def __init__(self) -> None:
         self._kept: dict[Key, tuple[JudgedRow, bytes]] = {}
@@ -327,7 +276,5 @@ def _accepted(run: Run, key: str | None, faults: list[BadInput] | None) -> Mappi
         for _, row in read_rows(path, growing=True):
             accepted[row["task"], row["program_sha256"]] = not row["problems"]
     except BadInput as error:
-        if faults is None:
-            raise
-        faults.append(error)
+        add_or_raise(error, faults)
     return accepted

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias, TypedDict
@@ -25,8 +25,8 @@ HASH = "0" * 64
 KINDS = frozenset(SKILLS.recordings)
 NO_ROW = "this line is no row of an evaluation"
 BROKEN = "was damaged or changed after the evaluation was finished"
+# The group is an escape of half a surrogate pair; the rest is what looks like one.
 ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
-"""What has to be told apart from an escape of half a surrogate pair, which is the group."""
 
 
 class Judgement(TypedDict):
@@ -61,12 +61,18 @@ class Row(Judgement):
     program_sha256: str
 
 
-RowData: TypeAlias = Mapping[str, Any]
-"""A row of an evaluation, or a part of one, as JSON has it."""
+RowData: TypeAlias = Mapping[str, Any]  # a row of an evaluation, or a part of one, as JSON has it
+
+
+def add_or_raise(fault: BadInput, faults: list[BadInput] | None) -> None:
+    """Add a fault to those that are collected; raise it where none are."""
+    if faults is None:
+        raise fault from None
+    faults.append(fault)
 
 
 def key_of(row: RowData) -> tuple[str, int, int]:
-    """What no other row of an evaluation shares."""
+    """The task, prompt and index of a row."""
     return row["task"], row["prompt"], row["index"]
 
 
@@ -78,19 +84,12 @@ class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Failure(_Part, frozen=True):
-    """The one reason for which a completion fails (paper, section V.B).
+    """The one reason for which a completion fails (paper, section V.B)."""
 
-    Args:
-        failure_class: one of the three classes.
-        kind: the kind within it.
-        world: position of the first unsatisfied world, counted from 0.
-        check: the first failed requirement there; None where an error decided.
-    """
-
-    failure_class: str = msgspec.field(name="class")
+    failure_class: str = msgspec.field(name="class")  # one of CLASSES
     kind: str
-    world: int
-    check: str | None = None
+    world: int  # the first unsatisfied one, from 0
+    check: str | None = None  # None where an error decided
 
 
 class ErrorOfRun(_Part, frozen=True):
@@ -144,7 +143,7 @@ class JudgedRow(_Part, frozen=True):
 
     @property
     def key(self) -> tuple[str, int, int]:
-        """What no other row of an evaluation shares."""
+        """Its task, prompt and index."""
         return self.task, self.prompt, self.index
 
 
@@ -152,15 +151,7 @@ DECODER = msgspec.json.Decoder(JudgedRow)
 
 
 def judged_row(line: bytes, *, check_kinds: bool = False) -> JudgedRow:
-    """The row of an evaluation that a line says.
-
-    Args:
-        line: of JSON.
-        check_kinds: whether to look into each event, too.
-
-    Raises:
-        BadInput: it is none, or something in it is unknown.
-    """
+    """Decode a row of an evaluation; with `check_kinds` look into each event, too."""
     try:
         row = _decoded(line)
         if check_kinds:
@@ -190,17 +181,10 @@ def _expect_known_kinds(row: JudgedRow) -> None:
 
 @dataclass(frozen=True)
 class Line:
-    """A row with its place in the file.
+    """A row with its place in the file."""
 
-    Args:
-        number: of its line, counted from 1.
-        at: where its line begins, in bytes.
-        size: of the line, in bytes.
-        row: what it says.
-    """
-
-    number: int
-    at: int
+    number: int  # from 1
+    at: int  # first byte in the file
     size: int
     row: JudgedRow
 
@@ -213,19 +197,7 @@ def read_lines_of(
     see: Callable[[bytes], None] | None = None,
     faults: list[BadInput] | None = None,
 ) -> Iterator[Line]:
-    """Read an evaluation, once and in order; a torn last line is passed over.
-
-    Args:
-        path: the file of the rows.
-        head: what KEY.json says.
-        seal: takes the lines into account as they are read.
-        see: sees the line of each row that is read.
-        faults: gets what is wrong with lines, which are then passed over, rather than that it is raised.
-
-    Raises:
-        BadInput: the file is missing, a line is no row of an evaluation, or, once all were read, they are
-            others than those of the finished evaluation.
-    """
+    """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
     seal = seal or Seal()
     at = 0
     for number, line in read_lines(path, limit=LONGEST_LINE):
@@ -239,17 +211,10 @@ def read_lines_of(
         except BadInput as error:
             if not line.endswith(b"\n"):
                 break
-            fault = BadInput(f"{error.sentence}; --redo starts over", file=path, line=number)
-            if faults is None:
-                raise fault from None
-            faults.append(fault)
+            add_or_raise(BadInput(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
         at += len(line)
-    if seal.is_broken(head):
-        broken = BadInput(f"{BROKEN}; --redo starts over", file=path)
-        if faults is None:
-            raise broken
-        if not faults:
-            faults.append(broken)
+    if seal.is_broken(head) and not faults:
+        add_or_raise(BadInput(f"{BROKEN}; --redo starts over", file=path), faults)
 
 
 # --- the seal of a finished file
@@ -262,7 +227,7 @@ class Seal:
         self._count, self._hash = 0, hashlib.sha256()
 
     def add(self, line: bytes) -> None:
-        """Take a line of the file into account, whether it is read or written."""
+        """Count a line that was read or written."""
         self._count += bool(line.strip())
         self._hash.update(line)
 
@@ -271,16 +236,12 @@ class Seal:
         return {"rows": self._count, "sha256": self._hash.hexdigest()}
 
     def is_broken(self, head: Mapping[str, Any]) -> bool:
-        """Whether these are other rows than when the evaluation was finished; never so before it is.
-
-        Args:
-            head: what KEY.json says.
-        """
+        """Whether these are other rows than when the evaluation was finished."""
         return is_sealed(head) and any(head.get(name) != value for name, value in self.data().items())
 
 
 def is_sealed(head: Mapping[str, Any]) -> bool:
-    """Whether a KEY.json tells of a finished evaluation; one of an earlier version never does."""
+    """Whether a KEY.json is that of a finished evaluation; that of an earlier version never is."""
     return "rows" in head or "sha256" in head
 
 
@@ -288,19 +249,13 @@ def is_sealed(head: Mapping[str, Any]) -> bool:
 
 
 def bounded(judgement: Judgement) -> Judgement:
-    """A judgement that fits into a row, with traces cut where they must be; a shorter one as it is.
-
-    Each world has an equal share of the bytes. Of a trace that takes more, `cut` says how many events are
-    left out, and the SHA-256 of the JSON of all of it.
-
-    Args:
-        judgement: with whole traces.
-    """
+    """A judgement that fits into a row: of a longer one each world has an equal share, and traces are cut."""
     verdicts = judgement["verdicts"]
     most = max(MOST, MOST_OF_WORLD * len(verdicts)) - NAMES
     if not verdicts or len(to_line(judgement)) <= most:
         return judgement
-    bare = [{**verdict, "trace": [], "cut": _cut(verdict["trace"], HASH)} for verdict in verdicts]
+    longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH} for verdict in verdicts)
+    bare = [{**verdict, "trace": [], "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)]
     share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
     return {**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]}
 
@@ -312,12 +267,8 @@ def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
         size += len(_json(event)) + BETWEEN
         if size > share:
             whole = hashlib.sha256(_json(trace)).hexdigest()
-            return {**verdict, "trace": trace[:kept], "cut": _cut(trace[kept:], whole)}
+            return {**verdict, "trace": trace[:kept], "cut": {"events": len(trace) - kept, "sha256": whole}}
     return verdict
-
-
-def _cut(events: Sequence[object], sha256: str) -> dict[str, Any]:
-    return {"events": len(events), "sha256": sha256}
 
 
 def _json(data: object) -> bytes:

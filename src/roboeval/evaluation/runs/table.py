@@ -55,12 +55,7 @@ WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
-    """A table whose `accepted` says what a check says.
-
-    Args:
-        table: as `load_results` gives it.
-        problems: what the check found, by task and hash of the program.
-    """
+    """A table whose `accepted` is whether the check found no problem in a program, by task and hash."""
     names = ["task", "program_sha256"]
     answers = [(*key, not found) for key, found in problems.items()]
     accepted = pl.DataFrame(
@@ -71,19 +66,13 @@ def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequenc
 
 
 class TableBuilder:
-    """Collects rows of an evaluation, column by column.
-
-    Args:
-        completions: those that stand in the run now.
-        categories: of requirements, by task and text.
-        accepted: whether the check found no problem, by task and hash of the program.
-    """
+    """Collects rows of an evaluation as the table that `load_results` describes."""
 
     def __init__(
         self,
-        completions: Mapping[Key, Completion] = {},
-        categories: Mapping[tuple[str, str], str] = {},
-        accepted: Mapping[tuple[str, str], bool] = {},
+        completions: Mapping[Key, Completion] = {},  # those in the run now
+        categories: Mapping[tuple[str, str], str] = {},  # of requirements, by task and text
+        accepted: Mapping[tuple[str, str], bool] = {},  # by task and hash of the program
     ) -> None:
         self._completions, self._categories, self._accepted = completions, categories, accepted
         self._frame = pl.DataFrame(schema={**COMPLETION_COLUMNS, **WORLD_COLUMNS})
@@ -137,7 +126,7 @@ class TableBuilder:
             )
 
     def table(self) -> pl.DataFrame:
-        """All that was added, as `load_results` describes it."""
+        """All that was added."""
         self._store()
         return self._frame.rechunk()
 
@@ -164,7 +153,7 @@ def _number(value: Any, kind: type | UnionType) -> float | None:  # noqa: ANN401
 
 
 def storable(text: str) -> str:
-    """A text that UTF-8 can hold; half of a surrogate pair is written out as an escape."""
+    """A text that UTF-8 can hold, with halves of surrogate pairs as escapes."""
     return text.encode(errors="backslashreplace").decode()
 
 
@@ -172,45 +161,28 @@ def storable(text: str) -> str:
 
 
 FORMATS = ("csv", "parquet")
-BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")
-"""What a file of such a table begins with, by its format."""
+BEGINNINGS = (b"task,prompt,index,model,", b"PAR1")  # of files in these formats
 
 
 def kind_of(path: Path | None) -> str:
-    """The format that a file's name asks for; csv if it asks for none."""
+    """The format of a file's ending; csv if it has none of them."""
     ending = "" if path is None else path.suffix.removeprefix(".").lower()
     return ending if ending in FORMATS else FORMATS[0]
 
 
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
-    """Write a table to a file; the same table gives the same bytes.
-
-    A spreadsheet takes a cell that starts with =, +, -, @, a tab or a line end for a formula, and texts here
-    come from models. So in CSV such a text gets a ' in front, as OWASP advises; parquet holds it as it is.
-
-    Args:
-        frame: the table.
-        path: the file; replaced if it is there, once all is written.
-        kind: csv or parquet.
-
-    Raises:
-        BadInput: there is no such format or folder.
-        OSError: the file cannot be written; then what stood there stays.
-    """
+    """Write a table to a file as csv or parquet; the same table gives the same bytes."""
     if kind not in FORMATS:
         raise BadInput(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
     if not path.parent.is_dir():
         raise BadInput("there is no such folder", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
-        _harmless(frame).write_csv(content)
+        # A spreadsheet takes a cell that begins so for a formula; OWASP advises the ' in front.
+        frame.with_columns(pl.col(pl.String).str.replace(r"^([=+\-@\t\r\n])", "'${1}")).write_csv(content)
     else:
         frame.write_parquet(content)
     if path.exists() and not path.is_file():  # such as /dev/stdout, which nothing may take the place of
         path.write_bytes(content.getvalue())
     else:
         write_whole(path.resolve() if path.is_symlink() else path, content.getvalue())
-
-
-def _harmless(frame: pl.DataFrame) -> pl.DataFrame:
-    return frame.with_columns(pl.col(pl.String).str.replace(r"^([=+\-@\t\r\n])", "'${1}"))
