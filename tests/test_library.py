@@ -338,6 +338,13 @@ print(count([*evaluate([completion], load_suite())]))
 """
 
 
+@pytest.fixture(scope="module")
+def typed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which a type checker keeps what it has read."""
+    pytest.importorskip("mypy")
+    return tmp_path_factory.mktemp("typed")
+
+
 @pytest.mark.parametrize(
     ("right", "wrong", "found"),
     [
@@ -347,13 +354,12 @@ print(count([*evaluate([completion], load_suite())]))
         (", program=", ", text=", 'Unexpected keyword argument "text"'),
     ],
 )
-def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: str, tmp_path: Path) -> None:
-    pytest.importorskip("mypy")
-    (tmp_path / "uses.py").write_text(USES.replace(right, wrong) if right else USES)
-    ours = ("--strict", "--follow-imports", "silent", "--cache-dir", str(tmp_path))
-    words = [sys.executable, "-m", "mypy", *ours, "uses.py"]
+def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: str, typed: Path) -> None:
+    uses = typed / "uses.py"
+    uses.write_text(USES.replace(right, wrong) if right else USES)
+    words = [sys.executable, "-m", "mypy", "--strict", "--follow-imports", "silent", "uses.py"]
     env = {**os.environ, "MYPYPATH": str(ROOT / "src")}
-    ended = subprocess.run(words, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    ended = subprocess.run(words, cwd=typed, env=env, capture_output=True, text=True, check=False)
     assert found in ended.stdout
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import http.client
 import json
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -28,6 +26,8 @@ from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question
 from codebotler.web.guard import MOST_BYTES
 from codebotler.web.view import View
 from codebotler.world import Room, World
+from command_line import ENVIRONMENT
+from forked import Forked
 from pageserver import PageServer
 
 TEA = """def task_program():
@@ -274,10 +274,11 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
 )
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], named: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
-    command = [sys.executable, "-m", "codebotler", "serve", "--world", "world.yaml", "--face", *arguments]
-    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
-    assert ended.returncode == 2
-    assert named in ended.stderr
+    words = ("serve", "--world", "world.yaml", "--face", *arguments)
+    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT) as process:
+        _, err = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert named in err
 
 
 def test_tokens_can_be_named_so_that_a_tablets_link_stays(tmp_path: Path) -> None:

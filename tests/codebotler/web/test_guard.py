@@ -6,8 +6,6 @@ import asyncio
 import http.client
 import json
 import re
-import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -19,6 +17,8 @@ from websockets.sync.client import connect
 from codebotler.web.access import TRIES, WINDOW, Access, Role, TooManyTriesError
 from codebotler.web.guard import LOOPBACK, MOST_BYTES, Guard, Rules, _is_same
 from codebotler.web.place import Place
+from command_line import ENVIRONMENT
+from forked import Forked
 from pageserver import PageServer
 
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
@@ -195,10 +195,11 @@ def test_a_token_is_made_for_each_start() -> None:
 )
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
     (tmp_path / "world.yaml").write_text("robot: a\nrooms: [a]\n")
-    command = [sys.executable, "-m", "codebotler", "serve", "--world", "world.yaml", *arguments]
-    ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
-    assert ended.returncode == 2
-    assert told in ended.stderr
+    words = ("serve", "--world", "world.yaml", *arguments)
+    with Forked("codebotler", *words, cwd=tmp_path, environment=ENVIRONMENT) as process:
+        _, err = process.communicate(timeout=30)
+    assert process.returncode == 2
+    assert told in err
 
 
 def test_other_machines_need_the_token_and_that_is_said(tmp_path: Path) -> None:
