@@ -1,4 +1,4 @@
-"""Commands that show what was judged: show, export."""
+"""The commands show, export and serve, which show what was judged."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from codebotler.options import HostOption, NameOption, NoTokenOption, PortOption, TokenOption
 from roboeval.cli.options import (
     AblationOption,
     JsonOption,
     RunArgument,
     SuiteOption,
     complaint_of,
+    load,
     named,
     open_current,
     open_run,
@@ -44,14 +46,13 @@ def show(
     """Print a run's tables, or show why a completion fails."""
     from roboeval.analysis.tasks import parse_selection
 
-    opened = open_run(run, suite, ablated=ablation)
-    results = opened.results
-    selection = parse_selection(what, opened.suite)
+    results, judged_by, again = open_run(run, suite, ablated=ablation)
+    selection = parse_selection(what, judged_by)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
         print_summary(
             results.table,
-            opened.suite,
+            judged_by,
             results.scope,
             title=str(run),
             ablated=ablation,
@@ -67,9 +68,9 @@ def show(
         selection.expect_judged(results)
         show_part(results, selection.task, selection.prompt, selection.index, as_json=json)
     if (complaint := complaint_of(results)) is not None:
-        note(f"{complaint}; `{opened.again} --redo` judges what stands there")
+        note(f"{complaint}; `{again} --redo` judges what stands there")
     if (unfinished := unfinished_of(results)) is not None:
-        note(f"{unfinished}; `{opened.again}` goes on")
+        note(f"{unfinished}; `{again}` goes on")
 
 
 def print_summary(
@@ -138,3 +139,34 @@ def export(
     expect_replaceable(path, *BEGINNINGS)
     write_table(results.table, path, kind)
     note(f"the table is in {path}")
+
+
+def serve(
+    runs: Annotated[Path, typer.Argument(help="A folder of runs, or one run.")] = Path("runs"),
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    name: NameOption = None,
+    token: TokenOption = None,
+    no_token: NoTokenOption = False,
+    suite: Annotated[
+        list[str] | None,
+        typer.Option(help="The folder of a suite by which runs were judged; more than one may be named."),
+    ] = None,
+) -> None:
+    """Show runs in a browser.
+
+    They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
+    """
+    from codebotler.badinput import BadInput
+    from codebotler.web.place import entrance
+    from codebotler.web.serving import serve as serve_page
+    from roboeval.web.pages import pages
+    from roboeval.web.run_store import RunStore
+
+    place, access = entrance(host, port, name or (), token, no_token=no_token)
+    if not runs.is_dir():
+        raise BadInput("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
+    suites = [load(each) for each in suite or ()]
+    if not RunStore(runs).names():
+        note(f"{runs} holds no run yet; those that come are shown, too")
+    serve_page(None, place, access, (pages(suites),), runs)

@@ -82,9 +82,10 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     for run in runs:
         about, head = run.results.about, run.results.head
         settings = about.get("settings")
+        told = None
         if isinstance(settings, dict):
-            settings = ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
-        asked = (settings, about.get("template"), about.get("codebotler"))
+            told = ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
+        asked = (told, about.get("template"), about.get("codebotler"))
         judged = (head.get(name) for name in ("codebotler", "python", "digest"))
         origin = ["not recorded" if value is None else str(value) for value in (*asked, *judged)]
         rows.append([run.name, run.folder, run.completions.height, *origin])

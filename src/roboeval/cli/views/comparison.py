@@ -1,4 +1,4 @@
-"""How much better one run is than another, and what a second suite changes."""
+"""Views of a comparison of two runs, and of two suites."""
 
 from __future__ import annotations
 
@@ -56,12 +56,7 @@ def _p(value: float) -> str:
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
-    """What a second suite changes, as text and tables.
-
-    Args:
-        found: at least one.
-        most: how many groups of programs are shown of each run and direction.
-    """
+    """What a second suite changes, with at most `most` groups of programs for each run and direction."""
     sentences = [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences]
     parts += [Text(), _scores(found)]

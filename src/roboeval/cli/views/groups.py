@@ -1,4 +1,4 @@
-"""Completions that were found, failures in groups, and what asking again would have given."""
+"""Views of completions found, of groups of failures, and of rejection sampling."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_LINES = 60  # of a difference between programs
 
 
 def found_view(found: Sequence[Found], total: int) -> RenderableType:
-    """How many completions were found, by task, for a person."""
+    """The number of completions found, by task."""
     head = Text(f"found {len(found):,} of {how_many(total)}", "bold")
     if not found:
         return head
@@ -42,7 +42,7 @@ def found_view(found: Sequence[Found], total: int) -> RenderableType:
 
 
 def cluster_view(cluster: Cluster) -> RenderableType:
-    """A group for a person: how many, why, and what would have helped."""
+    """A group of failures: their number, the reason, and the nearest program that passes."""
     size = how_many(len(cluster.members))
     name = visible(name_of(cluster.representative))
     head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
@@ -67,13 +67,7 @@ def _change(change: Change) -> Text:
 
 
 def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str) -> RenderableType:
-    """The same as a table for people.
-
-    Args:
-        prompts: at least one.
-        limits: numbers of retries.
-        title: which run it is about.
-    """
+    """The results of asking again, by limit of retries."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     heads = ("retries", "pass@1", *(f"pass@1\n≥ {t:g}" for t in THRESHOLDS), "accepted", "run at all")
     for name in heads:

@@ -1,4 +1,4 @@
-"""Tables of a run, of one of its tasks, and how failures are named."""
+"""Views of a run and of one of its tasks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _missed(missing: Missing) -> Iterator[Text]:
 
 @dataclass(frozen=True)
 class _TaskTable:
-    """The scores of tasks; where there is no room for all columns, names of tasks stay whole."""
+    """The scores of tasks, with fewer columns where names of tasks would be broken otherwise."""
 
     summary: Summary
 
@@ -65,7 +65,6 @@ class _TaskTable:
         yield next(fitting, tables[-1])
 
     def _tables(self) -> Iterator[Table]:
-        """The table with fewer and fewer columns."""
         passes = [f"pass@{k}" for k in self.summary.k]
         yield self._table("completions", *passes, "worst prompt", "best prompt")
         yield self._table("completions", *passes, "worst\nprompt", "best\nprompt")
@@ -117,11 +116,7 @@ def _name(failures: Failures) -> str:
 
 
 def task_view(data: Mapping[str, Any]) -> RenderableType:
-    """A task, prompt by prompt.
-
-    Args:
-        data: as `task_data` gives it.
-    """
+    """A task, prompt by prompt; the data is that of `task_data`."""
     task = data["task"]
     models = {model for prompt in data["prompts"] for model in prompt["models"]}
     parts: list[RenderableType] = [Text(visible(task) + by_hand(models), style="bold")]
@@ -138,7 +133,7 @@ def task_view(data: Mapping[str, Any]) -> RenderableType:
 
 
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
-    """The head of a prompt: how often it passes, and what the model was told."""
+    """The head of a prompt: its score, and its instruction."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
     head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
     if prompt["gone"] == prompt["completions"]:

@@ -1,4 +1,4 @@
-"""A suite's tasks, and one task with its checks and worlds."""
+"""Views of a suite's tasks, and of one task with its checks and worlds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def suite_view(suite: Suite) -> RenderableType:
 
 
 def suite_task_view(task: Task) -> RenderableType:
-    """One task: its phrasings, its checks, and what each world requires."""
+    """One task: its prompts, its checks, and the requirements of each world."""
     parts: list[RenderableType] = [
         Text.assemble((task.name, "bold"), f"  {task.summary}"),
         Text(f"takes {', '.join(task.abilities)}", "dim"),
@@ -75,7 +75,7 @@ def _room_lines(world: World) -> Iterator[Text]:
 
 @dataclass(frozen=True)
 class _Formula:
-    """A formula that is broken into lines where no text of it is torn."""
+    """A formula that wraps between its words, but never within a quoted text."""
 
     text: str
     style: str = ""
