@@ -66,17 +66,11 @@ def _is_among(pattern: str, labels: Iterable[str]) -> bool:
 def _mentioned(element: Element, task: Task) -> Iterator[str]:
     """The names of people of the task that stand in what is said or asked."""
     texts = (text for text in (element.text, element.options) if text is not None)
-    plain = [_ESCAPE.sub(_unescaped, pattern).lower() for text in texts for pattern in patterns(text)]
+    found = " | ".join(pattern for text in texts for pattern in patterns(text)).lower()
+    plain = re.sub(r"\\(.)", lambda escape: " " if escape[1].isalnum() else escape[1], found)
     for name in sorted(_people(task)):
-        if any(re.search(rf"\b{re.escape(name)}\b", text) for text in plain):
+        if re.search(rf"\b{re.escape(name)}\b", plain):
             yield name
-
-
-_ESCAPE = re.compile(r"\\(.)")
-
-
-def _unescaped(escape: re.Match[str]) -> str:
-    return " " if escape[1].isalnum() else escape[1]
 
 
 def _people(task: Task) -> set[str]:

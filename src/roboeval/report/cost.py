@@ -18,12 +18,13 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
     checked = {run.name: run.trials for run in runs if run.trials}
     points = {name: curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
+    steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
     parts = (
         Picture("rejection-sampling", lambda: figures.limits(points)),
         retries_sheet(checked),
         Picture("accepted", lambda: figures.accepted(shares)),
         curves_sheet(points),
-        steps_sheet(shares),
+        sheet("accepted", steps, shares=[*shares]),
     )
     return section("rejection-sampling", *(parts if checked else ()))
 
@@ -53,12 +54,6 @@ def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]
         for point in curve
     ]
     return sheet("rejection-sampling-curves", rows)
-
-
-def steps_sheet(shares: Mapping[str, Sequence[float]]) -> Sheet:
-    """The share that is accepted after each number of retries."""
-    rows = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
-    return sheet("accepted", rows, shares=[*shares])
 
 
 # --- tokens, time and money

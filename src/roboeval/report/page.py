@@ -93,7 +93,8 @@ def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
 def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
     if picture.name not in drawn:
         return ""
-    light, dark = map(_data, drawn[picture.name])
+    links = (base64.b64encode(svg).decode() for svg in drawn[picture.name])
+    light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
     caption = _text(described("figures", picture.name))
     return (
         f'<figure id="figure-{_text(picture.name)}"><picture>'
@@ -102,10 +103,6 @@ def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
         f'<figcaption>{caption} <span class="files">figures/{_text(picture.name)}.pdf, .png</span>'
         "</figcaption></figure>\n"
     )
-
-
-def _data(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
 # --- tables

@@ -24,16 +24,14 @@ def results(runs: Sequence[JudgedRun]) -> Section:
 
 def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """pass@1 of each run, with intervals."""
-    rows = [_overall_row(run) for run in runs]
+    rows: list[list[Cell]] = []
+    for run in runs:
+        tasks = [[prompt.pass_at(1) for prompt in score.prompts] for score in run.scores]
+        prompts = [[value] for values in tasks for value in values]
+        found = [by_formula(prompts), by_formula(tasks), by_bootstrap(tasks)]
+        ends = [end for estimate in found for end in (estimate.low, estimate.high)]
+        rows.append([run.name, run.completions.height, len(prompts), len(tasks), found[0].mean, *ends])
     return sheet("overall", rows, notes=[*_few_tasks(runs), *_unfinished(runs)])
-
-
-def _overall_row(run: JudgedRun) -> list[Cell]:
-    tasks = [[prompt.pass_at(1) for prompt in score.prompts] for score in run.scores]
-    prompts = [[value] for values in tasks for value in values]
-    found = [by_formula(prompts), by_formula(tasks), by_bootstrap(tasks)]
-    ends = [end for estimate in found for end in (estimate.low, estimate.high)]
-    return [run.name, run.completions.height, len(prompts), len(tasks), found[0].mean, *ends]
 
 
 def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
@@ -95,18 +93,14 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
             continue
         if len(said) < MOST_PAIRS:
             said.append(verdict(found, (first.name, second.name)))
-            notes += _unlike(first, second)
+            if apart := unlike(*(told_of(run.results.about, run.results.head) for run in (first, second))):
+                notes.append(f"{first.name} and {second.name}: {'; '.join(apart)}.")
         over = found.over_prompts, found.over_tasks
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]
         ps, much = (found.p_prompts, found.p_tasks), (found.needed.completions, found.needed.prompts)
         rows.append([f"{second.name} minus {first.name}", found.prompts, over[0].mean, *ends, *ps, *much])
     notes = [*([note("many-pairs")] if len(rows) > 1 else []), *notes]
     return section("differences", Prose(said), sheet("differences", rows, notes=notes))
-
-
-def _unlike(first: JudgedRun, second: JudgedRun) -> list[str]:
-    found = unlike(*(told_of(run.results.about, run.results.head) for run in (first, second)))
-    return [f"{first.name} and {second.name}: {'; '.join(found)}."] if found else []
 
 
 def _pairs(runs: Sequence[JudgedRun]) -> list[tuple[JudgedRun, JudgedRun]]:

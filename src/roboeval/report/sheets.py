@@ -131,16 +131,14 @@ def _heads(columns: Sequence[Column]) -> list[str]:
     """The heads of columns, made unique by numbers: a model may be named `task`."""
     heads: list[str] = []
     for column in columns:
-        plain = _head(column.head)
+        plain = str(_plain(column.head))
+        if plain.startswith(
+            ("=", "+", "-", "@", "\t", "\r", "\n")
+        ):  # lest a spreadsheet takes it for a formula
+            plain = f"'{plain}"
         others = (f"{plain} #{number}" for number in count(2))
         heads.append(plain if plain not in heads else next(head for head in others if head not in heads))
     return heads
-
-
-def _head(head: str) -> str:
-    """A head that no spreadsheet takes for a formula; `write_table` does the same for cells."""
-    plain = str(_plain(head))
-    return f"'{plain}" if plain.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else plain
 
 
 def _plain(cell: Cell) -> Cell:

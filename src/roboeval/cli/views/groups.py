@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 from rich import box
@@ -14,7 +15,6 @@ from codebotler.terminal import shortened, visible
 from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found
-from roboeval.analysis.similarity import Change
 from roboeval.cli.views.results import kind_view
 from roboeval.evaluation.explanation import GONE
 from roboeval.evaluation.runs.completions import how_many, name_of
@@ -29,11 +29,12 @@ def found_view(found: Sequence[Found], total: int) -> RenderableType:
         return head
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     table.add_column("task", overflow="fold")
-    for name in ("found", "passed", "such as"):
-        table.add_column(name, justify="right" if name != "such as" else "left")
-    by_task: dict[str, list[Found]] = {}
+    table.add_column("found", justify="right")
+    table.add_column("passed", justify="right")
+    table.add_column("such as")
+    by_task: defaultdict[str, list[Found]] = defaultdict(list)
     for one in found:
-        by_task.setdefault(one.key[0], []).append(one)
+        by_task[one.key[0]].append(one)
     for task, those in by_task.items():
         passed = sum(one.passed for one in those)
         example = f"{name_of(those[0].key)}, world {those[0].worlds[0][0]}"
@@ -51,19 +52,15 @@ def cluster_view(cluster: Cluster) -> RenderableType:
     lines.append(Text(shortened(f"{check}: {cluster.why}" if check else cluster.why)))
     if cluster.program is None:
         lines.append(Text(GONE, "yellow"))
-    if cluster.fix is not None:
-        changed = f"{cluster.fix.changed} line{'s' * (cluster.fix.changed != 1)}"
-        lines.append(Text(f"{visible(cluster.fix.name)} passes, and differs in {changed}:", "dim"))
-        lines += map(_change, cluster.fix.changes[:MOST_LINES])
-        left = len(cluster.fix.changes) - MOST_LINES
-        lines += [Text(f"... {left} more lines", "dim")] if left > 0 else []
+    if (fix := cluster.fix) is not None:
+        changed = f"{fix.changed} line{'s' * (fix.changed != 1)}"
+        lines.append(Text(f"{visible(fix.name)} passes, and differs in {changed}:", "dim"))
+        for sign, line in fix.changes[:MOST_LINES]:
+            style = {"-": "red", "+": "green"}.get(sign, "dim")
+            lines.append(Text(f"{sign} {shortened(line.expandtabs(4))}", style))
+        if (left := len(fix.changes) - MOST_LINES) > 0:
+            lines.append(Text(f"... {left} more lines", "dim"))
     return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
-
-
-def _change(change: Change) -> Text:
-    sign, line = change
-    style = {"-": "red", "+": "green"}.get(sign, "dim")
-    return Text(f"{sign} {shortened(line.expandtabs(4))}", style)
 
 
 def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str) -> RenderableType:
@@ -76,6 +73,7 @@ def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, ti
         shares = (*limit.prompts.values(), limit.accepted, limit.ran)
         table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
     hopeless = sum(not any(trial.accepted for trial in prompt.trials) for prompt in prompts)
+    of = "prompt" if hopeless == 1 else "prompts"
     return Group(
         Text(visible(title), style="bold"),
         Text("a program that the check rejects is asked for again, so many times at most; that gives:"),
@@ -85,9 +83,5 @@ def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, ti
         Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
         Text("accepted: the share of programs, at the end, that the check accepts", style="dim"),
         Text("run at all: the share that runs without an error in all the worlds of its task", style="dim"),
-        *([Text(f"no completion of {_prompts(hopeless)} is accepted")] if hopeless else []),
+        *([Text(f"no completion of {hopeless} {of} is accepted")] if hopeless else []),
     )
-
-
-def _prompts(count: int) -> str:
-    return f"{count} prompt{'s' * (count != 1)}"

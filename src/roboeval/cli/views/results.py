@@ -81,14 +81,11 @@ class _TaskTable:
         for task in self.summary.tasks:
             shares = {f"pass@{k}": task.pass_at(k).mean for k in self.summary.k}
             shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
-            cells = {name: Text(f"{share:.2f}", _mood(share)) for name, share in shares.items()}
+            styles = {0: "red", 1: "green"}
+            cells = {name: Text(f"{share:.2f}", styles.get(share, "")) for name, share in shares.items()}
             cells["completions"] = Text(f"{judged_count(task.prompts):,}")
             table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))
         return table
-
-
-def _mood(share: float) -> str:
-    return "green" if share == 1 else "red" if share == 0 else ""
 
 
 def _overall(summary: Summary) -> list[Text]:
@@ -104,15 +101,11 @@ def _overall(summary: Summary) -> list[Text]:
 
 def _failure_table(failures: Failures) -> Table:
     table = grid("left", "right", "right")
-    for each in [failures, *failures.kinds]:
-        name = _name(failures) if each is failures else f"  {visible(each.name)}"
-        style = "bold" if each is failures else "" if each.count else "dim"
-        table.add_row(Text(name), f"{each.count:,}", f"{each.share:.1%}", style=style)
+    rows = [(plural_of(failures.name), failures, "bold")]
+    rows += [(f"  {kind.name}", kind, "" if kind.count else "dim") for kind in failures.kinds]
+    for name, one, style in rows:
+        table.add_row(Text(visible(name)), f"{one.count:,}", f"{one.share:.1%}", style=style)
     return table
-
-
-def _name(failures: Failures) -> str:
-    return visible(plural_of(failures.name))
 
 
 def task_view(data: Mapping[str, Any]) -> RenderableType:
