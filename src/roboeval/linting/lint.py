@@ -89,7 +89,7 @@ def _same_worlds(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
 
 
 def _require_the_same(one: Scenario, other: Scenario) -> bool:
-    """Whether no events satisfy just one; False for two that nothing satisfies, unless they are written alike."""
+    """Whether no events satisfy just one; False for two that nothing satisfies, unless written alike."""
     first, second = ({r.formula: None for r in scenario.require} for scenario in (one, other))
     if first.keys() == second.keys():
         return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Protocol, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 from codebotler.badinput import BadInput
 from codebotler.simulator.engine import Lanes, digest
@@ -21,15 +21,8 @@ from roboeval.suites.solutions import equivalent_mutants
 WORLDS = 200  # to draw by default
 CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
-Item = TypeVar("Item")
 Run: TypeAlias = Callable[[str, World], Outcome]
-
-
-class Watch(Protocol):
-    """Passes things on, and shows progress."""
-
-    def __call__(self, items: Iterable[Item], doing: str, total: int) -> Iterator[Item]:
-        """Pass on items, of which there are `total`."""
+Watch: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # passes on a number of items
 
 
 def mutation_score(
@@ -41,7 +34,7 @@ def mutation_score(
     worlds: int | None = None,
     most: int = 400,
     seed: int = 1,
-    watched: Watch = lambda items, doing, total: iter(items),  # noqa: ARG005
+    watched: Watch = lambda items, *_: iter(items),
 ) -> MutationScore:
     """Run the solutions of a task and further originals, make mutants of the right ones, and try these.
 
