@@ -21,7 +21,6 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
-    from roboeval.analysis.cluster import Cluster
     from roboeval.analysis.search import Found, Question
     from roboeval.suites.load import Suite
 
@@ -52,6 +51,7 @@ def find(
     """
     from roboeval.analysis.cluster import cluster_data, clusters, groups
     from roboeval.analysis.search import Question, Search
+    from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
 
     if negated and formula is None:
@@ -82,7 +82,7 @@ def find(
             }
         )
     else:
-        show_found(found, told, total, failed=len(failed), groups=len(together))
+        print_rich(found_view(found, total, told, failed=len(failed), groups=len(together)))
 
 
 def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
@@ -115,22 +115,3 @@ def found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]:
         "passed": one.passed,
         "worlds": [{"number": number, "world": world} for number, world in worlds],
     }
-
-
-def show_found(
-    found: Sequence[Found], told: Sequence[Cluster], total: int, *, failed: int, groups: int
-) -> None:
-    """Print the completions found, and the groups of those that failed."""
-    from rich.console import Group
-    from rich.text import Text
-
-    from roboeval.cli.views.groups import cluster_view, found_view
-    from roboeval.evaluation.runs.completions import how_many
-
-    parts = [found_view(found, total)]
-    if told:
-        what = f"{how_many(failed)} of these failed, in {groups:,} group{'s' * (groups != 1)}:"
-        parts += [Text(), Text(what, "bold"), Text(), *map(cluster_view, told)]
-        if groups > len(told):
-            parts.append(Text(f"{groups - len(told):,} smaller groups; --groups shows more", "dim"))
-    print_rich(Group(*parts))

@@ -27,12 +27,12 @@ BLOCKS = 5
 
 
 class Attack(NamedTuple):
-    """A text of any length that may take a regex long: a prefix, a repeated unit, and so on anew."""
+    """A text of any length that may take a regex long."""
 
     prefix: str
-    unit: str
-    suffix: str = ""  # at the very end
-    blocks: int = 1  # of a prefix with its units
+    unit: str  # follows the prefix, again and again
+    suffix: str = ""
+    blocks: int = 1  # how often prefix and units come before the suffix
 
     def text(self, size: int) -> str:
         """The text with about `size` characters."""

@@ -57,13 +57,10 @@ class JudgedWorld:
         """All findings about this world alone."""
         for requirement in self.require:
             yield from self.dead_regexes(requirement)
-            yield from self._absent(requirement)
+            for what, name in absent_names(requirement, self.scenario, self.task):
+                message = f'"{requirement.text}" is about the {what} "{name}", but {self.name} has none'
+                yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
         yield from self.logic()
-
-    def _absent(self, requirement: Requirement) -> Iterator[Finding]:
-        for what, name in absent_names(requirement, self.scenario, self.task):
-            message = f'"{requirement.text}" is about the {what} "{name}", but {self.name} has none'
-            yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
 
     # --- requirements together
 
@@ -135,6 +132,10 @@ class JudgedWorld:
         moves = {request: resolve_room(self._rooms, request) or request for request in self._requests}
         return Reasoner((r.formula for r in self.require), moves, self.scenario.world.robot)
 
+    @property
+    def _rooms(self) -> list[str]:
+        return [room.name for room in self.scenario.world.rooms]
+
     @cached_property
     def _requests(self) -> list[str]:
         """For each room a request that leads there and, as far as possible, is no more than its name."""
@@ -142,10 +143,6 @@ class JudgedWorld:
         return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
 
     # --- regexes
-
-    @property
-    def _rooms(self) -> list[str]:
-        return [room.name for room in self.scenario.world.rooms]
 
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
         """Regexes of a requirement that match nothing, or visits that lead nowhere."""

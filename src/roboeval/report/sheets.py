@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -46,8 +45,7 @@ class Column(NamedTuple):
     kind: Kind = "text"  # "class" is one of failures; a share is from 0 to 1
 
 
-@dataclass(frozen=True)
-class Sheet:
+class Sheet(NamedTuple):
     """A table."""
 
     name: str  # in page.yaml, and of its CSV file
@@ -65,30 +63,26 @@ def sheet(
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
 
 
-@dataclass(frozen=True)
-class Picture:
+class Picture(NamedTuple):
     """A figure."""
 
     name: str  # in page.yaml, and of its files
     draw: Callable[[], Figure]
 
 
-@dataclass(frozen=True)
-class Prose:
+class Prose(NamedTuple):
     """Paragraphs of plain text."""
 
     paragraphs: Sequence[str]
 
 
-@dataclass(frozen=True)
-class Code:
+class Code(NamedTuple):
     """Preformatted text, such as a command."""
 
     text: str
 
 
-@dataclass(frozen=True)
-class Groups:
+class Groups(NamedTuple):
     """Groups of failures, each with the name of its run."""
 
     shown: Sequence[tuple[str, Cluster]]
@@ -97,8 +91,7 @@ class Groups:
 Part: TypeAlias = Sheet | Picture | Prose | Code | Groups
 
 
-@dataclass(frozen=True)
-class Section:
+class Section(NamedTuple):
     """A section of the page."""
 
     name: str  # in page.yaml, and of its anchor

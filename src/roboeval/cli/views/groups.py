@@ -22,11 +22,21 @@ from roboeval.evaluation.runs.completions import how_many, name_of
 MOST_LINES = 60  # of a difference between programs
 
 
-def found_view(found: Sequence[Found], total: int) -> RenderableType:
-    """The number of completions found, by task."""
-    head = Text(f"found {len(found):,} of {how_many(total)}", "bold")
-    if not found:
-        return head
+def found_view(
+    found: Sequence[Found], total: int, told: Sequence[Cluster], *, failed: int, groups: int
+) -> RenderableType:
+    """The completions found, by task, and some groups of those that failed."""
+    parts: list[RenderableType] = [Text(f"found {len(found):,} of {how_many(total)}", "bold")]
+    parts += [Text(), _by_task(found)] if found else []
+    if told:
+        what = f"{how_many(failed)} of these failed, in {groups:,} group{'s' * (groups != 1)}:"
+        parts += [Text(), Text(what, "bold"), Text(), *map(cluster_view, told)]
+        if groups > len(told):
+            parts.append(Text(f"{groups - len(told):,} smaller groups; --groups shows more", "dim"))
+    return Group(*parts)
+
+
+def _by_task(found: Sequence[Found]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     table.add_column("task", overflow="fold")
     table.add_column("found", justify="right")
@@ -39,7 +49,7 @@ def found_view(found: Sequence[Found], total: int) -> RenderableType:
         passed = sum(one.passed for one in those)
         example = f"{name_of(those[0].key)}, world {those[0].worlds[0][0]}"
         table.add_row(Text(visible(task)), f"{len(those):,}", f"{passed:,}", Text(visible(example), "dim"))
-    return Group(head, Text(), table)
+    return table
 
 
 def cluster_view(cluster: Cluster) -> RenderableType:
