@@ -130,7 +130,7 @@ def as_judged(run: Path, suite: Suite, *, ablated: bool) -> Suite:
 def command(
     verb: str, *arguments: object, suite: str, ablated: bool = False, program: str | None = None
 ) -> str:
-    """A command to paste; `program` is where this shell finds roboeval unless it is given."""
+    """A command to paste; by default it calls roboeval by the path or name that works in this shell."""
     from codebotler.pasted import runnable
 
     words = [program or runnable("roboeval"), verb, *map(str, arguments)]

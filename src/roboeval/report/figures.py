@@ -138,7 +138,7 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 def thresholds(runs: Sequence[JudgedRun]) -> Figure:
     """The share of prompts by threshold of pass@1, one line a model, on the paper's axis."""
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()])) for run in runs}
-    means = [sum(run.by_prompt.values()) / len(run.by_prompt) for run in runs]
+    means = [run.mean for run in runs]
     figure = _line_a_model(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
     _threshold_axes(figure.axes[0])
     _threshold_labels(figure.axes[0])
