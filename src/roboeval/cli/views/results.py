@@ -81,7 +81,7 @@ class _TaskTable:
         for task in self.summary.tasks:
             shares = {f"pass@{k}": task.pass_at(k).mean for k in self.summary.k}
             shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
-            styles = {0: "red", 1: "green"}
+            styles: dict[float, str] = {0: "red", 1: "green"}
             cells = {name: Text(f"{share:.2f}", styles.get(share, "")) for name, share in shares.items()}
             cells["completions"] = Text(f"{judged_count(task.prompts):,}")
             table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))
