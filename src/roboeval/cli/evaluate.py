@@ -54,6 +54,7 @@ def evaluate(
 ) -> None:
     """Say of every completion whether it does what is asked."""
     from codebotler.files import to_line
+    from roboeval.analysis.summary import summary
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import evaluate as judge_all
     from roboeval.evaluation.runs.completions import how_many
@@ -100,7 +101,8 @@ def evaluate(
         builder = TableBuilder()
         for row in watched(tally.of(rows), "judging", scope.total):
             builder.add(row)
-        print_summary(builder.table(), judged_by, scope, title=source, ablated=ablation, as_json=json)
+        counted = summary(builder.table(), judged_by, scope, ablated=ablation)
+        print_summary(counted, title=source, as_json=json)
     except KeyboardInterrupt:
         note(f"roboeval: {tally.after_a_stop(is_kept=run is not None, redo=redo)}")
         raise SystemExit(STOPPED) from None

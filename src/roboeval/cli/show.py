@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -25,11 +25,9 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:
-    import polars as pl
-
+    from roboeval.analysis.summary import Summary
     from roboeval.evaluation.runs.completions import Key
-    from roboeval.evaluation.runs.results import Results, Scope
-    from roboeval.suites.load import Suite
+    from roboeval.evaluation.runs.results import Results
 
 
 def show(
@@ -44,22 +42,15 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
+    from roboeval.analysis.summary import summary
     from roboeval.analysis.tasks import parse_selection
 
     results, judged_by, again = open_run(run, suite, ablated=ablation)
     selection = parse_selection(what, judged_by)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
-        print_summary(
-            results.table,
-            judged_by,
-            results.scope,
-            title=str(run),
-            ablated=ablation,
-            as_json=json,
-            k=ks,
-            stale=results.stale,
-        )
+        counted = summary(results.table, judged_by, results.scope, k=ks, ablated=ablation)
+        print_summary(counted, title=str(run), as_json=json, stale=results.stale)
     else:
         if k:
             fail(f"--k is about a whole run; leave {selection} out, or --k")
@@ -73,23 +64,12 @@ def show(
         note(f"{unfinished}; `{again}` goes on")
 
 
-def print_summary(
-    table: pl.DataFrame,
-    suite: Suite,
-    scope: Scope,
-    *,
-    title: str,
-    ablated: bool,
-    as_json: bool,
-    k: Sequence[int] = (1,),
-    stale: Iterable[Key] = (),
-) -> None:
+def print_summary(counted: Summary, *, title: str, as_json: bool, stale: Iterable[Key] = ()) -> None:
     """Print the tables of an evaluation."""
-    from roboeval.analysis.summary import summary, summary_data
+    from roboeval.analysis.summary import summary_data
     from roboeval.cli.views.results import summary_view
     from roboeval.evaluation.runs.completions import name_of
 
-    counted = summary(table, suite, scope, k=k, ablated=ablated)
     if as_json:
         print_json({**summary_data(counted), "stale": list(map(name_of, stale))})
     else:

@@ -52,16 +52,15 @@ def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
 
 def survivors_view(score: MutationScore) -> RenderableType:
     """The survivors of a task, each with its operator and its diff."""
-    parts = (_survivor(score.task, number, mutant) for number, mutant in enumerate(score.survivors, 1))
-    return Group(*(line for part in parts for line in (Text(), part)))
-
-
-def _survivor(task: str, number: int, mutant: Mutant) -> RenderableType:
-    of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
-    diff = Text("\n").join(Text(visible(line), STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
-    diff.rstrip()
-    head = Text.assemble((f"{task} {number}", "bold"), of)
-    return Group(head, Text(ABOUT[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2)))
+    parts: list[RenderableType] = []
+    for number, mutant in enumerate(score.survivors, 1):
+        of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
+        head = Text.assemble((f"{score.task} {number}", "bold"), of)
+        lines = (Text(visible(line), STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
+        diff = Text("\n").join(lines)
+        diff.rstrip()
+        parts += [Text(), head, Text(ABOUT[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2))]
+    return Group(*parts)
 
 
 def _table(*heads: str) -> Table:
