@@ -1,4 +1,4 @@
-"""The commands of `roboeval`, one module each: they parse, call and print.
+"""The commands of `roboeval`: they parse, call and print; the rooms below count and judge.
 
-Start with `app.py`, which lists them. Everything that is counted or judged happens in the rooms below.
+Start with `app.py`, which lists them.
 """

@@ -15,14 +15,10 @@ from roboeval.cli.find import find
 from roboeval.cli.generate import generate, run
 from roboeval.cli.mutate import mutate
 from roboeval.cli.report import report
-from roboeval.cli.serve import serve
-from roboeval.cli.show import export, show
+from roboeval.cli.show import export, serve, show
 from roboeval.cli.tasks import tasks
 
-app = typer.Typer(
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
+app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
 @app.callback(invoke_without_command=True)
@@ -38,18 +34,9 @@ def roboeval(
         print_text(context.get_help())
 
 
-app.command()(generate)
-app.command()(evaluate)
-app.command()(run)
-app.command()(show)
-app.command()(find)
-app.command()(tasks)
-app.command()(resample)
-app.command()(report)
-app.command()(compare)
-app.command()(mutate)
-app.command()(serve)
-app.command()(export)
+commands = generate, evaluate, run, show, find, tasks, resample, report, compare, mutate, serve, export
+for command in commands:
+    app.command()(command)
 app.command("import")(import_)
 
 

@@ -1,4 +1,4 @@
-"""Commands that compare: two runs, two suites, and a run with what checking its programs would have given."""
+"""The commands compare and resample: two runs or suites, and the effect of checking programs before a run."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ PAIR = 2
 
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
-    """Print which of two runs is better."""
+    """Print by how much the second of two runs is better."""
     from roboeval.analysis.compare import compared, comparison_data, prompts, told_of, unlike
     from roboeval.analysis.metrics import pass_at_1
     from roboeval.cli.views.comparison import comparison_view
@@ -72,29 +72,32 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
     expect_alike(paths, opened)
     result = compared(*(pass_at_1(one.results.table) for one in opened))
-    abouts = [told_of(one.results.about, one.results.head) for one in opened]
-    for difference in unlike(*abouts):
-        note(f"warning: {difference}")
+    warnings = unlike(*(told_of(one.results.about, one.results.head) for one in opened))
+    for warning in warnings:
+        note(f"warning: {warning}")
     if result.left_out:
         note(f"left out, since only one of them has them: {prompts(result.left_out)}")
     names = str(paths[0]), str(paths[1])
     if as_json:
-        print_json({**comparison_data(result, names), "warnings": unlike(*abouts)})
+        print_json({**comparison_data(result, names), "warnings": warnings})
     else:
         print_rich(comparison_view(result, names))
 
 
 def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bool, as_json: bool) -> None:
-    """Print what a second suite changes."""
+    """Print what the second of two suites changes."""
     from roboeval.analysis.verdict_changes import changes_data, verdict_changes
     from roboeval.cli.views.comparison import changes_view
     from roboeval.evaluation.runs.completions import how_many
 
     if len({path.resolve() for path in paths}) < len(paths):
         fail("a run is named twice; name each once")
+    names = [name.strip() for name in suites.split(",")]
+    if len(names) != PAIR or len({*names}) != PAIR or not all(names):
+        fail(f'--suites takes two suites with a comma between them, such as paper,plus, and not "{suites}"')
     found = []
     for path in paths:
-        first, second = (open_current(path, one, ablated=ablated).results for one in two_suites(suites))
+        first, second = (open_current(path, name, ablated=ablated).results for name in names)
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:
@@ -103,14 +106,6 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
         print_json(changes_data(found))
     else:
         print_rich(changes_view(found, most=most))
-
-
-def two_suites(text: str) -> tuple[str, str]:
-    """The suites that a user names, in their order."""
-    names = [name.strip() for name in text.split(",")]
-    if len(names) != PAIR or len({*names}) != PAIR or not all(names):
-        fail(f'--suites takes two suites with a comma between them, such as paper,plus, and not "{text}"')
-    return names[0], names[1]
 
 
 def expect_alike(paths: Sequence[Path], opened: Sequence[Opened]) -> None:
@@ -155,14 +150,7 @@ def resample(
 
 
 def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEngine) -> pl.DataFrame:
-    """The table of a run with what the check says of each program; that stays in the run.
-
-    Args:
-        results: of the run, by a suite that is at hand.
-        samples: how many worlds to imagine for each program.
-        seed: from which they are drawn.
-        engine: where programs are checked.
-    """
+    """The table of a run with the answers of the check to each program; the run keeps the answers."""
     from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypedDict
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,7 +26,6 @@ from roboeval.cli.output import fail, note, watched
 from roboeval.cli.show import print_summary
 
 if TYPE_CHECKING:
-    from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.rows import JudgedRow
 
 
@@ -55,6 +54,7 @@ def evaluate(
 ) -> None:
     """Say of every completion whether it does what is asked."""
     from codebotler.files import to_line
+    from roboeval.analysis.summary import summary
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import evaluate as judge_all
     from roboeval.evaluation.runs.completions import how_many
@@ -63,7 +63,7 @@ def evaluate(
     from roboeval.evaluation.runs.rows import judged_row
     from roboeval.evaluation.runs.table import TableBuilder
 
-    opened_engine = engine_named(engine, workers, require_isolation=require_isolation)
+    running = engine_named(engine, workers, require_isolation=require_isolation)
     judged_by = load(suite)
     if worlds is not None or seed is not None:
         judged_by = judged_by.with_worlds(worlds, seed)
@@ -82,16 +82,27 @@ def evaluate(
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
             run.keep(opened.completions)
-        how = How(ablated=ablation, engine=opened_engine)
         rows = (
-            (judged_row(to_line(row)) for row in judge_all(opened.of(wanted), judged_by, **how))
+            (
+                judged_row(to_line(row))
+                for row in judge_all(opened.of(wanted), judged_by, ablated=ablation, engine=running)
+            )
             if run is None
-            else evaluate_run(run, judged_by, tasks=wanted, redo=redo, completions=opened.completions, **how)
+            else evaluate_run(
+                run,
+                judged_by,
+                ablated=ablation,
+                tasks=wanted,
+                redo=redo,
+                engine=running,
+                completions=opened.completions,
+            )
         )
         builder = TableBuilder()
         for row in watched(tally.of(rows), "judging", scope.total):
             builder.add(row)
-        print_summary(builder.table(), judged_by, scope, title=source, ablated=ablation, as_json=json)
+        counted = summary(builder.table(), judged_by, scope, ablated=ablation)
+        print_summary(counted, title=source, as_json=json)
     except KeyboardInterrupt:
         note(f"roboeval: {tally.after_a_stop(is_kept=run is not None, redo=redo)}")
         raise SystemExit(STOPPED) from None
@@ -123,19 +134,11 @@ def import_(
     note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
 
 
-class How(TypedDict):
-    """How completions are judged."""
-
-    ablated: bool
-    engine: OpenEngine
-
-
 class Tally:
-    """Passes rows on, and remembers what there is to say at the end."""
+    """Counts the rows that it passes on."""
 
-    def __init__(self) -> None:
-        self.count = 0
-        self.first_failed: tuple[str, ...] = ()
+    count = 0
+    first_failed: tuple[str, ...] = ()  # its name, if any has failed
 
     def of(self, rows: Iterable[JudgedRow]) -> Iterator[JudgedRow]:
         """Pass rows on."""
@@ -146,7 +149,7 @@ class Tally:
             yield row
 
     def after_a_stop(self, *, is_kept: bool, redo: bool) -> str:
-        """What Ctrl-C left behind, and how to go on."""
+        """What Ctrl-C leaves behind, and how to go on."""
         if not is_kept:
             return "stopped; nothing is kept (with --out RUN, what was judged would be)"
         if self.count == 0:
@@ -154,7 +157,7 @@ class Tally:
         return f"stopped; the same command {'without --redo ' * redo}goes on where it was"
 
     def say_how_to_look(self, run: Path, suite: str, *, ablated: bool) -> None:
-        """Where the verdicts are, and what shows more of them."""
+        """Note where the verdicts are, and the command that shows more of them."""
         again = command("show", run, *self.first_failed, suite=suite, ablated=ablated)
         does = "says why that one fails" if self.first_failed else "prints these tables again"
         note(f"verdicts are in {run}; `{again}` {does}")

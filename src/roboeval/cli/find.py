@@ -1,4 +1,4 @@
-"""The command that looks for completions by what they did, and says why those that fail do."""
+"""The command find, which searches completions by what they did, and groups the failures."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
-    from roboeval.analysis.cluster import Cluster
     from roboeval.analysis.search import Found, Question
     from roboeval.suites.load import Suite
 
@@ -50,8 +49,9 @@ def find(
 
     Of those that did something in some world, those that fail are put together by the reason.
     """
-    from roboeval.analysis.cluster import clusters, groups
+    from roboeval.analysis.cluster import cluster_data, clusters, groups
     from roboeval.analysis.search import Question, Search
+    from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
 
     if negated and formula is None:
@@ -73,13 +73,20 @@ def find(
     if undecided:
         note(f"undecided, since their traces were too long to be kept: {how_many(len(undecided))}")
     if json:
-        print_found(found, undecided, told, total)
+        print_json(
+            {
+                "looked_at": total,
+                "found": [found_data(one, one.worlds) for one in found],
+                "undecided": [found_data(one, one.undecided) for one in undecided],
+                "groups": list(map(cluster_data, told)),
+            }
+        )
     else:
-        show_found(found, told, total, failed=len(failed), groups=len(together))
+        print_rich(found_view(found, total, told, failed=len(failed), groups=len(together)))
 
 
 def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
-    """Refuse a formula that is none, and a world that nobody has."""
+    """Refuse a wrong formula, and a world that no task has."""
     from codebotler.badinput import BadInput
     from codebotler.rtl import RtlSyntaxError, parse
 
@@ -99,23 +106,8 @@ def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
         fail(f'{where} has no world "{question.world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
-def print_found(
-    found: Sequence[Found], undecided: Sequence[Found], told: Sequence[Cluster], total: int
-) -> None:
-    """Print what was found for machines."""
-    from roboeval.analysis.cluster import cluster_data
-
-    print_json(
-        {
-            "looked_at": total,
-            "found": [_found_data(one, one.worlds) for one in found],
-            "undecided": [_found_data(one, one.undecided) for one in undecided],
-            "groups": list(map(cluster_data, told)),
-        }
-    )
-
-
-def _found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]:
+def found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]:
+    """A completion and the worlds in which it was found, as JSON."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {
@@ -123,22 +115,3 @@ def _found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]
         "passed": one.passed,
         "worlds": [{"number": number, "world": world} for number, world in worlds],
     }
-
-
-def show_found(
-    found: Sequence[Found], told: Sequence[Cluster], total: int, *, failed: int, groups: int
-) -> None:
-    """Print what was found for people."""
-    from rich.console import Group
-    from rich.text import Text
-
-    from roboeval.cli.views.groups import cluster_view, found_view
-    from roboeval.evaluation.runs.completions import how_many
-
-    parts = [found_view(found, total)]
-    if told:
-        what = f"{how_many(failed)} of these failed, in {groups:,} group{'s' * (groups != 1)}:"
-        parts += [Text(), Text(what, "bold"), Text(), *map(cluster_view, told)]
-        if groups > len(told):
-            parts.append(Text(f"{groups - len(told):,} smaller groups; --groups shows more", "dim"))
-    print_rich(Group(*parts))

@@ -1,4 +1,4 @@
-"""The commands generate, and run, which evaluates and reports as well."""
+"""The commands generate and run; run evaluates and reports as well."""
 
 from __future__ import annotations
 
@@ -22,14 +22,18 @@ from codebotler.options import (
 )
 from roboeval.cli.evaluate import evaluate
 from roboeval.cli.options import (
+    BudgetOption,
+    ConcurrencyOption,
     IsolationOption,
     JsonOption,
+    NumOption,
+    OutOption,
+    RateOption,
     SuiteOption,
     TasksOption,
     WorkersOption,
     command,
     load,
-    named,
 )
 from roboeval.cli.output import metered, note
 from roboeval.cli.report import report
@@ -37,16 +41,6 @@ from roboeval.cli.report import report
 if TYPE_CHECKING:
     from codebotler.models.base import Settings
     from roboeval.evaluation.generate import Pace, Progress
-
-OutOption = Annotated[
-    Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
-]
-NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
-ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]
-RateOption = Annotated[float | None, typer.Option(min=0.001, help="Send no more requests in a minute.")]
-BudgetOption = Annotated[
-    int | None, typer.Option(min=1, help="Stop when this command has used so many tokens.")
-]
 
 
 def generate(
@@ -133,7 +127,7 @@ def complete(
     settings: Settings,
     pace: Pace,
 ) -> Path:
-    """Make or complete a run, and return its folder; exits with status 1 if completions are missing."""
+    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
     from codebotler.models.open import open_model
     from roboeval.evaluation.generate import generate_run
     from roboeval.evaluation.requests import GenerationPlan
@@ -157,12 +151,12 @@ def complete(
 
 
 class Meter(ExitStack):
-    """Shows how far a run has come: how fast, with how many tokens, and how long the rest takes."""
+    """Shows the progress of a run: its rate, its tokens and the time left."""
 
     progress: Progress | None = None
 
     def show(self, progress: Progress) -> None:
-        """Draw the bar, or start it and note what there is already."""
+        """Draw the bar; start it first, and note what was done before."""
         if self.progress is None:
             self.progress = progress
             if progress.found:
@@ -176,7 +170,7 @@ class Meter(ExitStack):
             self._draw(progress.done, f"{rate}, {tokens:,} tokens" if tokens else rate)
 
     def after_a_stop(self) -> str:
-        """What Ctrl-C left behind, and how to go on."""
+        """What Ctrl-C leaves behind, and how to go on."""
         if self.progress is None:
             return "stopped before the first request; give the same command again"
         kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are kept"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,20 +67,9 @@ def mutate(
     names = [name for word in tasks or known.tasks for name in word.split(",")]
     wanted = [known.task(name) for name in dict.fromkeys(names)]
     further = named_programs(also or [], known)
+    score = partial(mutation_score, worlds=worlds, most=most, seed=seed, watched=watched)
     with Lanes(workers or cores()) as lanes:
-        scores = [
-            mutation_score(
-                task,
-                known,
-                lanes,
-                further=further.get(task.name, ()),
-                worlds=worlds,
-                most=most,
-                seed=seed,
-                watched=watched,
-            )
-            for task in wanted
-        ]
+        scores = [score(task, known, lanes, further=further.get(task.name, ())) for task in wanted]
     show_scores(scores, known.name, brief=brief)
     if out is not None:
         keep(scores, out)
@@ -88,21 +79,21 @@ def mutate(
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
-    """The programs that a user names, by their task; the same one may be among them several times."""
+    """The programs of a user's sources by task, with repetitions."""
     from roboeval.evaluation.runs.completions import name_of
     from roboeval.evaluation.runs.folder import open_source
     from roboeval.mutation.mutants import Original
 
-    found: dict[str, list[Original]] = {}
+    found: defaultdict[str, list[Original]] = defaultdict(list)
     for source in sources:
         for completion in open_source(source, suite).completions:
             name = f"{source}:{name_of(completion.key)}"
-            found.setdefault(completion.task, []).append(Original(name, completion.program, claimed=False))
+            found[completion.task].append(Original(name, completion.program, claimed=False))
     return found
 
 
 def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> None:
-    """Print the tables, the survivors, and beside them what makes a score doubtful."""
+    """Print the tables and the survivors, and note what makes a score doubtful."""
     from rich.console import Group
     from rich.text import Text
 

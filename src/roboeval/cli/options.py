@@ -1,16 +1,16 @@
-"""What the commands of RoboEval share: their options, and how they find what a user names."""
+"""Options that commands share, and the suites, runs and engines that they name."""
 
 from __future__ import annotations
 
 import os
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from codebotler.english import counted
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def suite_names(incomplete: str) -> list[str]:
-    """The suites that ship with RoboEval or are installed; the shell itself knows the folders."""
+    """The suites that ship with RoboEval or are installed; the shell itself completes folders."""
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import shipped_suites
 
@@ -32,7 +32,7 @@ def suite_names(incomplete: str) -> list[str]:
 
 
 def task_names(context: typer.Context, incomplete: str) -> list[str]:
-    """The tasks of the suite that the line names, or of the paper's; none where there is no such suite."""
+    """The tasks of the suite that the line names, or of the paper's."""
     from codebotler.badinput import BadInput
     from roboeval.suites.load import suite_folder, task_files
 
@@ -44,13 +44,13 @@ def task_names(context: typer.Context, incomplete: str) -> list[str]:
 
 
 def listed_task_names(context: typer.Context, incomplete: str) -> list[str]:
-    """The same for the last of several tasks, which commas separate."""
+    """The tasks for the last of several names, which commas separate."""
     *whole, last = incomplete.split(",")
     return [",".join([*whole, name]) for name in task_names(context, last) if name not in whole]
 
 
 def engine_names(incomplete: str) -> list[str]:
-    """Where programs can be run."""
+    """The engines."""
     return [name for name in ("local", "ray") if name.startswith(incomplete)]
 
 
@@ -93,6 +93,15 @@ IsolationOption = Annotated[
     bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+OutOption = Annotated[
+    Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
+]
+NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
+ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]
+RateOption = Annotated[float | None, typer.Option(min=0.001, help="Send no more requests in a minute.")]
+BudgetOption = Annotated[
+    int | None, typer.Option(min=1, help="Stop when this command has used so many tokens.")
+]
 
 
 # --- what a user names
@@ -106,7 +115,7 @@ def load(suite: str) -> Suite:
 
 
 def as_judged(run: Path, suite: Suite, *, ablated: bool) -> Suite:
-    """The suite with the worlds in which a run was judged, if they were drawn otherwise than now."""
+    """The suite with the worlds in which a run was judged, if other ones were drawn then."""
     from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
 
     path = Run(run).head(evaluation_key(suite, ablated=ablated))
@@ -118,53 +127,30 @@ def as_judged(run: Path, suite: Suite, *, ablated: bool) -> Suite:
     return suite
 
 
-def command(verb: str, *arguments: object, suite: str, ablated: bool = False) -> str:
-    """A command for the user to paste."""
+def command(
+    verb: str, *arguments: object, suite: str, ablated: bool = False, program: str | None = None
+) -> str:
+    """A command to paste; by default it calls roboeval by the path or name that works in this shell."""
     from codebotler.pasted import runnable
 
-    return shlex.join([runnable("roboeval"), *_words(verb, *arguments, suite=suite, ablated=ablated)])
-
-
-def command_anywhere(verb: str, *arguments: object, suite: str) -> str:
-    """A command for whoever reads it, wherever that is."""
-    return shlex.join(["roboeval", *_words(verb, *arguments, suite=suite)])
-
-
-def _words(verb: str, *arguments: object, suite: str, ablated: bool = False) -> list[str]:
-    words = [verb, *map(str, arguments)]
+    words = [program or runnable("roboeval"), verb, *map(str, arguments)]
     words += [] if suite == "paper" else ["--suite", suite]
-    return [*words, "--ablation"] if ablated else words
+    words += ["--ablation"] if ablated else []
+    return shlex.join(words)
 
 
-@dataclass(frozen=True)
-class Opened:
-    """A judged run that a user names.
-
-    Args:
-        results: as they lie in the run.
-        suite: by which it was judged, in the same worlds.
-        again: the command that goes on with judging it, to be pasted.
-    """
+class Opened(NamedTuple):
+    """A judged run that a user names."""
 
     results: Results
-    suite: Suite
-    again: str
+    suite: Suite  # with the worlds in which the run was judged
+    again: str  # the command that goes on with judging it
 
 
 def open_run(
     run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
 ) -> Opened:
-    """Read a judged run that a user names.
-
-    Args:
-        run: its folder.
-        suite_name: as the user writes it.
-        ablated: whether the verdicts on common sense only are meant.
-        see: sees each line of the evaluation's file.
-
-    Raises:
-        BadInput: it is no run, was not judged so, or is damaged.
-    """
+    """Read a judged run; `see` is called with each line of its verdicts."""
     from codebotler.badinput import BadInput
     from roboeval.evaluation.runs.folder import Run, evaluation_key
     from roboeval.evaluation.runs.results import read_results
@@ -192,10 +178,9 @@ def open_run(
 def open_current(
     run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
 ) -> Opened:
-    """Read a judged run of which every verdict counts; see `open_run`.
+    """Read a judged run of which every verdict counts.
 
-    Raises:
-        BadInput: besides, a row judges another program than stands in the run now, or there is no row.
+    Raises BadInput if there is none, or if the programs were changed since.
     """
     from codebotler.badinput import BadInput
 
@@ -210,21 +195,18 @@ def open_current(
 
 
 def complaint_of(results: Results) -> str | None:
-    """That rows judge other programs than stand in the run now, if any does."""
+    """A sentence about rows that judge other programs than stand in the run now; None without such rows."""
     from roboeval.evaluation.runs.completions import name_of
 
-    stale = results.stale
-    if not stale:
+    if not (stale := results.stale):
         return None
     others = len(stale) - 1
-    rows = f"{name_of(stale[0])} and {others:,} other {'rows' if others > 1 else 'row'} judge"
-    if not others:
-        rows = f"{name_of(stale[0])} judges"
-    return f"{rows} another program than stands in {results.run.completions} now"
+    judge = f"and {counted(others, 'other row')} judge" if others else "judges"
+    return f"{name_of(stale[0])} {judge} another program than stands in {results.run.completions} now"
 
 
 def unfinished_of(results: Results) -> str | None:
-    """That there is more to judge than was judged, if so."""
+    """A clause about completions that are not judged yet; None without such completions."""
     from roboeval.evaluation.runs.completions import how_many
 
     count, total = len(results.places), results.scope.total
@@ -232,25 +214,25 @@ def unfinished_of(results: Results) -> str | None:
 
 
 def _to_go_on(results: Results, suite: Suite) -> list[str]:
-    """What else a command needs to go on with an evaluation."""
+    """Options with which a command goes on with an evaluation."""
     from roboeval.evaluation.runs.folder import tasks_to_judge
 
-    tasks = results.tasks
-    drawn = [("--worlds", suite.worlds), ("--seed", suite.seed)] if suite.folder else []
-    own = suite.with_own_worlds() if suite.worlds is not None else suite
-    worlds = [text for name, number in drawn if own.digest != suite.digest for text in (name, str(number))]
-    if tasks in {None, tasks_to_judge(suite, None, ablated=bool(results.head.get("ablation")))[0]}:
-        return worlds
-    return ["--tasks", ",".join(sorted(tasks or ())), *worlds]
+    words = []
+    every = tasks_to_judge(suite, None, ablated=bool(results.head.get("ablation")))[0]
+    if results.tasks is not None and results.tasks != every:
+        words += ["--tasks", ",".join(sorted(results.tasks))]
+    if suite.with_own_worlds().digest != suite.digest:
+        words += ["--worlds", str(suite.worlds), "--seed", str(suite.seed)]
+    return words
 
 
 def cores() -> int:
-    """How many programs to run at the same time."""
+    """The default number of workers."""
     return os.cpu_count() or 1
 
 
 def engine_named(name: str, workers: int | None, *, require_isolation: bool = False) -> OpenEngine:
-    """The engine that a user names."""
+    """The engine with this name."""
     from roboeval.evaluation.engines import Local
 
     if name == "local":

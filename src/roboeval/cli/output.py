@@ -1,4 +1,4 @@
-"""What commands say while they work, and how they end on what they cannot use."""
+"""Progress of commands, and how they end on wrong input."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["fail", "metered", "note", "print_json", "print_rich", "print_text", 
 Item = TypeVar("Item")
 
 
-def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iterator[Item]:
+def watched(items: Iterable[Item], doing: str, total: int) -> Iterator[Item]:
     """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
     with metered(doing, total) as tell:
         for done, item in enumerate(items, 1):
@@ -24,41 +24,29 @@ def watched(items: Iterable[Item], doing: str, total: int | None = None) -> Iter
 
 
 @contextmanager
-def metered(doing: str, total: int | None = None, done: int = 0) -> Iterator[Callable[[int, str], None]]:
-    """What is to be told how far something has come, and more about it; it draws a bar or writes lines.
-
-    Args:
-        doing: what is being done, in a word.
-        total: how much there is to do; None where nobody knows.
-        done: how much of it was done before.
-    """
+def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, str], None]]:
+    """A progress bar, or lines; to be called with how much is done (`before` included) and a remark."""
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-    columns = (
-        TextColumn(doing),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[more]}", markup=False),
-        TimeRemainingColumn(),
-    )
-    of_all = "" if total is None else f" of {total:,}"
-    before, started = done, monotonic()
+    more_column = TextColumn("{task.fields[more]}", markup=False)
+    columns = TextColumn(doing), BarColumn(), MofNCompleteColumn(), more_column, TimeRemainingColumn()
+    started = monotonic()
     next_line = started + QUIET_S
     with progress(*columns) as shown:
-        job = shown.add_task(doing, total=total, completed=done, more="")
+        job = shown.add_task(doing, total=total, completed=before, more="")
 
         def tell(done: int, more: str) -> None:
             nonlocal next_line
             shown.update(job, completed=done, more=more)
             if shown.disable and monotonic() >= next_line:
-                left = _left(done - before, total and total - done, monotonic() - started)
-                note(", ".join(filter(None, (f"{doing}: {done:,}{of_all}", more, left))))
+                left = _left(done - before, total - done, monotonic() - started)
+                note(", ".join(filter(None, (f"{doing}: {done:,} of {total:,}", more, left))))
                 next_line = monotonic() + max(QUIET_S, (monotonic() - started) / 10)
 
         yield tell
 
 
-def _left(done: int, to_do: int | None, seconds: float) -> str:
+def _left(done: int, to_do: int, seconds: float) -> str:
     """How long the rest takes, at the rate so far."""
     return f"{timedelta(seconds=round(seconds * to_do / done))} left" if done and to_do else ""
 

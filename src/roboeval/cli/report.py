@@ -1,4 +1,4 @@
-"""The command that draws figures and a page about runs: report."""
+"""The command report, which draws figures and a page about runs."""
 
 from __future__ import annotations
 
@@ -8,22 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboeval.cli.compare import checked, expect_alike
-from roboeval.cli.options import (
-    Opened,
-    SuiteOption,
-    WorkersOption,
-    command_anywhere,
-    cores,
-    named,
-    open_current,
-)
+from roboeval.cli.options import Opened, SuiteOption, WorkersOption, command, cores, named, open_current
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from roboeval.evaluation.engines import OpenEngine
-    from roboeval.evaluation.runs.results import Results
     from roboeval.report.runs import JudgedRun
 
 
@@ -70,16 +59,11 @@ def report(
     engine = Local(workers or cores()) if check else None
     read = named_apart([judged_run(one, suite, beside=beside, engine=engine) for one in opened])
     expect_known(prices, read)
-    words = [
-        *map(str, runs),
-        "--out",
-        out,
-        *(["--published"] * published),
-        *([] if beside is None else ["--beside", beside]),
-        *([] if check else ["--no-check"]),
-    ]
-    words += [word for text in price or () for word in ("--price", text)]
-    again = command_anywhere("report", *words, suite=suite)
+    options: list[object] = ["--out", out, *["--published"] * published]
+    options += [] if beside is None else ["--beside", beside]
+    options += ["--no-check"] * (not check)
+    options += [word for text in price or () for word in ("--price", text)]
+    again = command("report", *runs, *options, suite=suite, program="roboeval")
     with busy("putting together"):
         parts = sections(read, with_published=published, prices=prices, command=again)
     written = write_report(*headline(read), parts, out)
@@ -89,32 +73,24 @@ def report(
 
 
 def judged_run(opened: Opened, suite: str, *, beside: str | None, engine: OpenEngine | None) -> JudgedRun:
-    """A run as a report shows it.
+    """A run with its ablation, if that was judged, and its verdicts by the suite `beside`.
 
-    Args:
-        opened: with its verdicts.
-        suite: by which it was judged, as the user writes it.
-        beside: another suite, whose verdicts are set beside these.
-        engine: where programs are checked; None where they are not to be.
+    Programs are checked on `engine`; without one, earlier answers of the check are left out, too.
     """
+    import polars as pl
+
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.report.runs import JudgedRun
 
     results = opened.results
     run = results.run
-    ablated = None
+    ablated = other = None
     if run.rows(evaluation_key(opened.suite, ablated=True)).is_file():
         ablated = open_current(run.path, suite, ablated=True).results
-    return JudgedRun(
-        results,
-        unchecked(results) if engine is None else checked(results, engine=engine),
-        ablated=ablated,
-        beside=None if beside is None else open_current(run.path, beside, ablated=False).results,
-    )
-
-
-def unchecked(results: Results) -> pl.DataFrame:
-    """The table of a run without what a check said of its programs."""
-    import polars as pl
-
-    return results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
+    if engine is None:
+        table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
+    else:
+        table = checked(results, engine=engine)
+    if beside is not None:
+        other = open_current(run.path, beside, ablated=False).results
+    return JudgedRun(results, table, ablated=ablated, beside=other)

@@ -1,19 +1,21 @@
-"""Commands that show what was judged: show, export."""
+"""The commands show, export and serve, which show what was judged."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from codebotler.options import HostOption, NameOption, NoTokenOption, PortOption, TokenOption
 from roboeval.cli.options import (
     AblationOption,
     JsonOption,
     RunArgument,
     SuiteOption,
     complaint_of,
+    load,
     named,
     open_current,
     open_run,
@@ -23,11 +25,9 @@ from roboeval.cli.options import (
 from roboeval.cli.output import fail, note, print_json, print_rich
 
 if TYPE_CHECKING:
-    import polars as pl
-
+    from roboeval.analysis.summary import Summary
     from roboeval.evaluation.runs.completions import Key
-    from roboeval.evaluation.runs.results import Results, Scope
-    from roboeval.suites.load import Suite
+    from roboeval.evaluation.runs.results import Results
 
 
 def show(
@@ -42,23 +42,15 @@ def show(
     json: JsonOption = False,
 ) -> None:
     """Print a run's tables, or show why a completion fails."""
+    from roboeval.analysis.summary import summary
     from roboeval.analysis.tasks import parse_selection
 
-    opened = open_run(run, suite, ablated=ablation)
-    results = opened.results
-    selection = parse_selection(what, opened.suite)
+    results, judged_by, again = open_run(run, suite, ablated=ablation)
+    selection = parse_selection(what, judged_by)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
-        print_summary(
-            results.table,
-            opened.suite,
-            results.scope,
-            title=str(run),
-            ablated=ablation,
-            as_json=json,
-            k=ks,
-            stale=results.stale,
-        )
+        counted = summary(results.table, judged_by, results.scope, k=ks, ablated=ablation)
+        print_summary(counted, title=str(run), as_json=json, stale=results.stale)
     else:
         if k:
             fail(f"--k is about a whole run; leave {selection} out, or --k")
@@ -67,28 +59,17 @@ def show(
         selection.expect_judged(results)
         show_part(results, selection.task, selection.prompt, selection.index, as_json=json)
     if (complaint := complaint_of(results)) is not None:
-        note(f"{complaint}; `{opened.again} --redo` judges what stands there")
+        note(f"{complaint}; `{again} --redo` judges what stands there")
     if (unfinished := unfinished_of(results)) is not None:
-        note(f"{unfinished}; `{opened.again}` goes on")
+        note(f"{unfinished}; `{again}` goes on")
 
 
-def print_summary(
-    table: pl.DataFrame,
-    suite: Suite,
-    scope: Scope,
-    *,
-    title: str,
-    ablated: bool,
-    as_json: bool,
-    k: Sequence[int] = (1,),
-    stale: Iterable[Key] = (),
-) -> None:
+def print_summary(counted: Summary, *, title: str, as_json: bool, stale: Iterable[Key] = ()) -> None:
     """Print the tables of an evaluation."""
-    from roboeval.analysis.summary import summary, summary_data
+    from roboeval.analysis.summary import summary_data
     from roboeval.cli.views.results import summary_view
     from roboeval.evaluation.runs.completions import name_of
 
-    counted = summary(table, suite, scope, k=k, ablated=ablated)
     if as_json:
         print_json({**summary_data(counted), "stale": list(map(name_of, stale))})
     else:
@@ -138,3 +119,34 @@ def export(
     expect_replaceable(path, *BEGINNINGS)
     write_table(results.table, path, kind)
     note(f"the table is in {path}")
+
+
+def serve(
+    runs: Annotated[Path, typer.Argument(help="A folder of runs, or one run.")] = Path("runs"),
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    name: NameOption = None,
+    token: TokenOption = None,
+    no_token: NoTokenOption = False,
+    suite: Annotated[
+        list[str] | None,
+        typer.Option(help="The folder of a suite by which runs were judged; more than one may be named."),
+    ] = None,
+) -> None:
+    """Show runs in a browser.
+
+    They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
+    """
+    from codebotler.badinput import BadInput
+    from codebotler.web.place import entrance
+    from codebotler.web.serving import serve as serve_page
+    from roboeval.web.pages import pages
+    from roboeval.web.run_store import RunStore
+
+    place, access = entrance(host, port, name or (), token, no_token=no_token)
+    if not runs.is_dir():
+        raise BadInput("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
+    suites = [load(each) for each in suite or ()]
+    if not RunStore(runs).names():
+        note(f"{runs} holds no run yet; those that come are shown, too")
+    serve_page(None, place, access, (pages(suites),), runs)

@@ -1,4 +1,4 @@
-"""The command about the tasks of a suite."""
+"""The command tasks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def tasks(
 
 
 def start(task: str, suite: str) -> None:
-    """Start a task in a folder, and say how to go on."""
+    """Start a task in a folder, and note how to go on."""
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import shipped_suites
     from roboeval.suites.new_task import new_task
@@ -83,7 +83,7 @@ def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
 
 
 def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
-    """The tasks of a suite, or only one, for machines."""
+    """The tasks of a suite, or only one, as JSON."""
     tasks = [
         {
             "task": task.name,
@@ -100,7 +100,7 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
 
 
 def other_suites(name: str) -> Iterator[str]:
-    """What else --suite takes besides one, in a sentence, and why suites of packages cannot be used."""
+    """Sentences about the other suites that --suite takes, and about installed ones that are unusable."""
     from codebotler.badinput import BadInput
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import load_suite, shipped_suites

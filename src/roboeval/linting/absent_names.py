@@ -1,11 +1,10 @@
-"""Rooms, things and people that a requirement names, and that its world has not."""
+"""Rooms, things and people that a requirement names and its world lacks."""
 
 from __future__ import annotations
 
 import ast
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TypeAlias
 
 from codebotler.rtl import Element, Regex
 from codebotler.rtl.reasoning.alphabet import elements
@@ -18,26 +17,18 @@ from roboeval.suites.load import Requirement, Scenario, Task
 
 ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")
 
-_Named: TypeAlias = tuple[str, str, Sequence[str]]
-"""Of what sort something is, what it is called, and what of this sort a world has."""
-
 
 def absent_names(requirement: Requirement, scenario: Scenario, task: Task) -> Iterator[tuple[str, str]]:
-    """What a requirement names and its world lacks: of what sort it is, and what it is called.
-
-    What is said or asked may also name a person who only has an office or a lab in the world.
-
-    Args:
-        requirement: of the scenario.
-        scenario: of the task.
-        task: whose worlds tell what is the name of a person.
-    """
+    """The sort and the name of what a requirement names and its world lacks."""
     for what, name, known in _named(requirement, scenario.world.rooms, task):
         if not _is_among(name, known):
             yield what, name
 
 
-def _named(requirement: Requirement, rooms: Sequence[Room], task: Task) -> Iterator[_Named]:
+def _named(
+    requirement: Requirement, rooms: Sequence[Room], task: Task
+) -> Iterator[tuple[str, str, Sequence[str]]]:
+    """Sort and name of each, and what of this sort the world has; of people also the owners of rooms."""
     objects = [label for room in rooms for label in room.objects]
     people = [person.name for room in rooms for person in room.people]
     sorts: dict[str, tuple[str, list[str]]] = {
@@ -60,7 +51,7 @@ def _named(requirement: Requirement, rooms: Sequence[Room], task: Task) -> Itera
 
 
 def _is_among(pattern: str, labels: Iterable[str]) -> bool:
-    """Whether a regex may mean one of these labels; true also of one that means anything, or nothing."""
+    """Whether a regex may mean one of these labels; true also if it matches anything, or nothing."""
     matches, texts = Regex(pattern).matches, samples(pattern)
     return (
         not texts
@@ -73,20 +64,17 @@ def _is_among(pattern: str, labels: Iterable[str]) -> bool:
 
 
 def _mentioned(element: Element, task: Task) -> Iterator[str]:
-    """The names, of people in some world of the task, that stand in what is said or asked."""
+    """The names of people of the task that stand in what is said or asked."""
     texts = (text for text in (element.text, element.options) if text is not None)
-    plain = [_without_escapes(pattern).lower() for text in texts for pattern in patterns(text)]
+    found = " | ".join(pattern for text in texts for pattern in patterns(text)).lower()
+    plain = re.sub(r"\\(.)", lambda escape: " " if escape[1].isalnum() else escape[1], found)
     for name in sorted(_people(task)):
-        if any(re.search(rf"\b{re.escape(name)}\b", text) for text in plain):
+        if re.search(rf"\b{re.escape(name)}\b", plain):
             yield name
 
 
-def _without_escapes(pattern: str) -> str:
-    return re.sub(r"\\(.)", lambda escape: " " if escape[1].isalnum() else escape[1], pattern)
-
-
 def _people(task: Task) -> set[str]:
-    """Who is in some world of a task, or has an office or a lab there; their names in small letters."""
+    """Lower-case names of the people in all worlds of a task, and of the owners of offices and labs."""
     scenarios = (*task.scenarios, *(task.ablation or ()))
     rooms = [room for scenario in scenarios for room in scenario.world.rooms]
     names = [*(person.name for room in rooms for person in room.people), *_owners(rooms)]
@@ -112,7 +100,7 @@ _CHOICE = re.compile(r"(?<!\\)\((?:\?:)?([\w' ]+(?:\|[\w' ]+)+)\)(?![?*+{])")
 
 
 def _alternatives(pattern: str) -> Iterator[str]:
-    """A regex once for each word that it leaves the choice of; as it is if it leaves none, or refers back."""
+    """A regex once for each word of its choices; unchanged if it has none, or refers back."""
     if _BACKREFERENCE.search(pattern):
         yield pattern
         return
@@ -126,7 +114,7 @@ def _alternatives(pattern: str) -> Iterator[str]:
 
 
 def _branches(pattern: str) -> list[str]:
-    """What stands between the bars outside of groups and sets."""
+    """The parts between the bars outside of groups and sets."""
     branches, depth = [""], 0
     for piece in _PIECE.findall(pattern):
         depth += (piece == "(") - (piece == ")")

@@ -1,53 +1,41 @@
-"""Regexes and functions whose time grows faster than the text they read: found by measuring."""
+"""Regexes and functions whose time grows faster than the text they read, found by measuring."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import product, takewhile
 from random import Random
-from typing import Any
+from typing import Any, NamedTuple
 
 from codebotler.rtl.pattern import compile_regex
 from codebotler.rtl.reasoning.regex_samples import Tree, inner_trees, parse_tree, spelled
 
-SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)
-"""Lengths of the texts that are tried, in characters."""
-
+SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)  # of texts, in characters
 FACTOR = 3
-LINEAR = 5.5
-"""How many times as long a text may take that is `FACTOR` times as long: 9 would be quadratic."""
+LINEAR = 5.5  # times as long for a text `FACTOR` times as long; 9 would be quadratic
 
 FLOOR = 0.001  # seconds below which a measurement says nothing
 ENOUGH = 0.02  # seconds beyond which no longer text is needed
 MOST = 40  # texts that are tried with a regex
-MANY = 50  # repetitions from which a repeat counts as one without an end
+MANY = 50  # repetitions from which a repeat counts as endless
 
 FILLERS = (" ", "\n", "1", "a", "a ", "1 ", "a, ", "-", ",", "'", "no ", "not ")
 SUFFIXES = ("", "\0 x y z x y z")
 BLOCKS = 5
 
 
-@dataclass(frozen=True)
-class Attack:
-    """A text of any length that may take a regex long.
-
-    Args:
-        prefix: how it begins.
-        unit: what follows, again and again.
-        suffix: how it ends.
-        blocks: how often it begins anew.
-    """
+class Attack(NamedTuple):
+    """A text of any length that may take a regex long."""
 
     prefix: str
-    unit: str
+    unit: str  # follows the prefix, again and again
     suffix: str = ""
-    blocks: int = 1
+    blocks: int = 1  # how often prefix and units come before the suffix
 
     def text(self, size: int) -> str:
-        """The text of about so many characters."""
+        """The text with about `size` characters."""
         block = self.prefix + self.unit * max(1, size // len(self.unit) // self.blocks)
         return block * self.blocks + self.suffix
 
@@ -83,7 +71,7 @@ def slow_text(pattern: str) -> Attack | None:
 
 
 def sampled_attacks(pattern: str) -> list[Attack]:
-    """Some texts that may take a regex long, the same ones each time."""
+    """Some texts that may take a regex long, the same each time."""
     every = [*_attacks(pattern)]
     return Random(pattern).sample(every, min(MOST, len(every)))  # noqa: S311 - no secret
 
@@ -108,7 +96,7 @@ def _attacks(pattern: str) -> Iterator[Attack]:
 
 
 def _repeats(items: Sequence[Tree], before: Sequence[str]) -> Iterator[tuple[Sequence[str], list[str]]]:
-    """For each repeat without an end: texts that lead to it, and what may be repeated."""
+    """For each endless repeat: texts that lead to it, and units that it may repeat."""
     for at, (op, value) in enumerate(items):
         if (inner := _repeated(str(op), value)) is not None:
             several = [unit for unit in spelled(inner)[:3] if unit]
@@ -126,7 +114,7 @@ def _until_next_repeat(items: Sequence[Any]) -> list[str]:
 
 
 def _denied(items: Sequence[Any]) -> Iterator[str]:
-    """What must not follow somewhere, and so makes a search fail at the end of a text."""
+    """Texts of negative assertions, which make a search fail at the end of a text."""
     for op, value in items:
         if str(op) == "ASSERT_NOT":
             yield from spelled(value[-1], " ")[-1:]

@@ -1,4 +1,4 @@
-"""What the linter finds in tasks, and as which text it is shown."""
+"""Findings of the linter, and their text."""
 
 from __future__ import annotations
 
@@ -25,31 +25,22 @@ Kind = Literal[
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about a task that is likely to be a mistake.
-
-    Args:
-        kind: what sort of mistake.
-        subject: what has it, in words that stay the same while the mistake does.
-        message: one sentence.
-        path: the task file.
-        line: where in it, counted from 1.
-        accepted: why it is there on purpose, as the task file says; None where it is open.
-    """
+    """Something about a task that is likely to be a mistake."""
 
     kind: Kind
-    subject: str
+    subject: str  # stays the same as long as the mistake does
     message: str
     path: Path
     line: int | None
-    accepted: str | None = None
+    accepted: str | None = None  # why it is there on purpose; None where it is open
 
     @property
     def name(self) -> str:
-        """By which a task file accepts it, such as `implied: comes_back`."""
+        """The name by which a task file accepts it, such as `implied: comes_back`."""
         return f"{self.kind}: {self.subject}"
 
     def rendered(self) -> str:
-        """One line of text, with the path as seen from the current folder."""
+        """One line of text, with the path relative to the current folder."""
         here = Path.cwd()
         path = self.path.relative_to(here) if self.path.is_relative_to(here) else self.path
         what, why = ("warning", "") if self.accepted is None else ("accepted", f": {self.accepted}")
@@ -57,12 +48,7 @@ class Finding:
 
 
 def render(findings: Iterable[Finding], *, accepted: bool = False) -> str:
-    """Findings as lines of text.
-
-    Args:
-        findings: what was found.
-        accepted: whether to show the accepted ones, with their reasons, instead of only counting them.
-    """
+    """Findings as lines of text; accepted ones are shown with their reasons, or only counted."""
     every = [*findings]
     lines = [one.rendered() for one in every if accepted or one.accepted is None]
     if hidden := len(every) - len(lines):

@@ -16,20 +16,12 @@ from roboeval.linting.trials import Verdicts
 from roboeval.linting.world_findings import JudgedWorld, judged_worlds
 from roboeval.suites.load import Requirement, Scenario, Task
 
-_MOST_DRAWN = 6
-"""In how many drawn worlds that require different things conflicts and implications are looked for."""
-
-_MOST_ALIKE = 5
-"""Of how many requirements that one line of `require` makes by its `for`."""
+_MOST_DRAWN = 6  # drawn worlds with different requirements in which conflicts and implications are sought
+_MOST_ALIKE = 5  # requirements that one line of `require` makes by its `for`
 
 
 def lint(task: Task, verdicts: Sequence[Verdicts]) -> list[Finding]:
-    """Look for mistakes in a task.
-
-    Args:
-        task: the task.
-        verdicts: on programs that are meant to be right or wrong.
-    """
+    """Look for mistakes in a task, given the verdicts on its solutions."""
     worlds = [*judged_worlds(task)]
     found = [*task_findings(task, verdicts)]
     if task.drawn:
@@ -52,9 +44,9 @@ def _stale(findings: Iterable[Finding], task: Task) -> Iterator[Finding]:
 
 
 def _of_drawn(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
-    """Findings in drawn worlds, of which many require the same; what is implied is so in all looked at.
+    """Findings in drawn worlds; a requirement is implied only if it is so in all worlds looked at.
 
-    That somebody is absent says nothing there, since the requirements are computed from who is present.
+    Absent people are no finding here: requirements are computed from who is present.
     """
     different = [*{frozenset(r.formula for r in w.require): w for w in reversed(worlds)}.values()]
     first = {
@@ -77,10 +69,7 @@ def _of_drawn(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
 
 
 def _with_few_alike(world: JudgedWorld) -> JudgedWorld:
-    """The world with a few of the requirements that differ only in what a `for` names, such as a time of day.
-
-    The texts that tell all of them apart are more than could be tried.
-    """
+    """The world with few of the requirements that one `for` makes: texts to tell all apart are too many."""
     alike: defaultdict[int | None, list[Requirement]] = defaultdict(list)
     for requirement in world.require:
         alike[requirement.line].append(requirement)
@@ -100,10 +89,7 @@ def _same_worlds(worlds: Sequence[JudgedWorld]) -> Iterator[Finding]:
 
 
 def _require_the_same(one: Scenario, other: Scenario) -> bool:
-    """Whether no sequence of events satisfies one and not the other; they may be written differently.
-
-    Of two that nothing satisfies this is not said, unless they are written alike.
-    """
+    """Whether no events satisfy just one; False for two that nothing satisfies, unless written alike."""
     first, second = ({r.formula: None for r in scenario.require} for scenario in (one, other))
     if first.keys() == second.keys():
         return True

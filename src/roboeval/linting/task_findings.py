@@ -22,12 +22,7 @@ from roboeval.suites.solutions import solutions
 
 
 def task_findings(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """All findings that are not about one world.
-
-    Args:
-        task: the task.
-        verdicts: on programs that are meant to be right or wrong.
-    """
+    """All findings that are not about one world."""
     yield from (*_unused(task), *_unsaid(task), *_slow(task))
     yield from (*_misjudged(task, verdicts), *_untripped(task, verdicts))
 
@@ -45,7 +40,7 @@ def _unused(task: Task) -> Iterator[Finding]:
 
 
 def _unsaid(task: Task) -> Iterator[Finding]:
-    """Facts that a prompt does not tell the model, or tells it although they are to be common sense."""
+    """Facts that a prompt leaves out, or says although they are common sense."""
     if task.borrows:
         return
     file = YamlFile.read(task.path)
@@ -66,7 +61,7 @@ def _unsaid(task: Task) -> Iterator[Finding]:
 
 
 def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
-    """Solutions that end otherwise than their file says."""
+    """Solutions whose verdict is not the one in their file."""
     if task.borrows:  # programs that were written for other requirements
         return
     for solution, judged in zip(solutions(task), verdicts, strict=False):  # an ablation's come afterwards
@@ -105,7 +100,6 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
 
 
 def _side(requirement: Requirement) -> str:
-    """The name of a check, with `not` where it is required not to hold."""
     return f"not {requirement.check}" if requirement.text.strip().startswith("not ") else requirement.check
 
 
@@ -113,10 +107,10 @@ def _side(requirement: Requirement) -> str:
 
 
 class SearchedRegex(NamedTuple):
-    """A regex as the judge looks for it, the requirement or the world that has it, and the line of that."""
+    """A regex as the judge searches for it."""
 
     pattern: str
-    where: str
+    where: str  # the requirement or the world that has it
     line: int | None
 
 
@@ -132,7 +126,7 @@ def _slow(task: Task) -> Iterator[Finding]:
 
 
 def searched_regexes(task: Task) -> Iterator[SearchedRegex]:
-    """The regexes of a task: those of its requirements, and what its worlds call things and answer."""
+    """The regexes of a task: of its requirements, and of the labels and answers in its worlds."""
     lines = {check.name: check.line for check in task.checks}
     for requirement in {one.text: one for one in _required(task)}.values():
         for element in elements(requirement.formula):

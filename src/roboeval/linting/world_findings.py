@@ -1,7 +1,7 @@
 """Findings about the requirements of one world: what they allow together, and what their regexes match.
 
-Whether a requirement is `unsatisfiable` or `implied` follows from RTL alone (see `codebotler.rtl.reasoning`),
-first with visits that name one room of the world each, then with any.
+`unsatisfiable` and `implied` follow from RTL alone (`codebotler.rtl.reasoning`), first with visits that name
+one room of the world each, then with any.
 """
 
 from __future__ import annotations
@@ -27,33 +27,26 @@ _PLAIN = ", as long as each visit names one room of the world"
 
 @dataclass(frozen=True)
 class JudgedWorld:
-    """A world of a task, or of its ablation, and what it requires.
-
-    Args:
-        task: the task.
-        number: of the world in the task, from 1.
-        scenario: the world and its requirements.
-        ablated: whether it is of the ablation.
-    """
+    """A world of a task, or of its ablation, with its requirements."""
 
     task: Task
-    number: int
+    number: int  # from 1
     scenario: Scenario
-    ablated: bool = False
+    ablated: bool
 
     @property
     def name(self) -> str:
-        """As messages call it."""
+        """Its name in messages."""
         return f"{'the ablation of ' if self.ablated else ''}world {self.number}"
 
     @property
     def require(self) -> tuple[Requirement, ...]:
-        """What it requires."""
+        """Its requirements."""
         return self.scenario.require
 
     @property
     def line(self) -> int | None:
-        """Where the task file describes it."""
+        """Its line in the task file."""
         return YamlFile.read(self.task.path).line(("worlds", self.number - 1))
 
     def finding(self, kind: Kind, subject: str, message: str, line: int | None) -> Finding:
@@ -64,18 +57,15 @@ class JudgedWorld:
         """All findings about this world alone."""
         for requirement in self.require:
             yield from self.dead_regexes(requirement)
-            yield from self._absent(requirement)
+            for what, name in absent_names(requirement, self.scenario, self.task):
+                message = f'"{requirement.text}" is about the {what} "{name}", but {self.name} has none'
+                yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
         yield from self.logic()
-
-    def _absent(self, requirement: Requirement) -> Iterator[Finding]:
-        for what, name in absent_names(requirement, self.scenario, self.task):
-            message = f'"{requirement.text}" is about the {what} "{name}", but {self.name} has none'
-            yield self.finding("absent", f"{name} in {requirement.text}", message, requirement.line)
 
     # --- requirements together
 
     def logic(self) -> Iterator[Finding]:
-        """Which requirements cannot hold, or follow from others."""
+        """Requirements that cannot hold, or follow from others."""
         rest = [*self.require]
         try:
             while (conflict := self._conflict([r.formula for r in rest])) is not None:
@@ -116,7 +106,7 @@ class JudgedWorld:
         return self.finding("undecided", subject, f"{what} would take too long to find out", line)
 
     def _line_of_fault(self, requirement: Requirement) -> int | None:
-        """Where to mend what is wrong in any world: the check, unless arguments may be to blame."""
+        """The line to mend where a mistake is in every world: the check's, unless it takes arguments."""
         check = self._check(requirement)
         return requirement.line if check.parameters else check.line
 
@@ -142,6 +132,10 @@ class JudgedWorld:
         moves = {request: resolve_room(self._rooms, request) or request for request in self._requests}
         return Reasoner((r.formula for r in self.require), moves, self.scenario.world.robot)
 
+    @property
+    def _rooms(self) -> list[str]:
+        return [room.name for room in self.scenario.world.rooms]
+
     @cached_property
     def _requests(self) -> list[str]:
         """For each room a request that leads there and, as far as possible, is no more than its name."""
@@ -149,10 +143,6 @@ class JudgedWorld:
         return [next((t for t in samples(r) if resolve_room(rooms, t) == r), r) for r in rooms]
 
     # --- regexes
-
-    @property
-    def _rooms(self) -> list[str]:
-        return [room.name for room in self.scenario.world.rooms]
 
     def dead_regexes(self, requirement: Requirement) -> Iterator[Finding]:
         """Regexes of a requirement that match nothing, or visits that lead nowhere."""

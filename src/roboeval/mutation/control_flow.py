@@ -35,7 +35,6 @@ def before_the_last(program: ProgramTree, _: Context) -> Edits:
 
 
 def _tests(program: ProgramTree) -> Iterator[ast.expr]:
-    """All conditions."""
     for node in program.nodes:
         match node:
             case ast.If(test=test) | ast.While(test=test) | ast.IfExp(test=test):
@@ -123,7 +122,7 @@ def stop_at_the_first(program: ProgramTree, _: Context) -> Edits:
 
 
 def _inside(block: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """The statements of a loop's body that belong to no inner loop."""
+    """The statements of a loop's body outside of inner loops."""
     for statement in block:
         yield statement
         if isinstance(statement, ast.If):

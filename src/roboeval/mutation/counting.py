@@ -23,7 +23,7 @@ def off_by_one(program: ProgramTree, _: Context) -> Edits:
 
 
 def _is_exact(node: ast.AST) -> bool:
-    """Whether the numbers in a node count, compare or scale, and do not merely propose something."""
+    """Whether the numbers in a node count, compare or scale, rather than propose something."""
     match node:
         case ast.Compare() | ast.Subscript() | ast.AugAssign():
             return True
@@ -57,7 +57,6 @@ def forget_to_count(program: ProgramTree, _: Context) -> Edits:
 
 
 def _remembers(node: ast.AST) -> bool:
-    """Whether a statement adds to what was remembered before."""
     match node:
         case ast.AugAssign():
             return True

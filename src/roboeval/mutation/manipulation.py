@@ -17,7 +17,7 @@ PUTTING_DOWN = re.compile(
 
 
 def _is_put_down(context: Context) -> bool:
-    """Whether no phrasing is content with what is brought back and still held."""
+    """Whether every phrasing that has something brought here also has it put down."""
     return not any(BRINGING_HERE.search(one) and not PUTTING_DOWN.search(one) for one in context.prompts)
 
 

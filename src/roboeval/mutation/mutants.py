@@ -1,4 +1,4 @@
-"""Right programs, and the distinct mutants that operators make of them."""
+"""Right programs, and the distinct mutants made of them."""
 
 from __future__ import annotations
 
@@ -18,70 +18,49 @@ from roboeval.suites.solutions import bare_diff, solutions
 
 MODULES = navigation, speech, manipulation, counting, control_flow
 OPERATORS = tuple(chain.from_iterable(map(operators_in, MODULES)))
-"""All mutation operators, by what they are about; the names are unique."""
 
 
 @dataclass(frozen=True)
 class Original:
-    """A program that mutants are made of.
-
-    Args:
-        name: what is special about it, or where it comes from.
-        program: its source.
-        claimed: whether its author says that it is right.
-    """
+    """A program to be mutated."""
 
     name: str
     program: str
-    claimed: bool = True
+    claimed: bool = True  # to be right, by its author
 
     @cached_property
     def tree(self) -> ProgramTree | None:
-        """What operators read; None where they cannot."""
+        """Its tree; None if it has none."""
         return read(self.program)
 
     @property
     def text(self) -> str:
-        """What all programs with the same tree share; the source where there is none."""
+        """The text that all programs with the same tree share; the source if there is no tree."""
         return self.program if self.tree is None else self.tree.text
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """A program that an operator made of an original.
-
-    Args:
-        operator: its name.
-        original: of which it was made.
-        program: its source, as trees are written.
-    """
+    """A program made by an operator."""
 
     operator: str
     original: Original
-    program: str
+    program: str  # as `ast.unparse` writes it
 
     @cached_property
     def diff(self) -> str:
-        """What was changed, as lines of a unified diff, without names of files."""
+        """The change as lines of a unified diff, without file names."""
         before, after = self.original.text.splitlines(), self.program.splitlines()
         return "\n".join([*difflib.unified_diff(before, after, lineterm="")][2:]) + "\n"
 
     @property
     def key(self) -> tuple[str, str]:
-        """By what a list of equivalent mutants knows it."""
+        """Its key in the list of equivalent mutants."""
         return self.operator, bare_diff(self.diff)
 
 
 def originals(task: Task, further: Iterable[Original] = ()) -> tuple[Original, ...]:
-    """The right solutions of a task, and further programs; of those with the same tree the first.
-
-    Args:
-        task: the task.
-        further: programs that a user names.
-
-    Raises:
-        BadInput: a file of solutions is wrong.
-    """
+    """The right solutions of a task, and further programs; of those with the same tree the first."""
     right = (Original(one.about, one.program) for one in solutions(task) if one.fails is None or one.right)
     distinct: dict[str, Original] = {}
     for original in chain(right, further):
@@ -106,13 +85,7 @@ def mutants(
 
 
 def drawn(every: Iterable[Mutant], most: int, seed: int) -> tuple[Mutant, ...]:
-    """Some of the mutants, as evenly over the operators as there are mutants of each.
-
-    Args:
-        every: mutants; their order makes no difference.
-        most: how many at most.
-        seed: from which they are drawn; the same seed draws the same ones.
-    """
+    """Draw at most `most` mutants, evenly over the operators, whatever the order of `every`."""
 
     def lot(mutant: Mutant) -> bytes:
         return hashlib.sha256(f"{seed}\n{mutant.program}".encode(errors="surrogatepass")).digest()

@@ -1,4 +1,4 @@
-"""Mutation operators: what one is, and what it may know of a task."""
+"""Mutation operators, and what they know of a task."""
 
 from __future__ import annotations
 
@@ -16,19 +16,12 @@ from roboeval.mutation.program_tree import Edit, ProgramTree, text_of
 
 @dataclass(frozen=True)
 class Context:
-    """What operators may know of a task: the names in its worlds, in their order there, and its instruction.
+    """The names in the worlds of a task, and its instruction."""
 
-    Args:
-        rooms: all rooms but the start.
-        people: those who have a room of their own; no instruction tells the names of others.
-        things: what lies somewhere.
-        prompts: the instruction in several phrasings.
-    """
-
-    rooms: tuple[str, ...]
-    people: tuple[str, ...]
+    rooms: tuple[str, ...]  # but the start
+    people: tuple[str, ...]  # who have a room of their own; no instruction names others
     things: tuple[str, ...]
-    prompts: tuple[str, ...] = ()
+    prompts: tuple[str, ...]
 
     @classmethod
     def of(cls, worlds: Sequence[World], prompts: Sequence[str] = ()) -> Context:
@@ -44,7 +37,7 @@ class Context:
         )
 
     def idle_rooms(self, program: ProgramTree) -> tuple[str, ...]:
-        """The rooms of whose names no word stands in any text of a program."""
+        """The rooms whose names share no word with any text of a program."""
         texts = filter(None, map(text_of, program.nodes))
         named = {word for text in texts for word in re.findall(r"\w+", text.lower())}
         return tuple(room for room in self.rooms if not named & set(re.findall(r"\w+", room.lower())))
@@ -57,17 +50,11 @@ Condition: TypeAlias = Callable[[Context], bool]
 
 @dataclass(frozen=True)
 class Operator:
-    """A mutation operator: one way in which models get a program wrong.
+    """A mutation operator: one way in which models get a program wrong."""
 
-    Args:
-        name: such as `drop-the-return`.
-        about: what the mutant does wrong, in a sentence.
-        edits: all ways to make a program wrong like that, each by itself.
-    """
-
-    name: str
+    name: str  # such as `drop-the-return`
     about: str
-    edits: Mutate
+    edits: Mutate  # each makes one mutant
 
 
 def operators_in(module: ModuleType) -> Iterator[Operator]:
@@ -78,7 +65,7 @@ def operators_in(module: ModuleType) -> Iterator[Operator]:
 
 
 def where(condition: Condition) -> Callable[[Mutate], Mutate]:
-    """Limits an operator to tasks that meet a condition; the others leave open what it changes."""
+    """Limit an operator to tasks that meet a condition; the others leave open what it changes."""
 
     def conditional(edits: Mutate) -> Mutate:
         @wraps(edits)
@@ -91,13 +78,13 @@ def where(condition: Condition) -> Callable[[Mutate], Mutate]:
 
 
 def asks(pattern: str) -> Condition:
-    """The condition that some phrasing asks for it; what none asks for, a program may leave out."""
+    """The condition that some phrasing matches; what none asks for, a program may leave out."""
     compiled = re.compile(pattern)
     return lambda context: not context.prompts or any(map(compiled.search, context.prompts))
 
 
 def others(names: Sequence[str], name: str, most: int = 2) -> tuple[str, ...]:
-    """The names that come after a name, round and round, without it."""
+    """The names that follow a name, starting over at the end."""
     folded = [one.lower() for one in names]
     at = folded.index(name.lower()) if name.lower() in folded else -1
     around = [*names[at + 1 :], *names[: max(at, 0)]]

@@ -12,21 +12,15 @@ from codebotler.program import Problem, parsed
 from codebotler.skills import SKILLS
 
 Node = TypeVar("Node", bound=ast.AST)
-Edit: TypeAlias = Mapping[Any, ast.AST | list[ast.stmt]]
-"""What stands in place of some nodes of a tree; for a statement also several statements, or none."""
+Edit: TypeAlias = Mapping[Any, ast.AST | list[ast.stmt]]  # replacements of nodes; a list for a statement
 
 
 @dataclass(frozen=True, eq=False)
 class ProgramTree:
-    """A program that parses.
-
-    Args:
-        tree: of the whole program.
-        text: that all programs with the same tree share, without comments.
-    """
+    """A program that parses."""
 
     tree: ast.Module
-    text: str
+    text: str  # without comments: all programs with the same tree share it
 
     @cached_property
     def nodes(self) -> tuple[ast.AST, ...]:
@@ -36,9 +30,8 @@ class ProgramTree:
     @cached_property
     def blocks(self) -> tuple[list[ast.stmt], ...]:
         """All sequences of statements, the innermost too."""
-        fields = (
-            getattr(node, name, None) for node in self.nodes for name in ("body", "orelse", "finalbody")
-        )
+        names = ("body", "orelse", "finalbody")
+        fields = (getattr(node, name, None) for node in self.nodes for name in names)
         return tuple(field for field in fields if isinstance(field, list) and field)
 
     @cached_property
@@ -61,7 +54,7 @@ class ProgramTree:
 
 
 def read(program: str) -> ProgramTree | None:
-    """The tree of a program; None where it does not parse, or is nested too deeply to be written."""
+    """The tree of a program; None if it does not parse, or is nested too deeply to be unparsed."""
     tree = parsed(program, compiled=True)
     try:
         return None if isinstance(tree, Problem) else ProgramTree(tree, ast.unparse(tree))
@@ -70,7 +63,7 @@ def read(program: str) -> ProgramTree | None:
 
 
 def rewritten(node: Node, edit: Edit) -> Node:
-    """A copy of a tree with some of its nodes replaced; a block that loses all statements gets a `pass`."""
+    """A copy of a tree with some nodes replaced; a block that loses all statements gets a `pass`."""
     fields: dict[str, object] = {}
     for name, value in ast.iter_fields(node):
         if isinstance(value, list):
@@ -91,7 +84,7 @@ def _put(value: object, edit: Edit) -> object:
 
 
 def changed(program: ProgramTree, edit: Edit) -> str | None:
-    """The text of an edited program; None where it no longer compiles, such as with a stray `break`."""
+    """The text of an edited program; None if it no longer compiles, such as with a stray `break`."""
     try:
         text = ast.unparse(ast.fix_missing_locations(rewritten(program.tree, edit)))
     except RecursionError:
@@ -116,7 +109,7 @@ def skills_in(node: ast.AST) -> frozenset[str]:
 
 
 def argument(call: ast.Call, position: int) -> ast.expr | None:
-    """What a call of a skill passes for its parameter number `position`, from 0, by place or by name."""
+    """The argument for a skill's parameter number `position`, from 0, passed by place or by name."""
     if position < len(call.args):
         starred = any(isinstance(a, ast.Starred) for a in call.args[: position + 1])
         return None if starred else call.args[position]
@@ -125,12 +118,12 @@ def argument(call: ast.Call, position: int) -> ast.expr | None:
 
 
 def text_of(node: ast.AST | None) -> str | None:
-    """The text that a literal is."""
+    """The value of a string literal; None for other nodes."""
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
 def is_pause(node: ast.AST) -> bool:
-    """Whether a node does nothing but let time pass."""
+    """Whether a node only lets time pass."""
     match node:
         case ast.Expr(ast.Call(ast.Name("sleep") | ast.Attribute(_, "sleep"))):
             return True
@@ -146,14 +139,14 @@ def names_in(node: ast.AST, context: type[ast.expr_context]) -> frozenset[str]:
 
 
 def statement(template: str, **parts: ast.expr) -> ast.stmt:
-    """A statement as it is written, with expressions in place of some of its names."""
+    """The statement that a template spells, with expressions in place of some names."""
     tree = ast.parse(template).body[0]
     names = (node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in parts)
     return rewritten(tree, {name: parts[name.id] for name in names})
 
 
 def expression(template: str, **parts: ast.expr) -> ast.expr:
-    """An expression as it is written, with others in place of some of its names."""
+    """The expression that a template spells, with others in place of some names."""
     tree = statement(template, **parts)
     assert isinstance(tree, ast.Expr)
     return tree.value

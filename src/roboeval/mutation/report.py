@@ -1,4 +1,4 @@
-"""Mutation scores as tables and diffs for people, and as files."""
+"""Mutation scores as tables, diffs and files."""
 
 from __future__ import annotations
 
@@ -22,12 +22,7 @@ ABOUT = {operator.name: operator.about for operator in OPERATORS}
 
 
 def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
-    """The score of each task.
-
-    Args:
-        scores: of tasks.
-        suite: the name of the suite whose checks were tried.
-    """
+    """The score of each task."""
     heads = "task", "worlds", "originals", "mutants", "killed", "equivalent", "survived", "score", "of all"
     table = _table(*heads, "same traces", "crashes")
     for score in scores:
@@ -44,7 +39,7 @@ def scores_view(scores: Sequence[MutationScore], suite: str) -> RenderableType:
 
 
 def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
-    """What became of the mutants of each operator that change behaviour."""
+    """The mutants of each operator that change behaviour, by status."""
     table = _table("operator", "mutants", "killed", "survived")
     tried = (one for score in scores for one in score.mutants)
     counts = Counter((one.mutant.operator, one.result.status) for one in tried)
@@ -56,17 +51,16 @@ def operators_view(scores: Sequence[MutationScore]) -> RenderableType:
 
 
 def survivors_view(score: MutationScore) -> RenderableType:
-    """The survivors of a task, each with what its operator does and its diff."""
-    parts = (_survivor(score.task, number, mutant) for number, mutant in enumerate(score.survivors, 1))
-    return Group(*(line for part in parts for line in (Text(), part)))
-
-
-def _survivor(task: str, number: int, mutant: Mutant) -> RenderableType:
-    of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
-    diff = Text("\n").join(Text(visible(line), STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
-    diff.rstrip()
-    head = Text.assemble((f"{task} {number}", "bold"), of)
-    return Group(head, Text(ABOUT[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2)))
+    """The survivors of a task, each with its operator and its diff."""
+    parts: list[RenderableType] = []
+    for number, mutant in enumerate(score.survivors, 1):
+        of = f'  {mutant.operator}, of "{visible(mutant.original.name)}"'
+        head = Text.assemble((f"{score.task} {number}", "bold"), of)
+        lines = (Text(visible(line), STYLES.get(line[:1], "")) for line in mutant.diff.splitlines())
+        diff = Text("\n").join(lines)
+        diff.rstrip()
+        parts += [Text(), head, Text(ABOUT[mutant.operator], "dim"), Padding(diff, (0, 0, 0, 2))]
+    return Group(*parts)
 
 
 def _table(*heads: str) -> Table:
@@ -77,15 +71,7 @@ def _table(*heads: str) -> Table:
 
 
 def keep(scores: Sequence[MutationScore], folder: Path) -> None:
-    """Write scores.json, mutants/TASK.jsonl and survivors/TASK.yaml; what stood there before is replaced.
-
-    Args:
-        scores: of tasks.
-        folder: made if it is not there.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
+    """Write scores.json, mutants/TASK.jsonl and survivors/TASK.yaml."""
     for score in scores:
         rows = b"".join(to_line(one.row()) for one in score.mutants)
         write_whole(folder / "mutants" / f"{score.task}.jsonl", rows)
@@ -98,7 +84,7 @@ def keep(scores: Sequence[MutationScore], folder: Path) -> None:
 
 
 def to_yaml(mutants: Iterable[Mutant]) -> str:
-    """A list of equivalent mutants to fill in: each `because` waits for its reason."""
+    """A list of equivalent mutants whose reasons are to be filled in."""
     entries = [{"operator": one.operator, "diff": one.diff, "because": ""} for one in mutants]
     listed = {"equivalent_mutants": entries}
     return yaml.dump(listed, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=110)

@@ -1,4 +1,4 @@
-"""What became of the mutants of a task, and its mutation score."""
+"""The status of each mutant of a task, and its mutation score."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import Any, NamedTuple
 
 from roboeval.mutation.mutants import Mutant, Original
 
-ENOUGH = 60
-"""How many mutants that change behaviour a task needs for its score to mean something."""
-MOST_EQUIVALENT = 0.15
-"""The largest share of a task's mutants that should be equivalent."""
+ENOUGH = 60  # mutants that change behaviour, for a score to mean something
+MOST_EQUIVALENT = 0.15  # share of them
 
 
 class MutantStatus(StrEnum):
-    """What became of a mutant."""
+    """The status of a mutant."""
 
     KILLED = "killed"
     SURVIVED = "survived"
@@ -24,32 +22,25 @@ class MutantStatus(StrEnum):
     CRASHES = "crashes everywhere"
 
 
-CHANGED = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQUIVALENT
-"""Those of mutants that do something else than their original, and do something at all."""
+CHANGED = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQUIVALENT  # behaviour, without crashing
 
 
 class Result(NamedTuple):
-    """What became of a program, and where.
-
-    Args:
-        status: of the mutant.
-        world: what the world is about in which it was killed.
-        why: the check that failed there, or the error; for an equivalent mutant the reason.
-    """
+    """The status of a program, and the reason."""
 
     status: MutantStatus
-    world: str | None = None
-    why: str | None = None
+    world: str | None = None  # in which it was killed
+    why: str | None = None  # the check that failed there, or the error; of an equivalent mutant the reason
 
 
 class TriedMutant(NamedTuple):
-    """A mutant and what became of it."""
+    """A mutant and its result."""
 
     mutant: Mutant
     result: Result
 
     def row(self) -> dict[str, Any]:
-        """As a row of mutants.jsonl."""
+        """A row of mutants.jsonl."""
         return {
             "operator": self.mutant.operator,
             "original": self.mutant.original.name,
@@ -61,24 +52,16 @@ class TriedMutant(NamedTuple):
 
 @dataclass(frozen=True)
 class MutationScore:
-    """How many mutants of a task the checks kill.
-
-    Args:
-        task: its name.
-        worlds: how many worlds each mutant was tried in.
-        right: the originals of which mutants were made.
-        wrong: the originals that the suite finds wrong, and where.
-        mutants: all that were tried.
-    """
+    """How many mutants of a task the checks kill."""
 
     task: str
-    worlds: int
+    worlds: int  # in which each mutant was tried
     right: tuple[Original, ...]
-    wrong: tuple[tuple[Original, Result], ...]
+    wrong: tuple[tuple[Original, Result], ...]  # by the suite's checks; no mutants are made of these
     mutants: tuple[TriedMutant, ...]
 
     def count(self, *statuses: MutantStatus) -> int:
-        """How many mutants have one of some statuses."""
+        """The number of mutants with one of these statuses."""
         return sum(one.result.status in statuses for one in self.mutants)
 
     @property
@@ -97,12 +80,12 @@ class MutationScore:
 
     @property
     def survivors(self) -> tuple[Mutant, ...]:
-        """The mutants that the checks let through, and that nobody has explained."""
+        """The mutants that the checks let through and no file explains."""
         return tuple(one.mutant for one in self.mutants if one.result.status is MutantStatus.SURVIVED)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What makes the score doubtful, in sentences."""
+        """Reasons to doubt the score."""
         changing, equivalent = self.count(*CHANGED), self.count(MutantStatus.EQUIVALENT)
         found = []
         if changing < ENOUGH:
@@ -113,7 +96,7 @@ class MutationScore:
         return tuple(found)
 
     def data(self) -> dict[str, Any]:
-        """The numbers, for machines."""
+        """The entry in scores.json."""
         return {
             "task": self.task,
             "worlds": self.worlds,

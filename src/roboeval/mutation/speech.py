@@ -54,7 +54,7 @@ SILENT = re.compile(r"\b(yes|no|ok|done|\d+|zero|one|two|three|four)\b", re.IGNO
 
 
 def _answers(call: ast.Call) -> Iterator[ast.expr]:
-    """The first and the last option of a question, as expressions."""
+    """The first and the last option of a question."""
     options = argument(call, 2)
     if isinstance(options, ast.List) and options.elts:
         yield from dict.fromkeys((options.elts[0], options.elts[-1]))
@@ -63,7 +63,7 @@ def _answers(call: ast.Call) -> Iterator[ast.expr]:
 
 
 def _used(program: ProgramTree) -> Iterator[tuple[ast.Call, ast.expr]]:
-    """The questions whose answer is used, each with its answers."""
+    """The questions whose answer is used, with each of its answers."""
     unused = {call for _, call in program.steps("ask")}
     for call in program.calls("ask"):
         if call not in unused:
@@ -128,7 +128,6 @@ def wrong_person(program: ProgramTree, context: Context) -> Edits:
 
 
 def _compared(program: ProgramTree) -> Iterator[tuple[ast.expr, str]]:
-    """The texts with which something is compared."""
     for node in program.nodes:
         match node:
             case ast.Compare(_, [ast.Eq() | ast.NotEq()], [ast.Constant(str(text)) as right]) if text:
@@ -150,14 +149,13 @@ def unknown_option(program: ProgramTree, _: Context) -> Edits:
 
 
 def _messages(program: ProgramTree) -> Iterator[ast.AST]:
-    """All that stands in what may be said: everything but the arguments of the other skills."""
+    """All nodes that may be part of a message: all but the calls of other skills."""
     other_calls = (node for node in program.nodes if skill_of(node) not in {None, "say"})
     elsewhere = {inner for call in other_calls for inner in ast.walk(call)}
     return (node for node in program.nodes if node not in elsewhere)
 
 
 def _reported(program: ProgramTree) -> Iterator[ast.AST]:
-    """The values that are put into messages."""
     for node in _messages(program):
         match node:
             case ast.FormattedValue(inner) if not isinstance(inner, ast.Constant):
@@ -233,7 +231,6 @@ def swap_values(program: ProgramTree, _: Context) -> Edits:
 
 
 def _variable(value: ast.expr) -> str | None:
-    """The variable that a value of a message is."""
     match value:
         case ast.Name(name) | ast.FormattedValue(ast.Name(name)):
             return name
@@ -241,7 +238,7 @@ def _variable(value: ast.expr) -> str | None:
 
 
 def _neighbours(program: ProgramTree) -> Iterator[tuple[ast.expr, ast.expr]]:
-    """Values that follow one another in a message."""
+    """Pairs of neighbouring values in a message."""
     for node in _messages(program):
         match node:
             case ast.JoinedStr(parts):

@@ -1,9 +1,9 @@
-"""Runs right programs and their mutants in the worlds of a task: which mutants do the checks kill?"""
+"""Runs right programs and their mutants in the worlds of a task."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Protocol, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 from codebotler.badinput import BadInput
 from codebotler.simulator.engine import Lanes, digest
@@ -18,19 +18,11 @@ from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMu
 from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import equivalent_mutants
 
-WORLDS = 200
-"""How many worlds a suite makes for mutants by default."""
+WORLDS = 200  # to draw by default
 CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
-Item = TypeVar("Item")
 Run: TypeAlias = Callable[[str, World], Outcome]
-
-
-class Watch(Protocol):
-    """Passes things on, and shows how far they have come."""
-
-    def __call__(self, items: Iterable[Item], doing: str, total: int) -> Iterator[Item]:
-        """Pass on items, of which there are `total`."""
+Watch: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # passes on a number of items
 
 
 def mutation_score(
@@ -42,23 +34,11 @@ def mutation_score(
     worlds: int | None = None,
     most: int = 400,
     seed: int = 1,
-    watched: Watch = lambda items, doing, total: iter(items),  # noqa: ARG005
+    watched: Watch = lambda items, *_: iter(items),
 ) -> MutationScore:
-    """Run the originals of a task, make mutants of the right ones, and try these.
+    """Run the solutions of a task and further originals, make mutants of the right ones, and try these.
 
-    Args:
-        task: the task.
-        suite: of the task.
-        lanes: in which programs are run.
-        further: originals beside the solutions of the task.
-        worlds: how many to make; by default 200, or those that are written out.
-        most: how many mutants to try at most.
-        seed: from which mutants are drawn and worlds are made; never that of the suite's own worlds.
-        watched: shows how far this has come.
-
-    Raises:
-        BadInput: a file of solutions is wrong, or worlds are to be made and the suite makes none.
-        EngineError: no isolated process can be started.
+    Raises BadInput if a number of worlds is given, but the suite's are written by hand.
     """
     scenarios = worlds_of(suite, task, worlds, seed)
 
@@ -94,7 +74,7 @@ def mutation_score(
 
 
 def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[Scenario, ...]:
-    """The worlds in which mutants of a task are tried, with what they require."""
+    """The worlds in which mutants are tried; drawn ones never come from the suite's own seed."""
     if suite.worlds is not None:
         return suite.with_worlds(count or WORLDS, seed + 1 + (suite.seed or 0)).tasks[task.name].scenarios
     if count is not None:
@@ -106,21 +86,15 @@ def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[S
 
 
 def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> Result | None:
-    """Where an original is wrong, and why; None for a right one."""
+    """The first failure of an original; None for a right one."""
     verdicts = map(judge, outcomes, scenarios)
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 
 
 def result_of(program: str, before: Sequence[Outcome], scenarios: Sequence[Scenario], run: Run) -> Result:
-    """What becomes of one mutant; no world is tried after the one that kills it.
+    """The result of one mutant, tried until a check kills it.
 
     One that crashes is tried further: if it crashes in each world, no check is needed to find it wrong.
-
-    Args:
-        program: of the mutant.
-        before: how its original did, world by world.
-        scenarios: the worlds.
-        run: runs a program in a world.
     """
     crashes: list[Verdict] = []
     changed = False

@@ -1,4 +1,4 @@
-"""Which abilities models lack, whether their programs come back, and how much phrasing matters."""
+"""Sections on the abilities that tasks take, and on the phrasing of instructions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_SENTENCES = 20
 
 
 def abilities(runs: Sequence[JudgedRun]) -> Section:
-    """What tasks take, and what programs lack (paper, section V.B)."""
+    """Failures by what a task takes (paper, section V.B)."""
     back = coming_back_sheet(runs)
     return section("abilities", ability_sheet(runs), Prose(coming_back_sentences(back)), back)
 
@@ -38,18 +38,18 @@ def ability_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def coming_back_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """Tasks with a report against those without."""
+    """Tasks that end with a report against the others."""
     rows: list[list[Cell]] = []
     for run in runs:
         for reports, completions, failed, away, lost, passed in coming_back(run.results).iter_rows():
-            shares = [n / failed if failed else None for n in (away, lost)]
             tasks = WITH_REPORT if reports else "others"
+            shares = (away / failed, lost / failed) if failed else (None, None)
             rows.append([run.name, tasks, completions, passed, failed, away, shares[0], lost, shares[1]])
     return sheet("coming-back", rows)
 
 
 def coming_back_sentences(table: Sheet) -> list[str]:
-    """The same in sentences, for tasks that end with a report."""
+    """Sentences about tasks that end with a report."""
     return [
         f"Of {failed:,} failures of {name} in tasks that end with a report, {away:,} left and never came "
         f"back, and {lost:,} went to a room that does not exist."
@@ -67,7 +67,7 @@ def phrasings(runs: Sequence[JudgedRun]) -> Section:
 
 
 def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """For each task and run, how far its prompts lie apart, the widest first."""
+    """How far the prompts of each task and run lie apart, the widest first."""
     order = tasks_of(runs)
     found = [(run, row) for run in runs for row in spread(run.table).iter_rows()]
     rows = []
@@ -78,16 +78,12 @@ def spread_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def only(one: str | None, other: str | None) -> tuple[str, str]:
-    """The words that stand in one of two texts only, for both, in their order."""
+    """The words that only the one text has, and those that only the other has."""
     if one is None or other is None:
         return NOT_RECORDED, NOT_RECORDED
-    first, second = _words(one), _words(other)
+    words = (re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower()) for text in (one, other))
+    first, second = map(dict.fromkeys, words)
     return _listed([w for w in first if w not in second]), _listed([w for w in second if w not in first])
-
-
-def _words(text: str) -> list[str]:
-    """The different words of a text, in small letters."""
-    return list(dict.fromkeys(re.findall(r"[^\W_]+(?:['\u2019][^\W_]+)*", text.lower())))
 
 
 def _listed(words: Sequence[str]) -> str:
@@ -96,7 +92,7 @@ def _listed(words: Sequence[str]) -> str:
 
 
 def phrasing_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """For each prompt, how it does beside the others of its task, the one that hurts most first."""
+    """Each prompt against the others of its task, the one that hurts most first."""
     order = tasks_of(runs)
     scores = [prompt_scores(run.table).with_columns(model=pl.lit(at)) for at, run in enumerate(runs)]
     found = phrasing(pl.concat(scores)).rows()

@@ -1,4 +1,4 @@
-"""What asking again for rejected programs gives, and what programs that pass cost (paper, section VI)."""
+"""Sections on rejection sampling and on the cost of programs that pass (paper, section VI)."""
 
 from __future__ import annotations
 
@@ -14,28 +14,29 @@ from roboeval.report.sheets import Cell, Picture, Section, Sheet, section, sheet
 
 
 def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
-    """What each limit of retries gives, to runs whose programs were checked."""
+    """Results by limit of retries, of runs whose programs were checked."""
     checked = {run.name: run.trials for run in runs if run.trials}
     points = {name: curves(prompts) for name, prompts in checked.items()}
     shares = {name: accepted_after(prompts, LIMITS[-1]) for name, prompts in checked.items()}
+    steps = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
     parts = (
         Picture("rejection-sampling", lambda: figures.limits(points)),
         retries_sheet(checked),
         Picture("accepted", lambda: figures.accepted(shares)),
         curves_sheet(points),
-        steps_sheet(shares),
+        sheet("accepted", steps, shares=[*shares]),
     )
     return section("rejection-sampling", *(parts if checked else ()))
 
 
 def curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
-    """For each limit, the share of prompts by threshold of pass@1."""
+    """For each limit of retries, the share of prompts by threshold of pass@1."""
     found = {limit: resampled(prompts, limit).by_prompt for limit in LIMITS}
     return {limit: threshold_curve([min(one.passed, 1.0) for one in each]) for limit, each in found.items()}
 
 
 def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
-    """What each limit gives to each run."""
+    """pass@1 of each run at each limit of retries."""
     rows: list[list[Cell]] = []
     for name, prompts in checked.items():
         for at in (resampled(prompts, limit) for limit in LIMITS):
@@ -45,46 +46,40 @@ def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:
 
 
 def curves_sheet(points: Mapping[str, Mapping[int, Sequence[tuple[float, float]]]]) -> Sheet:
-    """The curves by threshold as numbers."""
-    of_limits = [(name, *one) for name, found in points.items() for one in found.items()]
-    rows = [[name, limit, *point] for name, limit, those in of_limits for point in those]
+    """The curves by threshold."""
+    rows = [
+        [name, limit, *point]
+        for name, of_limits in points.items()
+        for limit, curve in of_limits.items()
+        for point in curve
+    ]
     return sheet("rejection-sampling-curves", rows)
-
-
-def steps_sheet(shares: Mapping[str, Sequence[float]]) -> Sheet:
-    """The share that is accepted after each number of retries."""
-    rows = [[retries, *those] for retries, those in enumerate(zip(*shares.values(), strict=True))]
-    return sheet("accepted", rows, shares=[*shares])
 
 
 # --- tokens, time and money
 
 
 def costs(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Section:
-    """What programs cost, as far as runs say it."""
+    """The cost of programs, as far as runs record it."""
     return section("cost", cost_sheet(runs, prices), budget_sheet(runs, prices))
 
 
 def cost_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """What each run took, and what each of its programs that pass."""
+    """The cost of each run, and of each of its programs that pass."""
     found = [(run.name, spent(run.table, price_of(run, prices))) for run in runs]
-    is_known = [one.input_tokens is not None or one.seconds is not None for _, one in found]
-    return sheet("cost", [[name, *one] for (name, one), known in zip(found, is_known, strict=True) if known])
+    known = [one for one in found if one[1].input_tokens is not None or one[1].seconds is not None]
+    return sheet("cost", [[name, *one] for name, one in known])
 
 
 def budget_sheet(runs: Sequence[JudgedRun], prices: Mapping[str, Price]) -> Sheet:
-    """What a budget gives at each limit of retries, to runs whose programs were checked."""
+    """The yield of a budget at each limit of retries, of runs whose programs were checked."""
     checked = [run for run in runs if run.trials]
     rows = [[run.name, *one] for run in checked for one in budgets(run.table, price_of(run, prices))]
     return sheet("budget", rows)
 
 
 def read_prices(texts: Sequence[str]) -> dict[str, Price]:
-    """Read `MODEL=INPUT/OUTPUT`, by model.
-
-    Raises:
-        BadInput: one is no price, or two are of the same model.
-    """
+    """Read `MODEL=INPUT/OUTPUT`, by model."""
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
@@ -101,16 +96,12 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
 
 
 def price_of(run: JudgedRun, prices: Mapping[str, Price]) -> Price | None:
-    """The price that was given for a run: that for its folder, or else that for its model."""
+    """The price given for a run's folder, or else for its model."""
     return next((prices[name] for name in (run.folder, run.name, run.model or "") if name in prices), None)
 
 
 def expect_known(prices: Mapping[str, Price], runs: Sequence[JudgedRun]) -> None:
-    """Refuse a price of a model that wrote no run.
-
-    Raises:
-        BadInput: so it is.
-    """
+    """Refuse a price of a model that wrote no run."""
     for model, price in prices.items():
         if not any(price_of(run, {model: price}) for run in runs):
             names = ", ".join(run.name for run in runs)

@@ -29,13 +29,11 @@ PAPER, INK, FAINT, QUIET = "#ffffff", "#1b1b1f", "#d5d5da", "#6f6f78"
 BLACK, WHITE = "#010101", "#fefefe"  # of data, and of text on full shades; SVG leaves out what is #000000
 FULL = "#00507d"  # the shade of a share of 1; one hue is read by every eye, and in print
 MIDDLE = "#7fb5d5"
-DARK = {PAPER: "#17181c", INK: "#e6e6ea", FAINT: "#3d3f47", QUIET: "#8f919b", BLACK: "#ffffff"}
-"""What takes the place of a colour on a dark page; colours of data stay."""
 DARK_MIDDLE = "#2b5f80"
-
+# On a dark page; colours of data stay.
+DARK = {PAPER: "#17181c", INK: "#e6e6ea", FAINT: "#3d3f47", QUIET: "#8f919b", BLACK: "#ffffff"}
+# Okabe and Ito's, which colour-blind people can tell apart.
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", BLACK, "#F0E442")
-"""Okabe and Ito's, which people who see colours differently tell apart, too."""
-
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 LONGEST_NAME = 26
@@ -74,7 +72,7 @@ load_font = subset.load_font
 
 
 def _load_font(*args: Any, **more: Any) -> Any:  # noqa: ANN401 - as fontTools has it
-    """A font for a PDF, without what places letters: a PDF says where each stands, and copying takes long."""
+    """A font for a PDF without kerning tables: a PDF places each letter itself, and copying them is slow."""
     font = load_font(*args, **more)
     for table in {"GDEF", "GPOS", "GSUB"}.intersection(font.keys()):
         del font[table]
@@ -86,7 +84,7 @@ subset.load_font = _load_font
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw and write figures in one style; no setting of the reader's own plays a part."""
+    """Draw and write figures in one style, whatever the reader's own settings."""
     with warnings.catch_warnings(), mpl.rc_context():
         warnings.simplefilter("ignore")  # a name may hold letters that the font lacks
         mpl.rcdefaults()
@@ -95,12 +93,12 @@ def styled() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of so many inches that places what stands in it by itself."""
+    """An empty figure that lays itself out; sizes are in inches."""
     return Figure(figsize=(width, height), dpi=DPI, layout="constrained")
 
 
 def written(figure: Figure) -> dict[str, bytes]:
-    """A figure as png, pdf and svg, with no date and no version in it; laid out and drawn once for all."""
+    """A figure as png, pdf and svg without date and version; laid out and drawn once for all three."""
     canvas = FigureCanvasAgg(figure)
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
@@ -118,7 +116,7 @@ def written(figure: Figure) -> dict[str, bytes]:
 
 
 class Recorder:
-    """Passes on to a renderer what is drawn, and notes each call with its pen."""
+    """Passes drawing calls on to a renderer, and records each with its pen."""
 
     def __init__(self, renderer: RendererBase, calls: list[Any]) -> None:
         self._renderer, self._calls = renderer, calls
@@ -138,15 +136,14 @@ class Recorder:
 
 
 class Repetition(Figure):
-    """A drawing that is repeated, call by call, where an inch has 72 points, for other formats."""
+    """Recorded calls that are repeated for other formats, at 72 dots an inch."""
 
-    TRANSFORMS: ClassVar = {
+    TRANSFORMS: ClassVar = {  # positions of the arguments that are transforms to dots
         "draw_path": (1,),
         "draw_markers": (1, 3),
         "draw_path_collection": (0, 4),
         "draw_quad_mesh": (0, 5),
     }
-    """Which arguments of a call lead to dots."""
 
     def __init__(self, figure: Figure) -> None:
         super().__init__(figsize=tuple(figure.get_size_inches()), dpi=POINTS)
@@ -170,7 +167,7 @@ class Repetition(Figure):
 
 
 def _slim(svg: bytes) -> bytes:
-    """The same drawing with each letter's shape written once, and not at each of its uses."""
+    """The same drawing with each letter's shape written once."""
     seen: set[bytes] = set()
 
     def once(shape: re.Match[bytes]) -> bytes:
@@ -184,13 +181,13 @@ def _slim(svg: bytes) -> bytes:
 
 
 def shades(paper: str = PAPER, middle: str = MIDDLE) -> LinearSegmentedColormap:
-    """The shades of shares, from that of 0 to that of 1."""
+    """The colours of shares from 0 to 1."""
     return LinearSegmentedColormap.from_list("shades", [paper, middle, FULL])
 
 
 @cache
 def dark_colours() -> dict[bytes, bytes]:
-    """What takes the place of which colour on a dark page."""
+    """The colours of a dark page by those of a light one."""
     light, dark = shades(), shades(DARK[PAPER], DARK_MIDDLE)
     pairs = {to_hex(light(n)): to_hex(dark(n)) for n in range(light.N)} | DARK
     return {old.encode(): new.encode() for old, new in pairs.items()}
@@ -203,7 +200,7 @@ def darkened(svg: bytes) -> bytes:
 
 
 def brief(name: str, most: int = LONGEST_NAME) -> str:
-    """A name that fits into a figure: its beginning and its end, by which names are told apart."""
+    """A name shortened for a figure: its beginning and its end, by which names are told apart."""
     name, end = visible(name), (most - 1) // 2
     return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"
 

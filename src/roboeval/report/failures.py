@@ -1,8 +1,8 @@
-"""Why programs fail: causes, groups of failures that are alike, and what other checks say of them."""
+"""Sections on failures: causes, groups of similar ones, and verdicts by another suite."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from roboeval.analysis.cluster import Cluster, clusters, groups
 from roboeval.analysis.summary import ALL, Causes, causes
@@ -17,19 +17,9 @@ from roboeval.analysis.verdict_changes import (
 from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun
-from roboeval.report.sheets import (
-    Cell,
-    Groups,
-    Picture,
-    Prose,
-    Section,
-    Sheet,
-    note,
-    section,
-    sheet,
-)
+from roboeval.report.sheets import Cell, Groups, Picture, Prose, Section, Sheet, note, section, sheet
 
-MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups that are shown of a run, and of all runs
+MOST, FEWEST, ALTOGETHER = 25, 4, 200  # groups to show of a run, and of all runs
 MOST_REVERSALS = 100  # groups of each run
 
 
@@ -45,7 +35,7 @@ def why(runs: Sequence[JudgedRun], *, with_published: bool) -> Section:
 
 
 def all_causes(runs: Sequence[JudgedRun], *, with_published: bool) -> list[tuple[str, Causes]]:
-    """The causes of each run, each followed by the published ones if they are asked for and there."""
+    """The causes of each run, each followed by the published ones if they are wanted and known."""
     found: list[tuple[str, Causes]] = []
     for run in runs:
         found.append((run.name, causes(run.table)))
@@ -66,7 +56,7 @@ def causes_sheet(found: Sequence[tuple[str, Causes]]) -> Sheet:
 
 
 def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
-    """What a reader must know where published causes stand beside ours."""
+    """Caveats where published causes stand beside ours."""
     known = [run for run in runs if paper.model_of(run) is not None]
     if not known:
         return ["None of these runs names a model of the paper, so no published causes stand beside them."]
@@ -112,7 +102,7 @@ def _cells(one: Cluster) -> list[Cell]:
 
 
 def beside(runs: Sequence[JudgedRun]) -> Section:
-    """The verdicts of another suite beside those of a report: what they change, of whom, and why."""
+    """What the verdicts of another suite change."""
     found = [verdict_changes(run.name, run.results, run.beside) for run in runs if run.beside is not None]
     sentences = [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
     sheets = changes_sheet(found), changed_tasks_sheet(found), reversals_sheet(found)
@@ -146,18 +136,12 @@ def reversals_sheet(found: Sequence[VerdictChanges]) -> Sheet:
     rows: list[list[Cell]] = []
     notes: list[str] = []
     for one in found:
-        those = sorted(_both_ways(one), key=lambda pair: -len(pair[1].members))
-        rows += [
-            [one.name, f"{suite} only", len(group.members), *_cells(group)]
-            for suite, group in those[:MOST_REVERSALS]
-        ]
+        sides = zip(one.suites, (one.first_only, one.second_only), strict=True)
+        those = [(suite, group) for suite, groups in sides for group in groups]
+        those.sort(key=lambda pair: -len(pair[1].members))
+        for suite, group in those[:MOST_REVERSALS]:
+            rows.append([one.name, f"{suite} only", len(group.members), *_cells(group)])
         if (left := len(those) - MOST_REVERSALS) > 0:
             more = f"{left:,} smaller groups are left out; `roboeval compare --suites` shows them."
             notes.append(f"{one.name}: {more}")
     return sheet("reversals", rows, notes=notes)
-
-
-def _both_ways(one: VerdictChanges) -> Iterator[tuple[str, Cluster]]:
-    """Each group with the suite by which it passes."""
-    for suite, those in zip(one.suites, (one.first_only, one.second_only), strict=True):
-        yield from ((suite, group) for group in those)

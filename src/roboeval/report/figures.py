@@ -36,11 +36,11 @@ from roboeval.report.runs import JudgedRun, tasks_of
 
 MOST_COLOURS = len(COLOURS)
 LOWEST = 1e-3  # where the paper ends its axis
-A_ROW = 8  # tasks that stand beside each other
-FEWEST = 4  # tasks for which there is room, lest a single bar fill a page
-SHORT_NAME = 16  # letters up to which two names stand beside each other below a narrow figure
+A_ROW = 8  # tasks beside each other
+FEWEST = 4  # tasks to leave room for, lest a single bar fill a page
+SHORT_NAME = 16  # letters up to which two names fit beside each other below a narrow figure
 BAR = 0.82  # of the room that a task has
-MOST_NUMBERS = 14  # rows or columns up to which each cell of a table says its number
+MOST_NUMBERS = 14  # rows or columns up to which each cell of a table has its number
 DARK_FROM = 0.75  # the share from which white is read better than black
 
 Points: TypeAlias = Sequence[tuple[float, float]]
@@ -113,7 +113,7 @@ def _two_lines(task: str) -> str:
 
 
 def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
-    """The same for more models than there are colours: one row a model."""
+    """The same for more models than colours: one row a model."""
     figure = new_figure(WIDE, 1.3 + 0.16 * len(runs))
     widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
@@ -138,7 +138,7 @@ def _means(scores: Sequence[TaskScore], tasks: Sequence[str]) -> list[float | No
 def thresholds(runs: Sequence[JudgedRun]) -> Figure:
     """The share of prompts by threshold of pass@1, one line a model, on the paper's axis."""
     lines = {run.name: _steps(threshold_curve([*run.by_prompt.values()])) for run in runs}
-    means = [sum(run.by_prompt.values()) / len(run.by_prompt) for run in runs]
+    means = [run.mean for run in runs]
     figure = _line_a_model(lines, means, 2.75, drawstyle="steps-post", markevery=[0, -1])
     _threshold_axes(figure.axes[0])
     _threshold_labels(figure.axes[0])
@@ -146,7 +146,7 @@ def thresholds(runs: Sequence[JudgedRun]) -> Figure:
 
 
 def accepted(shares: Mapping[str, Sequence[float]]) -> Figure:
-    """The share of programs that the check accepts by number of retries, one line a model."""
+    """The share of accepted programs by number of retries, one line a model."""
     lines = {name: [*enumerate(those)] for name, those in shares.items()}
     figure = _line_a_model(lines, [those[-1] for those in shares.values()], 2.6, markevery=[*LIMITS])
     axes = figure.axes[0]
@@ -187,13 +187,13 @@ def _line_a_model(
 
 
 def _steps(points: Points) -> Points:
-    """A curve as far as the axis goes."""
+    """The part of a curve that is on the axis."""
     shown = [(threshold, share) for threshold, share in points if threshold >= LOWEST]
     return [*shown, (LOWEST, shown[-1][1])]
 
 
 def _threshold_axes(axes: Axes) -> None:
-    """Set what axes that share theirs share; to be set once, since each time all of them are set."""
+    """Set what shared axes have in common: once for one of them, since it is slow and sets all."""
     axes.set_xscale("log")
     axes.set_xlim(1, LOWEST)
     axes.set_xticks([1, 0.1, 0.01, LOWEST], ["1", "0.1", "0.01", "0.001"])
@@ -242,14 +242,7 @@ def limits(curves: Mapping[str, Mapping[int, Points]]) -> Figure:
 
 
 def heat(axes: Axes, cells: Cells, rows: Sequence[str], columns: Sequence[str]) -> None:
-    """Draw a table of shares: the more, the more colour; with numbers where there is room for them.
-
-    Args:
-        axes: on which.
-        cells: by row; None where there is none.
-        rows: their names.
-        columns: their names.
-    """
+    """Draw a table of shares as a heat map, with numbers where there is room for them."""
     shown = np.ma.masked_invalid(np.array(cells, dtype=float))
     axes.pcolormesh(shown, cmap=shades(), vmin=0, vmax=1, edgecolors=PAPER, linewidth=0.6)
     axes.invert_yaxis()

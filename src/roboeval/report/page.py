@@ -31,23 +31,12 @@ LONG = 24  # rows from which a table is folded
 LONG_TEXT = 70  # characters from which a cell takes several lines
 STYLE = Path(__file__).with_name("page.css")
 SCRIPT = Path(__file__).with_name("page.js")
-Drawn = tuple[bytes, bytes]
-"""A figure as SVG, for light pages and for dark ones."""
-
-
-GENERATOR = '<meta name="generator" content="RoboEval">'
-"""By which a page that stands in a folder is known to be a report."""
+GENERATOR = '<meta name="generator" content="RoboEval">'  # marks a page in a folder as a report
+Drawn = tuple[bytes, bytes]  # a figure as SVG, for light pages and for dark ones
 
 
 def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Mapping[str, Drawn]) -> str:
-    """The page. Every text in it is text: whatever a model wrote is shown and never obeyed.
-
-    Args:
-        title: of the page.
-        lead: paragraphs at its beginning.
-        sections: what stands on it.
-        drawn: the figures by name; those that are not there are left out.
-    """
+    """The page as HTML; it escapes all text, so nothing that a model wrote is obeyed."""
     script = SCRIPT.read_text()
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src 'sha256-{digest}'"
@@ -70,7 +59,7 @@ def page(title: str, lead: Sequence[str], sections: Sequence[Section], drawn: Ma
 
 
 def _text(words: str) -> str:
-    """Words as HTML shows them; what is no text at all, such as half a surrogate pair, is written out."""
+    """Escape text for HTML; what cannot be printed, such as half a surrogate pair, is written out."""
     plain = "".join(
         c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in words
     )
@@ -104,7 +93,8 @@ def _part(part: Part, drawn: Mapping[str, Drawn]) -> str:
 def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
     if picture.name not in drawn:
         return ""
-    light, dark = map(_data, drawn[picture.name])
+    links = (base64.b64encode(svg).decode() for svg in drawn[picture.name])
+    light, dark = (f"data:image/svg+xml;base64,{link}" for link in links)
     caption = _text(described("figures", picture.name))
     return (
         f'<figure id="figure-{_text(picture.name)}"><picture>'
@@ -113,10 +103,6 @@ def _picture(picture: Picture, drawn: Mapping[str, Drawn]) -> str:
         f'<figcaption>{caption} <span class="files">figures/{_text(picture.name)}.pdf, .png</span>'
         "</figcaption></figure>\n"
     )
-
-
-def _data(svg: bytes) -> str:
-    return f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
 
 
 # --- tables
@@ -142,8 +128,7 @@ def _table(sheet: Sheet) -> str:
     return f'<div class="sheet" id="table-{name}"><h3>{title}</h3>{inside}</div>\n'
 
 
-BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")
-"""Where a long name may go on in the next line."""
+BREAKS = re.compile(r"(?<=[a-z])(?=[A-Z])|(?<=[_:])(?=\w)")  # where a long name may be broken
 
 
 def _css(column: Column) -> str:

@@ -1,4 +1,4 @@
-"""What the paper's authors published, and where it may stand beside what was judged here."""
+"""The paper's published numbers, and beside which runs they may stand."""
 
 from __future__ import annotations
 
@@ -23,10 +23,7 @@ def published() -> dict[str, Any]:
 
 
 def model_of(run: JudgedRun) -> str | None:
-    """The model of the paper that a run names; None if it names another, or none for sure.
-
-    Without a recorded model, the name of the folder counts.
-    """
+    """The model of the paper that a run's recorded model, or else its folder, names; None if unsure."""
     if run.results.head.get("suite") != SUITE or run.is_mixed:
         return None
     provider, colon, name = (run.model or run.folder).lower().partition(":")
@@ -36,41 +33,38 @@ def model_of(run: JudgedRun) -> str | None:
 
 
 def taken_for(runs: Iterable[JudgedRun]) -> list[str]:
-    """Which models of the paper runs are taken for, by their names, in sentences."""
+    """A sentence about which models of the paper runs are taken for."""
     named = [(run.name, model) for run in runs if (model := model_of(run)) is not None]
     those = ", ".join(f"{name} for {model}" for name, model in named)
     return [f"By their names, these are taken for models of the paper: {those}."] if named else []
 
 
 def is_of_authors_prompts(run: JudgedRun) -> bool:
-    """Whether completions were written for the authors' own prompts.
-
-    They come from elsewhere, so that run.json names no settings, and none names an instruction of the suite.
-    """
+    """Whether completions were written for the authors' own prompts: imported, and not for the suite's."""
     ours = {prompt for task in run.suite.tasks.values() for prompt in task.prompts}
     return "settings" not in run.results.about and not ours & {*run.instructions.values()}
 
 
 def cell(model: str, task: str, prompt: int) -> float | None:
-    """The published pass@1 of one of the authors' prompts; None if there is none."""
+    """The published pass@1 of one of the authors' prompts."""
     rows = published()["pass_at_1"].get(task, [])
     return rows[prompt][_column(model)] if prompt < len(rows) else None
 
 
 def task_mean(model: str, task: str) -> float | None:
-    """The mean of the published pass@1 over the prompts of a task; None if there is none."""
+    """The mean of the published pass@1 over the prompts of a task."""
     rows = published()["pass_at_1"].get(task)
     return None if rows is None else sum(row[_column(model)] for row in rows) / len(rows)
 
 
 def overall_mean(model: str, tasks: Sequence[str]) -> float | None:
-    """The mean of the published pass@1 over the prompts of some tasks; None if one was not published."""
+    """The mean of the published pass@1 over some tasks; None if one was not published."""
     means = [mean for task in tasks if (mean := task_mean(model, task)) is not None]
     return sum(means) / len(means) if means and len(means) == len(tasks) else None
 
 
 def causes(model: str) -> Causes:
-    """How completions of a model ended, as published."""
+    """The published causes of a model's failures."""
     at, classes, kinds = _column(model), published()["classes"], published()["kinds"]
     return Causes(
         {name: shares[at] / 100 for name, shares in classes.items()},
@@ -89,17 +83,10 @@ def published_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows: list[list[Cell]] = []
     for run, model in known:
         means = {score.task: score.pass_at(1).mean for score in run.scores}
-        here = sum(run.by_prompt.values()) / len(run.by_prompt)
         pairs = [(task, mean, task_mean(model, task)) for task, mean in means.items()]
-        pairs.append(("all of these", here, overall_mean(model, [*means])))
-        rows += [
-            [task, run.name, ours, theirs, None if theirs is None else ours - theirs]
-            for task, ours, theirs in pairs
-        ]
+        pairs.append(("all of these", run.mean, overall_mean(model, [*means])))
+        for task, ours, theirs in pairs:
+            rows.append([task, run.name, ours, theirs, None if theirs is None else ours - theirs])
     are_theirs = all(is_of_authors_prompts(run) for run, _ in known)
-    notes = [
-        *taken_for(runs),
-        *([] if are_theirs else [note("other-phrasings")]),
-        note("two-sums"),
-    ]
+    notes = [*taken_for(runs), *([] if are_theirs else [note("other-phrasings")]), note("two-sums")]
     return sheet("published", rows, notes=notes)

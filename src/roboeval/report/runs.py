@@ -1,4 +1,4 @@
-"""Judged runs as a report shows them: their tables of results, and names that tell them apart."""
+"""Judged runs as a report shows them, under names that tell them apart."""
 
 from __future__ import annotations
 
@@ -20,25 +20,17 @@ LONGEST_NAME = 100
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """A run with its verdicts.
-
-    Args:
-        results: by a suite that is at hand.
-        table: of the results; `accepted` is null where programs were not checked.
-        ablated: what is required by common sense only; None where that was not judged.
-        beside: as another suite judges it; None where that was not asked for.
-        name: as figures and tables call it; no two runs of a report share it.
-    """
+    """A run with its verdicts."""
 
     results: Results
-    table: pl.DataFrame
-    ablated: Results | None = None
-    beside: Results | None = None
-    name: str = ""
+    table: pl.DataFrame  # `accepted` is null where programs were not checked
+    ablated: Results | None = None  # where common sense only was judged
+    beside: Results | None = None  # as another suite judges it
+    name: str = ""  # in figures and tables; no two runs of a report share it
 
     @property
     def suite(self) -> Suite:
-        """The suite by which it was judged."""
+        """The suite that judged it."""
         assert self.results.suite is not None, "a report reads runs with their suite"
         return self.results.suite
 
@@ -54,7 +46,7 @@ class JudgedRun:
 
     @property
     def model(self) -> str | None:
-        """Who wrote the completions; None where that was not recorded, or several did."""
+        """The model that wrote the completions; None if not recorded, or if several did."""
         return None if self.is_mixed else self.table["model"][0]
 
     @cached_property
@@ -64,12 +56,12 @@ class JudgedRun:
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:
-        """How often completions pass, in the order of the suite."""
+        """The scores of tasks, in the order of the suite."""
         return task_scores(self.table, self.suite.tasks)
 
     @cached_property
     def ablated_scores(self) -> tuple[TaskScore, ...]:
-        """The same by common sense only."""
+        """The scores of tasks by common sense only."""
         return () if self.ablated is None else task_scores(self.ablated.table, self.suite.tasks)
 
     @cached_property
@@ -78,30 +70,30 @@ class JudgedRun:
         return {(p.task, p.prompt): p.pass_at(1) for score in self.scores for p in score.prompts}
 
     @property
-    def by_task(self) -> dict[str, list[float]]:
-        """pass@1 of the prompts of each task."""
-        return {score.task: [p.pass_at(1) for p in score.prompts] for score in self.scores}
+    def mean(self) -> float:
+        """The mean pass@1 over prompts."""
+        return sum(self.by_prompt.values()) / len(self.by_prompt)
 
     @cached_property
     def instructions(self) -> Mapping[tuple[str, int], str]:
-        """The text that the model was given for each prompt, where that was recorded."""
+        """The instruction of each prompt, where it was recorded."""
         completions = self.results.completions.items()
         return {key[:2]: one.instruction for key, one in completions if one.instruction is not None}
 
     @cached_property
     def trials(self) -> tuple[CheckedPrompt, ...]:
-        """The completions of each prompt as the check sees them; none where not all were checked."""
+        """The checked completions by prompt; none where not all were checked."""
         return () if self.table["accepted"].null_count() else trials_by_prompt(self.table)
 
 
 def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
-    """The tasks of which some run has completions, in the order of the suite."""
+    """The tasks with completions in any run, in the order of the suite."""
     there = {score.task for run in runs for score in run.scores}
     return [task for task in dict.fromkeys([*runs[0].suite.tasks, *sorted(there)]) if task in there]
 
 
 def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
-    """The same runs, each named by its model or, where that does not tell it apart, by its folder too."""
+    """The same runs, each named by its model and, where that is not unique, by its folder, too."""
     plain = [_readable(run.model or run.folder) for run in runs]
     names = _apart(plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)])
     while len({*names}) < len(names):
@@ -110,7 +102,6 @@ def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
 
 
 def _readable(name: str) -> str:
-    """A name as text that a line holds: its beginning and its end, by which names are told apart."""
     name = visible(name)
     return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 30]}…{name[-29:]}"
 

@@ -1,4 +1,4 @@
-"""How often programs do what was asked: by model, by task and by prompt, and how sure that is."""
+"""Sections on pass@1 by model, by task and by prompt."""
 
 from __future__ import annotations
 
@@ -24,16 +24,14 @@ def results(runs: Sequence[JudgedRun]) -> Section:
 
 def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     """pass@1 of each run, with intervals."""
-    rows = [_overall_row(run) for run in runs]
+    rows: list[list[Cell]] = []
+    for run in runs:
+        tasks = [[prompt.pass_at(1) for prompt in score.prompts] for score in run.scores]
+        prompts = [[value] for values in tasks for value in values]
+        found = [by_formula(prompts), by_formula(tasks), by_bootstrap(tasks)]
+        ends = [end for estimate in found for end in (estimate.low, estimate.high)]
+        rows.append([run.name, run.completions.height, len(prompts), len(tasks), found[0].mean, *ends])
     return sheet("overall", rows, notes=[*_few_tasks(runs), *_unfinished(runs)])
-
-
-def _overall_row(run: JudgedRun) -> list[Cell]:
-    tasks = list(run.by_task.values())
-    prompts = [[value] for values in tasks for value in values]
-    found = [by_formula(prompts), by_formula(tasks), by_bootstrap(tasks)]
-    ends = [end for estimate in found for end in (estimate.low, estimate.high)]
-    return [run.name, run.completions.height, len(prompts), len(tasks), found[0].mean, *ends]
 
 
 def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
@@ -71,12 +69,12 @@ def task_sheet(runs: Sequence[JudgedRun]) -> Sheet:
 
 
 def thresholds(runs: Sequence[JudgedRun]) -> Section:
-    """How many prompts reach which pass@1 (paper, section V.A)."""
+    """The share of prompts that reach each pass@1 (paper, section V.A)."""
     return section("thresholds", Picture("thresholds", lambda: figures.thresholds(runs)), curve_sheet(runs))
 
 
 def curve_sheet(runs: Sequence[JudgedRun]) -> Sheet:
-    """The second figure as numbers."""
+    """The figure of thresholds as numbers."""
     curves = [[*run.by_prompt.values()] for run in runs]
     steps = sorted({t for values in curves for t, _ in threshold_curve(values)}, reverse=True)
     rows = [[t, *(share_at_least(values, t) for values in curves)] for t in steps]
@@ -95,7 +93,8 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
             continue
         if len(said) < MOST_PAIRS:
             said.append(verdict(found, (first.name, second.name)))
-            notes += _unlike(first, second)
+            if apart := unlike(*(told_of(run.results.about, run.results.head) for run in (first, second))):
+                notes.append(f"{first.name} and {second.name}: {'; '.join(apart)}.")
         over = found.over_prompts, found.over_tasks
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]
         ps, much = (found.p_prompts, found.p_tasks), (found.needed.completions, found.needed.prompts)
@@ -104,21 +103,16 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     return section("differences", Prose(said), sheet("differences", rows, notes=notes))
 
 
-def _unlike(first: JudgedRun, second: JudgedRun) -> list[str]:
-    found = unlike(*(told_of(run.results.about, run.results.head) for run in (first, second)))
-    return [f"{first.name} and {second.name}: {'; '.join(found)}."] if found else []
-
-
 def _pairs(runs: Sequence[JudgedRun]) -> list[tuple[JudgedRun, JudgedRun]]:
     pairs = list(combinations(runs, 2))
     if len(pairs) <= MOST_PAIRS:
         return pairs
-    best = max(runs, key=lambda run: sum(run.by_prompt.values()) / len(run.by_prompt))
+    best = max(runs, key=lambda run: run.mean)
     return [(run, best) for run in runs if run is not best]
 
 
 def prompts(runs: Sequence[JudgedRun]) -> Section:
-    """pass@1 of each prompt, and what the paper's authors published."""
+    """pass@1 of each prompt, and the published numbers."""
     unknown = ", ".join(run.name for run in runs if paper.model_of(run) is None)
     published = paper.published_sheet(runs)
     nothing = f"No published numbers of {unknown}: no model of the paper is called so."

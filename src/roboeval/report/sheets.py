@@ -1,9 +1,8 @@
-"""What the page of a report consists of: tables, which stand in CSV files as well, figures and texts."""
+"""Parts of a report's page: tables, which are written as CSV as well, figures and texts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -24,46 +23,32 @@ Cell: TypeAlias = str | int | float | None
 
 @cache
 def page_words() -> dict[str, dict[str, Any]]:
-    """What page.yaml says of sections, figures, tables and notes, by their names."""
+    """The content of page.yaml: words for sections, figures, tables and notes, by name."""
     text = Path(__file__).with_name("page.yaml").read_text()
     return yaml.load(text, Loader)  # type: ignore[no-any-return]  # noqa: S506 - a safe one
 
 
 def described(kind: str, name: str) -> Any:  # noqa: ANN401 - a text, or several
-    """What page.yaml says of one of them."""
+    """The words of page.yaml for one of them."""
     return page_words()[kind][name]
 
 
 def note(name: str) -> str:
-    """What a reader must know."""
+    """A note of page.yaml."""
     return str(described("notes", name))
 
 
 class Column(NamedTuple):
-    """A column of a table.
-
-    Args:
-        head: its name, which may be that of a model.
-        kind: what stands in it: a text, a class of failures, a share from 0 to 1, a difference of shares, a
-            whole number, or any.
-    """
+    """A column of a table."""
 
     head: str
-    kind: Kind = "text"
+    kind: Kind = "text"  # "class" is one of failures; a share is from 0 to 1
 
 
-@dataclass(frozen=True)
-class Sheet:
-    """A table.
+class Sheet(NamedTuple):
+    """A table."""
 
-    Args:
-        name: of its file, without the ending, and in page.yaml.
-        columns: at least one.
-        rows: a cell for each column; None where there is nothing to say.
-        notes: what else a reader must know, such as where a published number does not fit.
-    """
-
-    name: str
+    name: str  # in page.yaml, and of its CSV file
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]]
     notes: Sequence[str] = ()
@@ -72,48 +57,32 @@ class Sheet:
 def sheet(
     name: str, rows: Sequence[Sequence[Any]], *, notes: Sequence[str] = (), shares: Sequence[str] = ()
 ) -> Sheet:
-    """A table that page.yaml describes.
-
-    Args:
-        name: of the table.
-        rows: a cell for each column.
-        notes: what else a reader must know.
-        shares: the heads of further columns, such as the names of models.
-    """
+    """A table that page.yaml describes, with further columns of shares, such as one a model."""
     kinds = described("tables", name)["columns"]
     columns = [Column(head, kind) for part in kinds for kind, heads in part.items() for head in heads]
     return Sheet(name, [*columns, *(Column(head, "share") for head in shares)], rows, notes)
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure.
+class Picture(NamedTuple):
+    """A figure."""
 
-    Args:
-        name: of its files, without the ending, and in page.yaml.
-        draw: draws it.
-    """
-
-    name: str
+    name: str  # in page.yaml, and of its files
     draw: Callable[[], Figure]
 
 
-@dataclass(frozen=True)
-class Prose:
+class Prose(NamedTuple):
     """Paragraphs of plain text."""
 
     paragraphs: Sequence[str]
 
 
-@dataclass(frozen=True)
-class Code:
-    """A text whose lines and spaces count, such as a command."""
+class Code(NamedTuple):
+    """Preformatted text, such as a command."""
 
     text: str
 
 
-@dataclass(frozen=True)
-class Groups:
+class Groups(NamedTuple):
     """Groups of failures, each with the name of its run."""
 
     shown: Sequence[tuple[str, Cluster]]
@@ -122,16 +91,10 @@ class Groups:
 Part: TypeAlias = Sheet | Picture | Prose | Code | Groups
 
 
-@dataclass(frozen=True)
-class Section:
-    """A section of the page.
+class Section(NamedTuple):
+    """A section of the page."""
 
-    Args:
-        name: by which links find it, and page.yaml its title.
-        parts: in their order.
-    """
-
-    name: str
+    name: str  # in page.yaml, and of its anchor
     parts: Sequence[Part]
 
 
@@ -148,34 +111,27 @@ def _is_empty(part: Part) -> bool:
 
 
 def write_csv(table: Sheet, folder: Path) -> None:
-    """Write a table as CSV, with all digits.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
+    """Write a table as CSV, with all digits."""
     types = {"text": pl.String, "class": pl.String, "count": pl.Int64}
     kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))
     rows = [list(map(_plain, row)) for row in table.rows]
-    write_table(
-        pl.DataFrame(rows, schema=schema, orient="row", strict=False), folder / f"{table.name}.csv", "csv"
-    )
+    frame = pl.DataFrame(rows, schema=schema, orient="row", strict=False)
+    write_table(frame, folder / f"{table.name}.csv", "csv")
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:
-    """The heads, with a number behind those that others have, such as that of a model named `task`."""
+    """The heads of columns, made unique by numbers: a model may be named `task`."""
     heads: list[str] = []
     for column in columns:
-        plain = _head(column.head)
+        plain = str(_plain(column.head))
+        if plain.startswith(
+            ("=", "+", "-", "@", "\t", "\r", "\n")
+        ):  # lest a spreadsheet takes it for a formula
+            plain = f"'{plain}"
         others = (f"{plain} #{number}" for number in count(2))
         heads.append(plain if plain not in heads else next(head for head in others if head not in heads))
     return heads
-
-
-def _head(head: str) -> str:
-    """A head that no spreadsheet takes for a formula, as `write` does it for cells."""
-    plain = str(_plain(head))
-    return f"'{plain}" if plain.startswith(("=", "+", "-", "@", "\t", "\r", "\n")) else plain
 
 
 def _plain(cell: Cell) -> Cell:
@@ -183,7 +139,7 @@ def _plain(cell: Cell) -> Cell:
 
 
 def told(cell: Cell, kind: Kind) -> str:
-    """A cell as a person reads it."""
+    """A cell as text for people."""
     if cell is None:
         return "-"
     if isinstance(cell, str):

@@ -1,4 +1,4 @@
-"""Puts a report together, and writes it: figures as PNG and PDF, tables as CSV, and the page."""
+"""Puts a report together and writes it: figures as PNG and PDF, tables as CSV, and the page."""
 
 from __future__ import annotations
 
@@ -29,18 +29,13 @@ from roboeval.report.sheets import (
 )
 
 FORMATS = ("png", "pdf")
-PARTS = ("figures", "tables")
 PAGE = "index.html"
 UNFINISHED = ("This report is not finished; give the command again that writes it.",)
-HEAD = 4_000  # characters at the beginning of a page, in which it says what it is
+HEAD = 4_000  # characters at the beginning of a page, among which is its generator
 
 
 def headline(runs: Sequence[JudgedRun]) -> tuple[str, list[str]]:
-    """The title of a page, and the paragraphs below it.
-
-    Args:
-        runs: at least one.
-    """
+    """The title of a page, and the paragraphs below it."""
     title = runs[0].name if len(runs) == 1 else f"{len(runs)} models"
     count = how_many(sum(run.completions.height for run in runs))
     by_hand = [run.name for run in runs if (run.model or "").startswith("recorded:")]
@@ -58,14 +53,7 @@ def sections(
     prices: Mapping[str, Price] = {},
     command: str = "",
 ) -> list[Section]:
-    """All sections of a report.
-
-    Args:
-        runs: judged by the same suite, named apart, at least one.
-        with_published: whether the published causes of failures stand beside ours.
-        prices: by model.
-        command: that makes the report.
-    """
+    """All sections of a report about runs that the same suite judged."""
     found = [
         scores.results(runs),
         scores.differences(runs),
@@ -84,9 +72,8 @@ def sections(
 
 
 def origin(runs: Sequence[JudgedRun], command: str) -> Section:
-    """Where a report comes from: what was judged, by what, and the command that makes it again."""
-    parts = origin_sheet(runs), Prose(about_suite(runs)), Code(command)
-    return section("origin", *parts)
+    """What was judged, by what, and the command that makes the report again."""
+    return section("origin", origin_sheet(runs), Prose(about_suite(runs)), Code(command))
 
 
 def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
@@ -94,27 +81,19 @@ def origin_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows: list[list[Cell]] = []
     for run in runs:
         about, head = run.results.about, run.results.head
-        asked = [
-            _settings(about.get("settings")),
-            *map(_text, (about.get("template"), about.get("codebotler"))),
-        ]
-        judged = [_text(head.get(name)) for name in ("codebotler", "python", "digest")]
-        rows.append([run.name, run.folder, run.completions.height, *asked, *judged])
+        settings = about.get("settings")
+        told = None
+        if isinstance(settings, dict):
+            told = ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
+        asked = (told, about.get("template"), about.get("codebotler"))
+        judged = (head.get(name) for name in ("codebotler", "python", "digest"))
+        origin = ["not recorded" if value is None else str(value) for value in (*asked, *judged)]
+        rows.append([run.name, run.folder, run.completions.height, *origin])
     return sheet("runs", rows)
 
 
-def _settings(settings: object) -> str:
-    if not isinstance(settings, dict):
-        return "not recorded"
-    return ", ".join(f"{name} {json.dumps(value)}" for name, value in settings.items())
-
-
-def _text(value: object) -> str:
-    return "not recorded" if value is None else str(value)
-
-
 def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
-    """By what was judged, in sentences."""
+    """Sentences about the suite and its rules."""
     head = runs[0].results.head
     version, digest = head.get("version"), head.get("digest")
     return (
@@ -128,24 +107,10 @@ def about_suite(runs: Sequence[JudgedRun]) -> tuple[str, ...]:
 
 
 def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], out: Path) -> Iterator[str]:
-    """Write a report into a folder, which is made if it is not there; the whole page comes last.
-
-    Args:
-        title: of the page.
-        lead: paragraphs at its beginning.
-        sections: what it holds.
-        out: the folder.
-
-    Yields:
-        what is written, piece by piece.
-
-    Raises:
-        BadInput: the folder cannot be made.
-        OSError: a file cannot be written; what stood there stays.
-    """
+    """Write a report into a folder, and yield the name of each piece; the whole page comes last."""
     parts = [part for section in sections for part in section.parts]
     try:
-        for name in PARTS:
+        for name in ("figures", "tables"):
             (out / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(f"cannot be made ({error.strerror})", file=out) from None
@@ -153,29 +118,19 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
         write_whole(out / PAGE, page(title, UNFINISHED, [], {}).encode())
     drawn: dict[str, Drawn] = {}
     for part in parts:
-        match part:
-            case Sheet():
-                write_csv(part, out / "tables")
-                yield part.name
-            case Picture():
-                drawn[part.name] = _draw(part, out / "figures")
-                yield part.name
-            case _:
-                pass
+        if isinstance(part, Sheet):
+            write_csv(part, out / "tables")
+            yield part.name
+        elif isinstance(part, Picture):
+            drawn[part.name] = _draw(part, out / "figures")
+            yield part.name
     write_whole(out / PAGE, page(title, lead, sections, drawn).encode())
     _forget_others(out, {part.name for part in parts if isinstance(part, Sheet | Picture)})
     yield "page"
 
 
 def expect_no_others(out: Path) -> None:
-    """Refuse a folder that holds something else than a report.
-
-    Args:
-        out: the folder, which need not exist.
-
-    Raises:
-        BadInput: files would be lost there.
-    """
+    """Refuse a folder with files that would be lost: any folder but a report's or an empty one."""
     if not out.is_dir():
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
@@ -193,19 +148,19 @@ def _is_report(page_file: Path) -> bool:
 
 
 def _forget_others(out: Path, names: AbstractSet[str]) -> None:
-    """Remove what an earlier report wrote here that this one has not, such as rejection sampling."""
+    """Remove files of an earlier report that this one does not have, such as rejection sampling."""
     for name in {*page_words()["figures"], *page_words()["tables"]} - names:
         for file in (f"tables/{name}.csv", *(f"figures/{name}.{kind}" for kind in FORMATS)):
             (out / file).unlink(missing_ok=True)
 
 
 def pieces(sections: Sequence[Section]) -> int:
-    """How many pieces `write_report` tells of."""
+    """The number of pieces that `write_report` yields."""
     return 1 + sum(isinstance(part, Sheet | Picture) for section in sections for part in section.parts)
 
 
 def _draw(picture: Picture, folder: Path) -> Drawn:
-    """Draw a figure, write it, and give it for the page."""
+    """Draw a figure, write its files, and return it for the page."""
     with styled():
         found = written(picture.draw())
     for kind in FORMATS:

@@ -1,4 +1,4 @@
-"""Computes what a task says about its worlds: a small part of Python's expressions, read and never run."""
+"""Expressions in task files: a small part of Python's, interpreted here and never run."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from typing import Any
 
 from codebotler.syntaxtree import parse_expression
 
-Names = Mapping[str, Any]
-"""What an expression may name: texts, numbers, lists, and people and things as namespaces."""
+Names = Mapping[str, Any]  # texts, numbers, lists, and people and things as namespaces
 
 
 class ExpressionError(ValueError):
-    """A text is not an expression, or names what does not exist; the message is one sentence."""
+    """A text is not an expression, or names what does not exist."""
 
 
 _OPERATORS: dict[type[ast.AST], Callable[[Any, Any], Any]] = {
@@ -48,11 +47,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 @cache  # the same few for each of many worlds
 def parsed(text: str) -> ast.expr:
-    """The syntax tree of an expression.
-
-    Raises:
-        ExpressionError: the text is none.
-    """
+    """The syntax tree of an expression."""
     try:
         return parse_expression(text.strip())
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -60,15 +55,7 @@ def parsed(text: str) -> ast.expr:
 
 
 def value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
-    """The value of an expression.
-
-    Args:
-        node: the expression.
-        names: what it may name.
-
-    Raises:
-        ExpressionError: it names what does not exist, or is more than an expression may be.
-    """
+    """The value of an expression."""
     try:
         return _value(node, names)
     except ExpressionError:
@@ -123,15 +110,7 @@ def _part(whole: Any, name: str) -> Any:  # noqa: ANN401 - of a fact
 
 
 def each_of(loop: ast.comprehension, names: Names) -> Iterator[Names]:
-    """The names in each turn of a loop such as `for person in people if person.room`.
-
-    Args:
-        loop: the loop.
-        names: those outside of it.
-
-    Raises:
-        ExpressionError: it is no such loop.
-    """
+    """The names in each turn of a loop such as `for person in people if person.room`."""
     if not isinstance(loop.target, ast.Name) or loop.is_async:
         raise ExpressionError(f'"{ast.unparse(loop.target)}" is no single name; write for NAME in ...')
     items = _value(loop.iter, names)

@@ -2,36 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
 from codebotler.badinput import BadInput
 
-GROUP = "roboeval.suites"
 
-
-@dataclass(frozen=True)
-class InstalledSuite:
-    """A suite that an installed package declares.
-
-    Args:
-        name: by which it is asked for, and that its suite.yaml must have as well.
-        package: that brings it, with its version.
-        place: where it lies, as `package` or `package.folder.folder`.
-    """
+class InstalledSuite(NamedTuple):
+    """A suite that an installed package declares."""
 
     name: str
-    package: str
-    place: str
+    package: str  # with its version
+    place: str  # `package` or `package.folder.folder`
 
     def folder(self) -> Path:
-        """Where its suite.yaml lies. No code of the package is run to find out.
-
-        Raises:
-            BadInput: it is not there.
-        """
+        """The folder of its suite.yaml; no code of the package is run to find it."""
         top, *below = self.place.split(".")
         try:
             spec = find_spec(top)
@@ -49,19 +36,18 @@ class InstalledSuite:
 
 
 def installed_suites() -> list[InstalledSuite]:
-    """The suites of installed packages, by name; two may have the same one."""
+    """The suites of installed packages, sorted by name; two may have the same one."""
     suites = []
-    for point in entry_points(group=GROUP):
+    for point in entry_points(group="roboeval.suites"):
         package = "of unknown name" if point.dist is None else f"{point.dist.name} {point.dist.version}"
         suites.append(InstalledSuite(point.name, package, point.value.strip()))
-    return sorted(suites, key=lambda suite: (suite.name, suite.package))
+    return sorted(suites)
 
 
 def installed_folder(name: str) -> Path | None:
-    """The folder of the suite that a package brings by a name; None if no package does.
+    """The folder of a suite that a package brings; None if no package does.
 
-    Raises:
-        BadInput: several packages bring one of this name, a folder here has it, too, or it is not there.
+    Raises BadInput if several packages bring one, or a folder here has the same name.
     """
     suites = [suite for suite in installed_suites() if suite.name == name]
     if not suites:

@@ -136,14 +136,7 @@ def shipped_suites() -> tuple[str, ...]:
 
 
 def suite_folder(name: str) -> Path:
-    """The folder of a suite: one that ships with RoboEval, one that a package brings, or a folder.
-
-    Args:
-        name: of the suite, or its folder.
-
-    Raises:
-        BadInput: there is no such suite.
-    """
+    """The folder of a suite: one that ships with RoboEval, one that a package brings, or a folder."""
     if name in shipped_suites():
         return SUITES / name
     if SUITE_NAME.fullmatch(name) and (brought := installed_folder(name)) is not None:
@@ -156,7 +149,7 @@ def suite_folder(name: str) -> Path:
 
 
 def task_files(folder: Path) -> list[Path]:
-    """The task files in a suite's folder, in the order of their names."""
+    """The task files in a suite's folder, sorted."""
     return sorted((folder / "tasks").glob("*.yaml"))
 
 
@@ -164,7 +157,7 @@ def task_files(folder: Path) -> list[Path]:
 
 
 def _read_suite(folder: Path, skills: SkillTable, count: int | None = None, seed: int | None = None) -> Suite:
-    """The suite in a folder as its files are now, which are read again only if they have changed."""
+    """The suite in a folder; its files are read again only if they have changed."""
     files = [folder / "suite.yaml", *task_files(folder)]
     stats = [(file.name, file.stat()) for file in files if file.is_file()]
     versions = tuple((name, stat.st_mtime_ns, stat.st_size) for name, stat in stats)

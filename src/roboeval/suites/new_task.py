@@ -1,4 +1,4 @@
-"""The start of a new task: a small whole one, with comments, in a suite of its own if there is none."""
+"""Templates for a new task, and for its suite if there is none."""
 
 from __future__ import annotations
 
@@ -13,18 +13,7 @@ _TEMPLATE = Path(__file__).parent / "template"
 
 
 def new_task(folder: Path, name: str) -> Path:
-    """Start a task in a suite's folder, and the suite if there is none; the files say what to fill in.
-
-    Solutions come with it, unless there are some for a task of this name already.
-
-    Args:
-        folder: of the suite.
-        name: of the task.
-
-    Raises:
-        BadInput: the name cannot be one, the task is there already, or the folder cannot be written or lies
-            within another suite.
-    """
+    """Write the files of a new task, and of the suite if there is none; existing solutions stay."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
         raise BadInput(
             f'"{name}" is no name for a task; write words together, each with a capital, such as WaterPlants'
@@ -34,23 +23,22 @@ def new_task(folder: Path, name: str) -> Path:
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
         raise BadInput("is there already; choose another name, or edit it", file=path)
-    files = {"new-suite.yaml": folder / "suite.yaml", "new-solutions.yaml": folder / "solutions" / path.name}
+    files = {
+        folder / "suite.yaml": ("new-suite.yaml", _suite_name(folder)),
+        folder / "solutions" / path.name: ("new-solutions.yaml", ""),
+        path: ("new-task.yaml", name),
+    }
     try:
-        for template, file in files.items():
+        for file, (template, put) in files.items():
             if not file.exists():
-                _write(template, file, _suite_name(folder))
-        _write("new-task.yaml", path, name)
+                write_whole(file, (_TEMPLATE / template).read_text().replace("NAME", put).encode())
     except OSError as error:
         raise BadInput(f"cannot be written ({error.strerror})", file=error.filename) from None
     return path
 
 
-def _write(template: str, file: Path, name: str) -> None:
-    write_whole(file, (_TEMPLATE / template).read_text().replace("NAME", name).encode())
-
-
 def _suite_name(folder: Path) -> str:
-    """A name for the suite in a folder: the folder's, as far as it can be one."""
+    """The folder's name, as far as it can be a suite's."""
     plain = re.sub(r"[^a-z0-9-]", "-", folder.resolve().name.lower())
     name = plain.lstrip("-0123456789").removesuffix(ABLATED)
     return f"my-{name}" if name in shipped_suites() else name or "mine"

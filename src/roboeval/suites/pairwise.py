@@ -7,12 +7,10 @@ from itertools import combinations, product
 from random import Random
 from typing import TypeAlias
 
-Row: TypeAlias = dict[str, int]
-"""For each factor the position of its value."""
-
+Row: TypeAlias = dict[str, int]  # for each factor the position of its value
 Pair: TypeAlias = tuple[tuple[str, int], tuple[str, int]]
 
-_TRIES = 12  # rows that are made up for each that is taken
+_TRIES = 12  # candidates for each row
 
 
 def pairs(sizes: Mapping[str, int]) -> set[Pair]:
@@ -30,34 +28,22 @@ def met(row: Row) -> set[Pair]:
 
 
 def spread(sizes: Mapping[str, int], count: int, random: Random) -> list[Row]:
-    """A covering array, with rows drawn by chance behind it up to a number.
-
-    Args:
-        sizes: how many values each factor has.
-        count: how many rows at least.
-        random: where draws come from.
-    """
+    """A covering array, filled up to `count` rows with random ones."""
     rows = covering(sizes, random)
     rows += [{name: random.randrange(size) for name, size in sizes.items()} for _ in range(count - len(rows))]
     return rows
 
 
 def covering(sizes: Mapping[str, int], random: Random) -> list[Row]:
-    """Rows in which every pair of values meets; greedy, so that they are few but not the fewest.
-
-    Args:
-        sizes: how many values each factor has.
-        random: where draws come from.
-    """
+    """Rows in which every pair of values meets; greedy, so that they are few but not the fewest."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
     left = pairs(sizes)
     rows: list[Row] = []
     while left:
         seeds = random.sample(sorted(left), min(_TRIES, len(left)))
-        rows.append(
-            max((_row(sizes, seed, left, random) for seed in seeds), key=lambda row: len(met(row) & left))
-        )
+        candidates = [_row(sizes, seed, left, random) for seed in seeds]
+        rows.append(max(candidates, key=lambda row: len(met(row) & left)))
         left -= met(rows[-1])
     return rows
 

@@ -10,8 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.world import AnswerFile, Name, PersonFile, Text, WorldFile
 
-MOST_WORLDS = 10_000
-"""Of one task; those of a whole suite then take a gigabyte of memory, and minutes to be drawn."""
+MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
 
 Category = Literal[
     "SayAtLocation",
@@ -79,20 +78,13 @@ class ScenarioFile(WorldFile):
 
 
 Levels = Annotated[list[Text], Field(min_length=1)] | Text
-"""What may be the case, or what always is."""
-
 NOWHERE = "nowhere"
-
-
 Answers = AnswerFile | Annotated[list[AnswerFile], Field(min_length=1)]
 Looks = Annotated[int, Field(strict=True, ge=0, le=1_000)]
 
 
 class DrawnPersonFile(_Form):
-    """Who may be in the worlds of a task.
-
-    Wherever there is a choice, it is drawn for each world: where they are, what they answer, when they come.
-    """
+    """A person who may be in the worlds of a task; where there is a choice, it is drawn for each world."""
 
     name: Name | None = None
     where: Levels = Field(alias="in")
@@ -103,21 +95,21 @@ class DrawnPersonFile(_Form):
 
 
 class DrawnThingFile(_Form):
-    """What may lie in the worlds of a task."""
+    """A thing that may lie in the worlds of a task."""
 
     label: Name | None = None
     where: Levels = Field(alias="in")
 
 
 class CornerFile(_Form):
-    """A world that a task sets by hand; what it does not set is the first of what there is to choose from."""
+    """A world that a task sets by hand; what it leaves out is the first of the choices."""
 
     about: Name
     set: dict[Name, AnswerFile | Annotated[int, Field(strict=True)]] = {}
 
 
 class DrawnWorldsFile(_Form):
-    """What the worlds of a task have in common, and what may be different in each."""
+    """What the worlds of a task have in common, and what may differ."""
 
     robot: Name
     rooms: Annotated[list[Name], Field(min_length=1)]

@@ -18,9 +18,7 @@ from roboeval.suites.task import Check, Requirement, Scenario, Task
 from roboeval.suites.worlds import WorldSampler
 
 LENT = ("summary", "abilities", "prompts")
-
-PEOPLE = "people"
-"""What every check of drawn worlds may name without a parameter: whoever a look may be for."""
+PEOPLE = "people"  # in checks of drawn worlds: any person or word for people
 
 _PARAMETER = r" *[^\W\d]\w* *"
 _HEAD = re.compile(rf"(\w+)(?:\(({_PARAMETER}(?:,{_PARAMETER})*)\))?")
@@ -63,7 +61,7 @@ def read_task(
         reader = _Reader(form, file, skills, _phrases(form, file, words))
         scenarios = tuple(reader.drawn(WorldSampler(form, file), count, seed))
     else:
-        reader = _Reader(form, file, skills)
+        reader = _Reader(form, file, skills, {})
         _expect_different_worlds(form, file)
         scenarios = tuple(reader.listed(form.worlds))
         if any(world.ablation is not None for world in form.worlds):
@@ -86,7 +84,7 @@ def read_task(
 
 
 def _borrowed(file: YamlFile, lender: YamlFile | None) -> object:
-    """What a task file says, with the instruction of another one where it has none of its own."""
+    """The content of a task file, with the instruction of another one where it has none of its own."""
     if lender is None or not isinstance(file.data, dict) or not isinstance(lender.data, dict):
         return file.data
     lent = {name: lender.data[name] for name in LENT if name in lender.data}
@@ -104,7 +102,7 @@ def _expect_different_worlds(form: TaskFile, file: YamlFile) -> None:
 
 
 def _phrases(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[str, str]:
-    """What checks may name without a parameter: people, and the phrases of the task."""
+    """Regexes that checks may name without a parameter: people, and the phrases of the task."""
     names = [person.name or key for key, person in form.worlds.people.items()]
     phrases = {PEOPLE: rf"(?:{'|'.join([*words, *names])})s?"}
     for name, regexes in form.phrases.items():
@@ -120,18 +118,16 @@ def _phrases(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[
 
 @dataclass(frozen=True)
 class _Reader:
-    """Reads the checks and requirements of one task file."""
+    """The checks and requirements of one task file."""
 
     form: TaskFile | DrawnTaskFile
     file: YamlFile
     skills: SkillTable
-    phrases: Mapping[str, str] = field(default_factory=dict)
+    phrases: Mapping[str, str]
     checks: dict[str, Check] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        for head in self.form.checks:
-            check = self._check(head)
-            self.checks[check.name] = check
+        self.checks.update((check.name, check) for check in map(self._check, self.form.checks))
 
     def _check(self, head: str) -> Check:
         def wrong(sentence: str, *place: str) -> BadInput:
@@ -206,7 +202,6 @@ class _Reader:
         return Requirement(text, name, formula, check.category, self.file.line(at))
 
     def _call(self, text: str, bare: str, at: Place) -> tuple[str, list[str]]:
-        """The name of a requirement's check, and the arguments as text."""
         try:
             node = parse_expression(bare)
         except (SyntaxError, ValueError, RecursionError, MemoryError):

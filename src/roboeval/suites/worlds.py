@@ -19,34 +19,27 @@ from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, 
 from roboeval.suites.pairwise import Row, spread
 from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile
 
-Level: TypeAlias = str | int
-"""Something that may be the case: a room, an answer, a position among the options, a number of looks."""
+Level: TypeAlias = str | int  # a room, an answer, a position among options, a number of looks
 
 _TRIES = 50  # draws for a world that is not there yet
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is the case in one world.
-
-    Args:
-        about: what is special in it.
-        chosen: for each factor, which of its levels.
-        rooms: in the order in which the robot knows them.
-    """
+    """One world: the level of each factor."""
 
     about: str
     chosen: Mapping[str, Level]
-    rooms: tuple[str, ...]
+    rooms: tuple[str, ...]  # in the order in which the robot knows them
 
     def room(self, name: str) -> str:
-        """Where somebody or something is; empty if nowhere."""
+        """The room of a person or thing; empty if nowhere."""
         room = str(self.chosen[f"{name}.in"])
         return "" if room == NOWHERE else room
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """What tells the world from others: of who is nowhere, the answers do not count."""
+        """What tells the world from others; answers of people who are nowhere do not count."""
         absent = {_owner(factor) for factor, level in self.chosen.items() if level == NOWHERE}
         chosen = self.chosen.items()
         return self.rooms, *(one for one in chosen if one[1] == NOWHERE or _owner(one[0]) not in absent)
@@ -54,12 +47,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class WorldSampler:
-    """Draws worlds from the description in a task file.
-
-    Args:
-        form: the task file's content.
-        file: the task file.
-    """
+    """Draws worlds from the description in a task file."""
 
     form: DrawnTaskFile
     file: YamlFile
@@ -71,7 +59,7 @@ class WorldSampler:
 
     @cached_property
     def factors(self) -> dict[str, tuple[Level, ...]]:
-        """The levels of whatever may differ between worlds, such as `alice.in` and `alice.answer 1`."""
+        """The levels of each factor, such as `alice.in` and `alice.answer 1`."""
         found: dict[str, tuple[Level, ...]] = {}
         for name, person in self.described.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
@@ -86,7 +74,6 @@ class WorldSampler:
 
     @cached_property
     def _free(self) -> dict[str, int]:
-        """How many levels each factor has that has a choice."""
         return {factor: len(levels) for factor, levels in self.factors.items() if len(levels) > 1}
 
     def _rooms(self, where: str | list[str], *place: str) -> tuple[Level, ...]:
@@ -102,9 +89,7 @@ class WorldSampler:
     def settings(self, count: int, seed: int) -> Iterator[Setting]:
         """The corners, and behind them worlds in which every two levels of two factors meet.
 
-        Args:
-            count: how many at least; fewer only where there are no more.
-            seed: from which they are drawn.
+        They are `count` at least, or fewer where there are no more.
         """
         random = Random(f"{self.form.name} {seed}")  # noqa: S311 - no secret
         corners = [self._corner(corner, number) for number, corner in enumerate(self.described.corners)]
@@ -141,7 +126,6 @@ class WorldSampler:
         return Setting(corner.about, chosen, tuple(self.described.rooms))
 
     def _about(self, chosen: Mapping[str, Level]) -> str:
-        """What is the case, in a few words: who and what is where, and what people answer."""
         parts = []
         for name in (*self.described.people, *self.described.things):
             levels, room = self.factors[f"{name}.in"], chosen[f"{name}.in"]
@@ -158,11 +142,7 @@ class WorldSampler:
     # --- what follows from a setting
 
     def world(self, setting: Setting) -> World:
-        """The world of a setting.
-
-        Raises:
-            BadInput: what it may wait for cannot be computed.
-        """
+        """The world of a setting."""
         things = self._things(setting)
         rooms = []
         for room in setting.rooms:
@@ -176,11 +156,7 @@ class WorldSampler:
         return World(tuple(rooms), self.described.robot, setting.about, wait)
 
     def requirements(self, setting: Setting) -> Iterator[tuple[str, int]]:
-        """What a world requires, as a task that lists its worlds would say it, and which entry says so.
-
-        Raises:
-            BadInput: an entry cannot be read or computed.
-        """
+        """The requirements of a world, as a task that lists its worlds would write them, with their entry."""
         names = self._names(setting)
         for number, text in enumerate(self.form.require):
             with self._located("require", number):
@@ -197,7 +173,6 @@ class WorldSampler:
         return [SimpleNamespace(name=n, label=form.label or n, room=setting.room(n)) for n, form in things]
 
     def _names(self, setting: Setting) -> Names:
-        """What the requirements of a world may name."""
         people = []
         for name in self.described.people:
             one = self._person(name, setting)
@@ -211,7 +186,6 @@ class WorldSampler:
 
     @contextmanager
     def _located(self, *place: str | int) -> Iterator[None]:
-        """Raise errors of expressions as those of the file at a place."""
         try:
             yield
         except ExpressionError as error:
@@ -219,7 +193,6 @@ class WorldSampler:
 
 
 Form: TypeAlias = str | int | OptionFile
-"""A level as a task file writes it."""
 
 
 def _levels(form: Form | Sequence[Form]) -> tuple[Level, ...]:

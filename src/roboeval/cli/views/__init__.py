@@ -1,1 +1,1 @@
-"""What commands draw on a terminal, from the numbers that `analysis` gives."""
+"""Tables and texts for a terminal, drawn from the numbers of `analysis`."""

@@ -1,9 +1,8 @@
-"""How much better one run is than another, and what a second suite changes."""
+"""Views of a comparison of two runs, and of two suites."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 
 from rich import box
 from rich.console import Group, RenderableType
@@ -19,7 +18,6 @@ from roboeval.analysis.verdict_changes import VerdictChanges, place, said, said_
 from roboeval.cli.views.groups import cluster_view
 
 SMALL = 0.0001
-COUNTS = ("both", "first_only", "second_only", "neither")
 
 
 def comparison_view(comparison: Comparison, names: tuple[str, str]) -> RenderableType:
@@ -28,11 +26,8 @@ def comparison_view(comparison: Comparison, names: tuple[str, str]) -> Renderabl
     rows = grid("left", "right", "left")
     rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")
     rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}")
-    rows.add_row(
-        "difference",
-        f"{comparison.over_tasks.mean:+.3f}",
-        f"over {prompts(comparison.prompts)} that both have",
-    )
+    over = f"over {prompts(comparison.prompts)} that both have"
+    rows.add_row("difference", f"{comparison.over_tasks.mean:+.3f}", over)
     few = "too narrow for so few tasks" if len(comparison.tasks) < FEW else ""
     for name, estimate, told in (
         ("95% interval, prompts drawn at random", comparison.over_prompts, _p(comparison.p_prompts)),
@@ -56,12 +51,7 @@ def _p(value: float) -> str:
 
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
-    """What a second suite changes, as text and tables.
-
-    Args:
-        found: at least one.
-        most: how many groups of programs are shown of each run and direction.
-    """
+    """What a second suite changes, with at most `most` groups of programs for each run and direction."""
     sentences = [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
     parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences]
     parts += [Text(), _scores(found)]
@@ -87,15 +77,10 @@ def _scores(found: Sequence[VerdictChanges]) -> Table:
     for one in found:
         before, after = one.pass_at_1
         ends = one.comparison.over_prompts
-        places = [place(one.name, of) for of in scores]
-        table.add_row(
-            Text(visible(one.name)),
-            f"{before:.3f}",
-            f"{after:.3f}",
-            f"{after - before:+.3f}",
-            f"{ends.low:+.3f} to {ends.high:+.3f}",
-            " -> ".join(map(str, dict.fromkeys(places))),
-        )
+        numbers = f"{before:.3f}", f"{after:.3f}", f"{after - before:+.3f}"
+        interval = f"{ends.low:+.3f} to {ends.high:+.3f}"
+        places = " -> ".join(dict.fromkeys(str(place(one.name, of)) for of in scores))
+        table.add_row(Text(visible(one.name)), *numbers, interval, places)
     return table
 
 
@@ -103,8 +88,8 @@ def _tasks(one: VerdictChanges) -> Table:
     first, second = one.suites
     table = _table(visible(one.name), "both", f"{first} only", f"{second} only", "neither")
     for task in one.tasks:
-        counts = asdict(task)
-        table.add_row(Text(visible(task.task)), *(f"{counts[name]:,}" for name in COUNTS))
+        counts = task.both, task.first_only, task.second_only, task.neither
+        table.add_row(Text(visible(task.task)), *(f"{count:,}" for count in counts))
     return table
 
 

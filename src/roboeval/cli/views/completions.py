@@ -1,4 +1,4 @@
-"""Programs of one prompt with the reason why each fails, and one program with all it did."""
+"""Views of a prompt's programs, each with the reason why it fails, and of one program with all it did."""
 
 from __future__ import annotations
 
@@ -21,11 +21,7 @@ MOST_LINES, EXPLANATION = 1_000, 2_000
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
-    """A prompt, program by program.
-
-    Args:
-        data: as `prompt_data` gives it.
-    """
+    """A prompt, program by program; the data is that of `prompt_data`."""
     table = grid("right", "left")
     for program in data["programs"]:
         table.add_row(f"  {program['indices'][0]}", _program_line(program))
@@ -50,17 +46,13 @@ def _program_line(program: Mapping[str, Any]) -> Text:
 
 
 def _error_sentence(verdict: Mapping[str, Any]) -> str:
-    """Where an error arose and what it says, of which either may be unknown."""
+    """The line and the message of an error, of which either may be unknown."""
     where = "" if verdict["line"] is None else f"line {verdict['line']}"
     return ": ".join(filter(None, [where, shortened(verdict["error"]["message"])]))
 
 
 def completion_view(data: Mapping[str, Any]) -> RenderableType:
-    """One completion: its program, and each world with every step and failed check.
-
-    Args:
-        data: as `completion_data` gives it.
-    """
+    """One completion: its program, and each world with every step and failed check (`completion_data`)."""
     lines = {world["line"] for world in data["worlds"] if not world["satisfied"]}
     parts: list[RenderableType] = [_completion_head(data)]
     if data["program"] is not None:

@@ -1,7 +1,8 @@
-"""Completions that were found, failures in groups, and what asking again would have given."""
+"""Views of completions found, of groups of failures, and of rejection sampling."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 
 from rich import box
@@ -21,27 +22,38 @@ from roboeval.evaluation.runs.completions import how_many, name_of
 MOST_LINES = 60  # of a difference between programs
 
 
-def found_view(found: Sequence[Found], total: int) -> RenderableType:
-    """How many completions were found, by task, for a person."""
-    head = Text(f"found {len(found):,} of {how_many(total)}", "bold")
-    if not found:
-        return head
+def found_view(
+    found: Sequence[Found], total: int, told: Sequence[Cluster], *, failed: int, groups: int
+) -> RenderableType:
+    """The completions found, by task, and some groups of those that failed."""
+    parts: list[RenderableType] = [Text(f"found {len(found):,} of {how_many(total)}", "bold")]
+    parts += [Text(), _by_task(found)] if found else []
+    if told:
+        what = f"{how_many(failed)} of these failed, in {groups:,} group{'s' * (groups != 1)}:"
+        parts += [Text(), Text(what, "bold"), Text(), *map(cluster_view, told)]
+        if groups > len(told):
+            parts.append(Text(f"{groups - len(told):,} smaller groups; --groups shows more", "dim"))
+    return Group(*parts)
+
+
+def _by_task(found: Sequence[Found]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     table.add_column("task", overflow="fold")
-    for name in ("found", "passed", "such as"):
-        table.add_column(name, justify="right" if name != "such as" else "left")
-    by_task: dict[str, list[Found]] = {}
+    table.add_column("found", justify="right")
+    table.add_column("passed", justify="right")
+    table.add_column("such as")
+    by_task: defaultdict[str, list[Found]] = defaultdict(list)
     for one in found:
-        by_task.setdefault(one.key[0], []).append(one)
+        by_task[one.key[0]].append(one)
     for task, those in by_task.items():
         passed = sum(one.passed for one in those)
         example = f"{name_of(those[0].key)}, world {those[0].worlds[0][0]}"
         table.add_row(Text(visible(task)), f"{len(those):,}", f"{passed:,}", Text(visible(example), "dim"))
-    return Group(head, Text(), table)
+    return table
 
 
 def cluster_view(cluster: Cluster) -> RenderableType:
-    """A group for a person: how many, why, and what would have helped."""
+    """A group of failures: their number, the reason, and the nearest program that passes."""
     size = how_many(len(cluster.members))
     name = visible(name_of(cluster.representative))
     head = Text.assemble((size, "bold"), f" of {visible(cluster.task)}, ", kind_view(cluster.failure))
@@ -50,29 +62,19 @@ def cluster_view(cluster: Cluster) -> RenderableType:
     lines.append(Text(shortened(f"{check}: {cluster.why}" if check else cluster.why)))
     if cluster.program is None:
         lines.append(Text(GONE, "yellow"))
-    if cluster.fix is not None:
-        changed = f"{cluster.fix.changed} line{'s' * (cluster.fix.changed != 1)}"
-        lines.append(Text(f"{visible(cluster.fix.name)} passes, and differs in {changed}:", "dim"))
-        lines += map(_change, cluster.fix.changes[:MOST_LINES])
-        left = len(cluster.fix.changes) - MOST_LINES
-        lines += [Text(f"... {left} more lines", "dim")] if left > 0 else []
+    if (fix := cluster.fix) is not None:
+        changed = f"{fix.changed} line{'s' * (fix.changed != 1)}"
+        lines.append(Text(f"{visible(fix.name)} passes, and differs in {changed}:", "dim"))
+        for sign, line in fix.changes[:MOST_LINES]:
+            style = {"-": "red", "+": "green"}.get(sign, "dim")
+            lines.append(Text(f"{sign} {shortened(line.expandtabs(4))}", style))
+        if (left := len(fix.changes) - MOST_LINES) > 0:
+            lines.append(Text(f"... {left} more lines", "dim"))
     return Group(head, *(Padding(line, (0, 0, 0, 2)) for line in lines), Text())
 
 
-def _change(change: Change) -> Text:
-    sign, line = change
-    style = {"-": "red", "+": "green"}.get(sign, "dim")
-    return Text(f"{sign} {shortened(line.expandtabs(4))}", style)
-
-
 def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str) -> RenderableType:
-    """The same as a table for people.
-
-    Args:
-        prompts: at least one.
-        limits: numbers of retries.
-        title: which run it is about.
-    """
+    """The results of asking again, by limit of retries."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     heads = ("retries", "pass@1", *(f"pass@1\n≥ {t:g}" for t in THRESHOLDS), "accepted", "run at all")
     for name in heads:
@@ -81,6 +83,7 @@ def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, ti
         shares = (*limit.prompts.values(), limit.accepted, limit.ran)
         table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))
     hopeless = sum(not any(trial.accepted for trial in prompt.trials) for prompt in prompts)
+    of = "prompt" if hopeless == 1 else "prompts"
     return Group(
         Text(visible(title), style="bold"),
         Text("a program that the check rejects is asked for again, so many times at most; that gives:"),
@@ -90,9 +93,5 @@ def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, ti
         Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
         Text("accepted: the share of programs, at the end, that the check accepts", style="dim"),
         Text("run at all: the share that runs without an error in all the worlds of its task", style="dim"),
-        *([Text(f"no completion of {_prompts(hopeless)} is accepted")] if hopeless else []),
+        *([Text(f"no completion of {hopeless} {of} is accepted")] if hopeless else []),
     )
-
-
-def _prompts(count: int) -> str:
-    return f"{count} prompt{'s' * (count != 1)}"

@@ -1,4 +1,4 @@
-"""Tables of a run, of one of its tasks, and how failures are named."""
+"""Views of a run and of one of its tasks."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _missed(missing: Missing) -> Iterator[Text]:
 
 @dataclass(frozen=True)
 class _TaskTable:
-    """The scores of tasks; where there is no room for all columns, names of tasks stay whole."""
+    """The scores of tasks, with fewer columns where names of tasks would be broken otherwise."""
 
     summary: Summary
 
@@ -65,7 +65,6 @@ class _TaskTable:
         yield next(fitting, tables[-1])
 
     def _tables(self) -> Iterator[Table]:
-        """The table with fewer and fewer columns."""
         passes = [f"pass@{k}" for k in self.summary.k]
         yield self._table("completions", *passes, "worst prompt", "best prompt")
         yield self._table("completions", *passes, "worst\nprompt", "best\nprompt")
@@ -82,14 +81,11 @@ class _TaskTable:
         for task in self.summary.tasks:
             shares = {f"pass@{k}": task.pass_at(k).mean for k in self.summary.k}
             shares |= {"worst prompt": task.lowest(first), "best prompt": task.highest(first)}
-            cells = {name: Text(f"{share:.2f}", _mood(share)) for name, share in shares.items()}
+            styles: dict[float, str] = {0: "red", 1: "green"}
+            cells = {name: Text(f"{share:.2f}", styles.get(share, "")) for name, share in shares.items()}
             cells["completions"] = Text(f"{judged_count(task.prompts):,}")
             table.add_row(Text(visible(task.task)), *(cells[name.replace("\n", " ")] for name in columns))
         return table
-
-
-def _mood(share: float) -> str:
-    return "green" if share == 1 else "red" if share == 0 else ""
 
 
 def _overall(summary: Summary) -> list[Text]:
@@ -105,23 +101,15 @@ def _overall(summary: Summary) -> list[Text]:
 
 def _failure_table(failures: Failures) -> Table:
     table = grid("left", "right", "right")
-    for each in [failures, *failures.kinds]:
-        name = _name(failures) if each is failures else f"  {visible(each.name)}"
-        style = "bold" if each is failures else "" if each.count else "dim"
-        table.add_row(Text(name), f"{each.count:,}", f"{each.share:.1%}", style=style)
+    rows = [(plural_of(failures.name), failures, "bold")]
+    rows += [(f"  {kind.name}", kind, "" if kind.count else "dim") for kind in failures.kinds]
+    for name, one, style in rows:
+        table.add_row(Text(visible(name)), f"{one.count:,}", f"{one.share:.1%}", style=style)
     return table
 
 
-def _name(failures: Failures) -> str:
-    return visible(plural_of(failures.name))
-
-
 def task_view(data: Mapping[str, Any]) -> RenderableType:
-    """A task, prompt by prompt.
-
-    Args:
-        data: as `task_data` gives it.
-    """
+    """A task, prompt by prompt; the data is that of `task_data`."""
     task = data["task"]
     models = {model for prompt in data["prompts"] for model in prompt["models"]}
     parts: list[RenderableType] = [Text(visible(task) + by_hand(models), style="bold")]
@@ -138,7 +126,7 @@ def task_view(data: Mapping[str, Any]) -> RenderableType:
 
 
 def prompt_lines(task: str, prompt: Mapping[str, Any]) -> list[Text]:
-    """The head of a prompt: how often it passes, and what the model was told."""
+    """The head of a prompt: its score, and its instruction."""
     score = f"{prompt['passed']:,} of {prompt['completions']:,} passed (pass@1 {prompt['pass@1']:.2f})"
     head = Text.assemble((f"{visible(task)}/{prompt['prompt']}", "bold"), "  ", score)
     if prompt["gone"] == prompt["completions"]:

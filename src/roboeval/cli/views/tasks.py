@@ -1,9 +1,9 @@
-"""A suite's tasks, and one task with its checks and worlds."""
+"""Views of a suite's tasks, and of one task with its checks and worlds."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType
@@ -11,7 +11,6 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.world import World
 from roboeval.suites.load import Check, Scenario, Suite, Task
 from roboeval.suites.task import describe_person
 
@@ -30,26 +29,23 @@ def suite_view(suite: Suite) -> RenderableType:
 
 
 def suite_task_view(task: Task) -> RenderableType:
-    """One task: its phrasings, its checks, and what each world requires."""
+    """One task: its prompts, its checks, and the requirements of each world."""
     parts: list[RenderableType] = [
         Text.assemble((task.name, "bold"), f"  {task.summary}"),
         Text(f"takes {', '.join(task.abilities)}", "dim"),
     ]
-    common = {True: " (common sense: no prompt says it)", False: ""}
+    common = " (common sense: no prompt says it)"
     parts += _section("Prompts", [Text(f"{n}  {prompt}") for n, prompt in enumerate(task.prompts)])
-    parts += _section("Facts", [Text(f"{fact.fact}{common[fact.commonsense]}") for fact in task.facts])
+    parts += _section("Facts", [Text(fact.fact + common * fact.commonsense) for fact in task.facts])
     parts += _section("Checks", [*map(_check_view, task.checks)])
-    if task.phrases:
-        named = [
-            Text.assemble((f"{{{name}}}", "bold"), f"  {', '.join(each)}") for name, each in task.phrases
-        ]
-        parts += _section("Phrases in checks", named)
+    phrases = [Text.assemble((f"{{{name}}}", "bold"), f"  {', '.join(each)}") for name, each in task.phrases]
+    parts += _section("Phrases in checks", phrases) if phrases else []
     for number, scenario in enumerate(task.scenarios, 1):
         parts += _section(f"World {number}: {scenario.world.about}", _world_lines(scenario))
     return Group(*parts)
 
 
-def _section(title: str, lines: Sequence[RenderableType]) -> list[RenderableType]:
+def _section(title: str, lines: Iterable[RenderableType]) -> list[RenderableType]:
     return [Text(), Text(title, "bold"), *(Padding(line, (0, 0, 0, 2)) for line in lines)]
 
 
@@ -59,23 +55,20 @@ def _check_view(check: Check) -> RenderableType:
     return Group(Text.assemble((head, "bold"), f"  {check.category}"), Padding(formula, (0, 0, 0, 2)))
 
 
-def _world_lines(scenario: Scenario) -> list[RenderableType]:
-    lines: list[RenderableType] = [*_room_lines(scenario.world)]
-    if scenario.world.may_wait_forever:
-        lines.append(Text("a program may wait here for ever", "italic"))
-    return [*lines, *(_Formula(f"requires {requirement.text}") for requirement in scenario.require)]
-
-
-def _room_lines(world: World) -> Iterator[Text]:
+def _world_lines(scenario: Scenario) -> Iterator[RenderableType]:
+    world = scenario.world
     for room in world.rooms:
         there = [*room.objects, *map(describe_person, room.people)]
         there += ["the robot"] if room.name == world.robot else []
         yield Text(f"{room.name}: {', '.join(there) or 'nobody and nothing'}")
+    if world.may_wait_forever:
+        yield Text("a program may wait here for ever", "italic")
+    yield from (_Formula(f"requires {requirement.text}") for requirement in scenario.require)
 
 
 @dataclass(frozen=True)
 class _Formula:
-    """A formula that is broken into lines where no text of it is torn."""
+    """A formula that wraps between its words, but never within a quoted text."""
 
     text: str
     style: str = ""
