@@ -5,10 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.main import get_command
 
 from codebotler import __version__
 from codebotler.options import (
@@ -354,6 +356,9 @@ def virtual_robot(
         robot.stop()
 
 
+_command = cache(get_command)
+
+
 def obey(app: typer.Typer, name: str) -> NoReturn:
     """Run a command line and end the process; what a user can cause ends in one sentence.
 
@@ -370,7 +375,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
         del os.environ["COLUMNS"]
     try:
-        status = app(standalone_mode=False, prog_name=name)
+        status = _command(app)(standalone_mode=False, prog_name=name)
         flush_output()
     except KeyboardInterrupt:
         status = STOPPED

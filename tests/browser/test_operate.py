@@ -14,7 +14,7 @@ from playwright.sync_api import Page, Route, expect
 
 from pageserver import PageServer
 from server import Fault, Server
-from viewing import DESK, PHONE, TABLET, OpenPage, until
+from viewing import DESK, PATIENCE, PHONE, TABLET, OpenPage, until
 
 TEA = """def task_program():
     get_all_rooms()
@@ -194,12 +194,15 @@ def test_checks_take_nothing_away_that_is_typed_meanwhile(server: PageServer, op
 
 def agree(server: PageServer, first: Page, second: Page) -> None:
     """Wait until two pages show the program that the tool has."""
-    for _ in range(600):
-        shown = {page.evaluate("programEditor.text()") for page in (first, second)}
-        if shown == {server.call("GET", "/api/missions/current").data["program"]}:
-            return
+
+    def shown() -> set[str]:
+        texts = {page.evaluate("programEditor.text()") for page in (first, second)}
+        return texts | {server.call("GET", "/api/missions/current").data["program"]}
+
+    end = time.monotonic() + PATIENCE
+    while len(shown()) > 1:
+        assert time.monotonic() < end
         first.wait_for_timeout(50)
-    raise AssertionError(shown)
 
 
 def test_two_who_type_at_once_end_with_the_same_text(server: PageServer, opened: OpenPage) -> None:

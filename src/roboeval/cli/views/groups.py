@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.terminal import shortened, visible
-from roboeval.analysis.cluster import Change, Cluster
+from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found
 from roboeval.cli.views.results import kind_view
