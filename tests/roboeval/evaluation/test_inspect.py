@@ -231,7 +231,7 @@ def test_the_viewer_opens_the_log(judged: EvalLog, viewer: str, pytestconfig: py
         page.set_default_timeout(40_000)
         expect.set_options(timeout=40_000)
         page.goto(viewer)
-        expect(page.get_by_text("480 Samples")).to_be_visible()
+        expect(page.get_by_text("320 Samples")).to_be_visible()
         expect(page.get_by_text(sample.input[:40]).first).to_be_visible()
         if shots:
             page.screenshot(path=str(Path(shots) / "inspect-samples.png"))
