@@ -130,7 +130,7 @@ TIMES = [
 
 @pytest.mark.parametrize(("text", "times"), TIMES)
 def test_times_of_day(text: str, times: list[tuple[int, ...]]) -> None:
-    assert times_in(text) == times
+    assert [*times_in(text)] == times
 
 
 def test_a_time_lies_between_two_others_or_not() -> None:

@@ -37,20 +37,13 @@ class Number:
         given = self.given(text)
         return bool(given) and (given != {self.number}) == self.other
 
-    def given(self, text: str) -> set[float]:
+    def given(self, text: str) -> frozenset[float]:
         """All numbers that a text gives of the thing.
 
         In each clause a number belongs to the thing next to it: the one that follows, or, where things come
         first, the one before. A text that does not name the thing gives all numbers that belong to no other.
         """
-        kinds = self.kinds
-        told = [sentence for sentence in sentences(without_harmless(text)) if not sentence.endswith("?")]
-        parts = [[*_marks(clause, kinds)] for sentence in told for clause in clauses(sentence)]
-        named = any(kind == 0 for part in parts for kind, _ in part)
-        if not named:
-            return {n for part in parts if not any(kind for kind, _ in part) for _, ns in part for n in ns}
-        found = {n for part in parts for n in _paired(part)}
-        return found or {n for sentence in told for n in _paired([*_marks(sentence, kinds)])}
+        return _given(self.kinds, text)
 
     @cached_property
     def kinds(self) -> tuple[re.Pattern[str], ...]:
@@ -60,6 +53,17 @@ class Number:
     def __str__(self) -> str:
         head = "othernumber" if self.other else "number"
         return f"{head}({', '.join([str(self.number), *map(quote, (self.thing, *self.others))])})"
+
+
+@lru_cache(maxsize=256)  # several checks ask for other numbers of the same thing
+def _given(kinds: tuple[re.Pattern[str], ...], text: str) -> frozenset[float]:
+    told = [sentence for sentence in sentences(without_harmless(text)) if not sentence.endswith("?")]
+    parts = [[*_marks(clause, kinds)] for sentence in told for clause in clauses(sentence)]
+    if not any(kind == 0 for part in parts for kind, _ in part):
+        no_other = (part for part in parts if not any(kind for kind, _ in part))
+        return frozenset(n for part in no_other for _, numbers in part for n in numbers)
+    found = frozenset(n for part in parts for n in _paired(part))
+    return found or frozenset(n for sentence in told for n in _paired([*_marks(sentence, kinds)]))
 
 
 def _word(pattern: str) -> re.Pattern[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import TypeAlias
 
 from codebotler.rtl.clauses import sentences
@@ -40,7 +41,8 @@ _NEAR = 30  # characters in which such a word stands
 _DAY = 24 * 60
 
 
-def times_in(text: str) -> list[tuple[TimeOfDay, ...]]:
+@lru_cache(maxsize=64)  # what a robot says is mostly looked at by several checks, one after the other
+def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
     """The times of day in a text; of each both readings where it may be in the morning or the afternoon.
 
     `12 pm`, `12:00`, `noon`, `twelve o'clock` and `half past twelve` are times, and so is a text that is no
@@ -51,9 +53,9 @@ def times_in(text: str) -> list[tuple[TimeOfDay, ...]]:
     """
     told = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
     if alone := _ALONE.fullmatch(told):
-        return _readings(alone["hour"], 0, None)
+        return (*_readings(alone["hour"], 0, None),)
     named = [match for match in _CLOCK.finditer(told) if not _is_beside(match)]
-    return [time for match in named for time in _of(match)]
+    return tuple(time for match in named for time in _of(match))
 
 
 def _is_beside(match: re.Match[str]) -> bool:

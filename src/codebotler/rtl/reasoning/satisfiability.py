@@ -13,7 +13,7 @@ from itertools import chain, compress, count
 from operator import getitem
 from typing import TypeAlias
 
-from codebotler.rtl.formula import Element, Formula, Not
+from codebotler.rtl.formula import Formula, Not
 from codebotler.rtl.reasoning.alphabet import alphabet, elements
 from codebotler.rtl.reasoning.automaton import Automaton, Undecided
 from codebotler.rtl.semantics import holds, matches
@@ -40,15 +40,21 @@ class Reasoner:
     ) -> None:
         wanted = [*dict.fromkeys(chain.from_iterable(map(elements, formulas)))]
         rooms = None if moves is None else [*dict.fromkeys([start, *moves.values()])]
-        self.events = alphabet(wanted, rooms)
+        events = alphabet(wanted, rooms)
+        if moves is not None:
+            events = [event for event in events if event.kind != "goto"]
+            events += [Event("goto", move) for move in moves]
+        distinct: dict[tuple[object, ...], tuple[list[bool], Event]] = {}
+        for event in events:  # of tens of thousands, only hundreds differ in what they match
+            row = [matches(element, (event,), 0) for element in wanted]
+            where = () if moves is None else (event.place, event.text if event.kind == "goto" else "")
+            distinct.setdefault((*row, *where), (row, event))
+        rows, self.events = [row for row, _ in distinct.values()], [event for _, event in distinct.values()]
+        self._matched = dict(zip(wanted, zip(*rows, strict=True), strict=True))
         self._readings: dict[Formula, Reading] = {}
         self._driving: Reading | None = None
-        if moves is not None and rooms is not None:
-            self.events = [event for event in self.events if event.kind != "goto"]
-            self.events += [Event("goto", move) for move in moves]
-            if any(element.place is not None for element in wanted):
-                self._driving = _driving(self.events, rooms, moves)
-        self._matched = {element: self._matching(element) for element in wanted}
+        if moves is not None and rooms is not None and any(element.place is not None for element in wanted):
+            self._driving = _driving(self.events, rooms, moves)
 
     def conflict(self, formulas: Sequence[Formula], denied: Formula | None = None) -> list[Formula] | None:
         """Formulas that cannot all hold, or not while another fails; none of them can be left out.
@@ -108,9 +114,6 @@ class Reasoner:
             number = {letter: index for index, letter in enumerate(dict.fromkeys(letters))}
             self._readings[formula] = Automaton.of(formula, [*number]), [number[letter] for letter in letters]
         return self._readings[formula]
-
-    def _matching(self, element: Element) -> list[bool]:
-        return [matches(element, (event,), 0) for event in self.events]
 
 
 def _driving(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
