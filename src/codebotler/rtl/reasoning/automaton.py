@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias, assert_never
 
 from codebotler.cachedproperty import cached_property
@@ -46,7 +47,8 @@ class Automaton:
     accepts: tuple[bool, ...]
 
     @classmethod
-    def of(cls, formula: Formula, letters: Sequence[Letter]) -> Automaton:
+    @lru_cache(maxsize=1_000)  # worlds of a task have most requirements in common
+    def of(cls, formula: Formula, letters: tuple[Letter, ...]) -> Automaton:
         """The automaton of a formula, reading these letters.
 
         Raises:

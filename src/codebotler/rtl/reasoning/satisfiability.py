@@ -107,12 +107,11 @@ class Reasoner:
     def _reading(self, formula: Formula) -> Reading:
         if formula not in self._readings:
             seen = [*dict.fromkeys(elements(formula))]
-            letters = [
-                frozenset(compress(seen, row))
-                for row in zip(*map(self._matched.__getitem__, seen), strict=True)
-            ]
-            number = {letter: index for index, letter in enumerate(dict.fromkeys(letters))}
-            self._readings[formula] = Automaton.of(formula, [*number]), [number[letter] for letter in letters]
+            rows = [*zip(*map(self._matched.__getitem__, seen), strict=True)]
+            different = sorted(set(rows))  # in an order that does not depend on the events
+            letters = tuple(frozenset(compress(seen, row)) for row in different)
+            number = {row: index for index, row in enumerate(different)}
+            self._readings[formula] = Automaton.of(formula, letters), [number[row] for row in rows]
         return self._readings[formula]
 
 
