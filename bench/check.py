@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from codebotler.checker import SAMPLES, Sample, Settings, check_on
+from codebotler.checking.check import SAMPLES, Sample, Settings, check_on
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.imagined import ImaginedRobot, Plan
 from codebotler.simulator.lane import Lane

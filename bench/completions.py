@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import read_completions, recorded_completions
 from roboeval.suites.load import Suite, load_suite

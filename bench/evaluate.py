@@ -20,11 +20,11 @@ from functools import cache, partial
 from itertools import count, groupby, repeat
 from pathlib import Path
 
+from codebotler.core.trace import Status
+from codebotler.core.world import Room, World
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.trace import Status
-from codebotler.world import Room, World
 from in_process import Reused, compiled
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import load_suite

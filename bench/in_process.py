@@ -15,6 +15,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import IO, Any, Protocol, Self, TypeAlias
 
+from codebotler.core.trace import Option, Outcome, RunError, Status
+from codebotler.core.world import World
 from codebotler.simulator.conversation import described
 from codebotler.simulator.play import LESSONS, PLAY, STAGE
 from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
@@ -23,8 +25,6 @@ from codebotler.simulator.sandbox import REFUSED, execution
 from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, BudgetSpentError, Run
 from codebotler.simulator.sandbox.preparing import answer
 from codebotler.simulator.sandbox.ticks import prepared
-from codebotler.trace import Option, Outcome, RunError, Status
-from codebotler.world import World
 
 CPU_SECONDS = 30
 MEMORY = 2 * 1024**3

@@ -18,7 +18,7 @@ from statistics import median
 
 from playwright.sync_api import Page, sync_playwright
 
-from codebotler.missionlog import EVENTS, events_of
+from codebotler.missions.log import EVENTS, events_of
 
 STOPS = int(os.environ.get("STOPS", "20"))
 AIM, AIM_OF_CHECKS = 150.0, 1000.0

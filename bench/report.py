@@ -17,7 +17,7 @@ from pathlib import Path
 
 import polars as pl
 
-from codebotler.files import to_line, to_text
+from codebotler.core.files import to_line, to_text
 from roboeval.evaluation.judge import evaluate, head
 from roboeval.evaluation.runs.completions import Completion, recorded_completions
 from roboeval.evaluation.runs.folder import Run

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from codebotler.files import to_line, to_text
+from codebotler.core.files import to_line, to_text
 from roboeval import evaluate, load_results, load_suite, recorded_completions
 from roboeval.analysis.metrics import overall, task_scores
 from roboeval.analysis.summary import failures

@@ -16,11 +16,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from statistics import median, quantiles
 
+from codebotler.core.skills import SKILLS
+from codebotler.core.world import Room, World
 from codebotler.robots.ros import PYTHON, actions_of
 from codebotler.robots.ros1 import SCRIPT, Ros1
 from codebotler.robots.virtual import VirtualRobot
-from codebotler.skills import SKILLS
-from codebotler.world import Room, World
 
 GOALS = int(os.environ.get("GOALS", "500"))
 ROUNDS = 5

@@ -18,8 +18,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
-from codebotler.mission import Mission
-from codebotler.missionlog import EVENTS, Line, events_of
+from codebotler.core.world import Room, World
+from codebotler.missions.log import EVENTS, Line, events_of
+from codebotler.missions.mission import Mission
 from codebotler.robots import pyrobosim, ros1
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, untold
 from codebotler.robots.pyrobosim import Pyrobosim
@@ -27,7 +28,6 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros1 import Ros1
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.virtual import VirtualRobot
-from codebotler.world import Room, World
 
 STOPS = int(os.environ.get("STOPS", "50"))
 AIM = 100.0

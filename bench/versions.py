@@ -14,10 +14,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+from codebotler.core.trace import Outcome
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.trace import Outcome
-from codebotler.world import Person, Room, World
 
 PYTHONS_OWN = re.compile("0x[0-9a-f]+|(?<=maximum recursion depth exceeded)[a-z ]+", re.IGNORECASE)
 RULES = Rules(limits=Limits(ticks=2_000, calls=60))

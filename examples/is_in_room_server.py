@@ -18,6 +18,7 @@ from typing import Any
 from PIL.Image import Image
 
 from codebotler import BadInput
+from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.models.base import Settings
 from codebotler.perception import (
     Detector,
@@ -33,7 +34,6 @@ from codebotler.robots.ros import actions_of
 from codebotler.robots.ros1 import master_uri
 from codebotler.robots.virtual import SCRIPT
 from codebotler.robots.worker import Worker
-from codebotler.skills import SKILLS, SkillTable
 
 SKILL = "is_in_room"
 HEARS = 3600.0  # seconds of one turn of listening

@@ -1,7 +1,7 @@
 """Judge a program in every world of a task, and say why it fails where it does."""
 
+from codebotler.core.tracefile import trace_from
 from codebotler.rtl import explain
-from codebotler.tracefile import trace_from
 from roboeval import Completion, evaluate, load_suite
 
 PROGRAM = """

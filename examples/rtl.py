@@ -1,7 +1,7 @@
 """RTL alone: a trace by hand, a formula, a verdict, a sentence."""
 
+from codebotler.core.trace import Event, Option
 from codebotler.rtl import explain, holds, parse
-from codebotler.trace import Event, Option
 
 lunch = parse("""tr.AfterFirst(goto("alice's office")).AfterFirst(ask("lunch", ".*")).Exists(say("lobby"))""")
 trace = (

@@ -1,7 +1,7 @@
 """Run a program in a simulated world, in three lines."""
 
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator import run
-from codebotler.world import Person, Room, World
 
 house = World((Room("lobby"), Room("kitchen", objects=("mug",), people=(Person("amy", ("yes",)),))), "lobby")
 outcome = run("def task_program():\n    go_to('kitchen')\n    say(str(is_in_room('mug')))", house)

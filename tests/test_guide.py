@@ -7,12 +7,12 @@ from typing import get_args
 import pytest
 from pydantic import BaseModel
 
-from codebotler.checker import check
+from codebotler.checking.check import check
+from codebotler.core.trace import Status
+from codebotler.core.world import OptionFile, PersonFile, Room, RoomFile, World
 from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
 from codebotler.simulator.sandbox.stdlib import LISTED
-from codebotler.trace import Status
-from codebotler.world import OptionFile, PersonFile, Room, RoomFile, World
 from roboeval.linting.findings import Kind
 from roboeval.suites.schema import (
     Ability,

@@ -48,7 +48,7 @@ def test_an_interpreter_that_imports_such_a_library_is_seen_through() -> None:
 @pytest.mark.parametrize("package", PACKAGES)
 def test_importing_a_package_imports_next_to_nothing(package: str) -> None:
     new = imported_by(f"import {package}") - imported_by("")
-    assert new <= {package, "codebotler", "codebotler.facade", "__future__"}
+    assert new <= {package, "codebotler", "codebotler.core.facade", "__future__"}
 
 
 @pytest.mark.parametrize(
@@ -95,8 +95,8 @@ def test_a_public_name_is_documented_and_is_no_module(package: str, name: str) -
 
 def test_names_stay_what_they_are_whatever_else_is_imported() -> None:
     code = (
-        "import roboeval.evaluation.judge, codebotler.checker, codebotler.generation\n"
-        "import roboeval.cli.app, codebotler.cli\n"
+        "import roboeval.evaluation.judge, codebotler.checking.check, codebotler.generation.generate\n"
+        "import roboeval.cli.app, codebotler.cli.app\n"
     )
     uses = "from roboeval import evaluate\nfrom codebotler import check, generate\n"
     imported_by(code + uses + "assert callable(evaluate) and callable(check) and callable(generate)")

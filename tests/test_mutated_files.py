@@ -8,9 +8,9 @@ from functools import partial
 
 import pytest
 
-from codebotler.badinput import BadInput, YamlFile
-from codebotler.tracefile import OutcomeFile
-from codebotler.world import WorldFile
+from codebotler.core.badinput import BadInput, YamlFile
+from codebotler.core.tracefile import OutcomeFile
+from codebotler.core.world import WorldFile
 from roboeval.suites.load import SUITES, read_task
 from roboeval.suites.schema import SuiteFile
 from roboeval.suites.solutions import SolutionsFile

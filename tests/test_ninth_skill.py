@@ -6,18 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.badinput import BadInput
-from codebotler.checker import check
-from codebotler.program import Problem, Program
+from codebotler.checking.check import check
+from codebotler.core.badinput import BadInput
+from codebotler.core.program import Problem, Program
+from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
+from codebotler.core.trace import Event, Option, Outcome, RunError, Status
+from codebotler.core.tracefile import outcome_yaml, read_outcome
+from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.imagined import IMAGINED
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
-from codebotler.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
-from codebotler.trace import Event, Option, Outcome, RunError, Status
-from codebotler.tracefile import outcome_yaml, read_outcome
-from codebotler.world import Person, Room, World
 from roboeval.suites.load import SUITES, load_suite
 
 TABLE = SKILLS.with_skill(

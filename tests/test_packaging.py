@@ -95,7 +95,7 @@ def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
     ):
         assert known in packed
     (entries,) = (text.decode() for name, text in packed.items() if name.endswith("entry_points.txt"))
-    assert "codebotler = codebotler.cli:main" in entries
+    assert "codebotler = codebotler.cli.app:main" in entries
     assert "roboeval = roboeval.cli.app:main" in entries
 
 

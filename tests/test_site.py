@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import pytest
 import yaml
 
-from codebotler.cli import app as codebotler
+from codebotler.cli.app import app as codebotler
 from roboeval.cli.app import app as roboeval
 
 ROOT = Path(__file__).parent.parent

@@ -17,7 +17,7 @@ from typing import Any
 
 import typer
 
-import codebotler.cli
+import codebotler.cli.app
 import roboeval.cli.app
 
 ROOT = Path(__file__).parent.parent
@@ -27,14 +27,9 @@ WIDTH = 82  # letters in a line of `--help` here
 
 MODULES = {
     "codebotler": (
-        *("codebotler", "codebotler.simulator", "codebotler.program", "codebotler.world", "codebotler.trace"),
-        *(
-            "codebotler.tracefile",
-            "codebotler.skills",
-            "codebotler.rtl",
-            "codebotler.rtl.reasoning",
-            "codebotler.mission",
-        ),
+        *("codebotler", "codebotler.simulator", "codebotler.core.program", "codebotler.core.world"),
+        *("codebotler.core.trace", "codebotler.core.tracefile", "codebotler.core.skills", "codebotler.rtl"),
+        *("codebotler.rtl.reasoning", "codebotler.missions.mission"),
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
         *("codebotler.robots.ros", "codebotler.robots.ros1", "codebotler.robots.virtual"),
         *("codebotler.robots.worker", "codebotler.models.base", "codebotler.models.open"),
@@ -61,7 +56,7 @@ def main() -> None:
         path.write_text(_within(path.read_text()))
     (PAGES / "changes.md").write_text((ROOT / "CHANGELOG.md").read_text())
     (PAGES / "examples.md").write_text(_examples())
-    for name, app in (("codebotler", codebotler.cli.app), ("roboeval", roboeval.cli.app.app)):
+    for name, app in (("codebotler", codebotler.cli.app.app), ("roboeval", roboeval.cli.app.app)):
         (PAGES / f"{name}.md").write_text(_commands(name, app))
         (PAGES / f"python-{name}.md").write_text(_python(name))
     command = [sys.executable, "-m", "zensical", "build", "--strict", "--clean"]

@@ -20,29 +20,29 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from codebotler.badinput import BadInput
-    from codebotler.checker import Check, Problem, check
-    from codebotler.generation import Generation
+    from codebotler.checking.check import Check, Problem, check
+    from codebotler.core.badinput import BadInput
+    from codebotler.generation.generate import Generation
+    from codebotler.generation.onecall import generate
     from codebotler.models.base import ModelError
-    from codebotler.onecall import generate
     from codebotler.prompts import prompt_for
-    from codebotler.reply import program_of
+    from codebotler.prompts.extract import program_of
     from codebotler.simulator.lane import EngineError
 else:  # each name is imported when it is first used
-    from codebotler.facade import facade
+    from codebotler.core.facade import facade
 
     __getattr__, __dir__ = facade(
         __name__,
         {
-            "BadInput": "badinput",
-            "Check": "checker",
+            "BadInput": "core.badinput",
+            "Check": "checking.check",
             "EngineError": "simulator.lane",
-            "Generation": "generation",
+            "Generation": "generation.generate",
             "ModelError": "models.base",
-            "Problem": "checker",
-            "check": "checker",
-            "generate": "onecall",
-            "program_of": "reply",
+            "Problem": "checking.check",
+            "check": "checking.check",
+            "generate": "generation.onecall",
+            "program_of": "prompts.extract",
             "prompt_for": "prompts",
         },
     )

@@ -1,6 +1,6 @@
 """`python -m codebotler` is the command `codebotler`."""
 
-from codebotler.cli import main
+from codebotler.cli.app import main
 
 if __name__ == "__main__":
     main()

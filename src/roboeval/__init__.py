@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from roboeval.evaluation.runs.rows import Row
     from roboeval.suites.load import Suite, load_suite
 else:  # each name is imported when it is first used
-    from codebotler.facade import facade
+    from codebotler.core.facade import facade
 
     __getattr__, __dir__ = facade(
         __name__,

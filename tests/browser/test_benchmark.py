@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
 from command_line import forked
 from evil import EVIL, NAMES, OWN_TAGS
 from pageserver import PageServer

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from codebotler.archive import missions
+from codebotler.missions.store import missions
 from pageserver import PageServer
 from viewing import PHONE, OpenPage
 

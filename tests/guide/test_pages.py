@@ -20,8 +20,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from codebotler.mission import State
-from codebotler.missionview import WORDS
+from codebotler.missions.mission import State
+from codebotler.missions.view import WORDS
 from server import Server
 
 ROOT = Path(__file__).parents[2]

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 
 import pytest
 
-from codebotler.cli import main as codebotler_main
+from codebotler.cli.app import main as codebotler_main
 from forked import Forked
 from roboeval.cli.app import main as roboeval_main
 

@@ -13,10 +13,10 @@ from typing import TypeVar
 
 import pytest
 
+from codebotler.core.trace import Outcome
 from codebotler.simulator.conversation import Robot
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.zygote import Zygote
-from codebotler.trace import Outcome
 
 Started = TypeVar("Started")
 IDLE: list[SharedLane] = []
@@ -95,7 +95,7 @@ def lasting(start: Callable[[], Started]) -> Started:
 def shared() -> Iterator[None]:
     """Let whoever starts a lane be given one of these."""
     with pytest.MonkeyPatch.context() as patch:
-        for user in ("codebotler.simulator.engine", "codebotler.mission"):
+        for user in ("codebotler.simulator.engine", "codebotler.missions.mission"):
             patch.setattr(f"{user}.Lane", lane)
         yield
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 ERRORS = {
-    "BadInput": "codebotler.badinput",
+    "BadInput": "codebotler.core.badinput",
     "EngineError": "codebotler.simulator.lane",
-    "MissionError": "codebotler.mission",
+    "MissionError": "codebotler.missions.mission",
     "ModelError": "codebotler.models.base",
     "NotReadyError": "codebotler.robots.base",
     "RefusedError": "codebotler.web.guard",
@@ -24,7 +24,7 @@ ERRORS = {
 """Those whose text a user reads, and where they are defined."""
 SOURCES = Path(import_module("codebotler").__path__[0]).parent
 Said = dict[str, str]
-"""Sentences, by the place that raises them, such as `codebotler/world.py:12`."""
+"""Sentences, by the place that raises them, such as `codebotler/core/world.py:12`."""
 
 
 def collect(said: Said) -> None:

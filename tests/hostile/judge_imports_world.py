@@ -6,8 +6,8 @@ import inspect
 
 def task_program():
     for name in (
-        "codebotler.world",
-        "codebotler.trace",
+        "codebotler.core.world",
+        "codebotler.core.trace",
         "codebotler.simulator.robot",
         "codebotler.simulator.engine",
         "roboeval.evaluation.judge",

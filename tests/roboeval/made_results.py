@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import FailedRows, Results

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from codebotler.files import to_text
+from codebotler.core.files import to_text
 from roboeval.evaluation.runs.folder import Run
 
 

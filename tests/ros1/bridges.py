@@ -14,9 +14,9 @@ from typing import Any
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import ServerConnection, serve
 
+from codebotler.core.skills import SKILLS
 from codebotler.robots.ros import PYTHON, actions_of
 from codebotler.robots.ros1 import SCRIPT
-from codebotler.skills import SKILLS
 
 ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
 

@@ -14,9 +14,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from codebotler.core.skills import SKILLS, Skill
 from codebotler.robots.ros import PYTHON, Waits
 from codebotler.robots.ros1 import SCRIPT, Ros1
-from codebotler.skills import SKILLS, Skill
 
 HERE = Path(__file__).parent
 MASTER = HERE / "ros_master.py"

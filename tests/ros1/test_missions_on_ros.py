@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.skills import SKILLS
 from codebotler.robots.ros1 import SCRIPT
-from codebotler.skills import SKILLS
 from ros_graph import GO_TO, Graph
 
 FETCH = 'def task_program():\n    go_to("the hall")\n    if is_in_room("mug"):\n        pick("mug")\n'

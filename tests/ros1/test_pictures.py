@@ -20,13 +20,13 @@ import pytest
 from mcap.reader import make_reader
 from PIL import Image
 
-from codebotler.missionlog import events_of
+from codebotler.core.skills import SKILLS
+from codebotler.missions.log import events_of
 from codebotler.perception import image_of
 from codebotler.robots.base import CancelledError, Picture
 from codebotler.robots.ros import PYTHON, Waits
 from codebotler.robots.ros1 import SCRIPT
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS
 from ros_graph import LONG, Graph, Process, free_port, started
 from server import Fault, Request, Server
 

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS, Parameter, RosAction, Skill
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import PYTHON, Ros, RosRobot, Waits
 from codebotler.robots.ros1 import SCRIPT, Ros1
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS, Parameter, RosAction, Skill
 from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
 
 

@@ -20,12 +20,12 @@ import pytest
 from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
+from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import Waits
 from codebotler.robots.rosbridge import Rosbridge
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS
 from processes import are_gone, children_of
 from ros_graph import GO_TO, SAY, Graph, free_port, started
 

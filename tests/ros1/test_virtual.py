@@ -14,7 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.live import LiveRobot
+from codebotler.core.trace import Status
+from codebotler.core.world import Person, Room, World
+from codebotler.missions.live import LiveRobot
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros1 import Ros1
@@ -23,8 +25,6 @@ from codebotler.robots.virtual import VirtualRobot
 from codebotler.simulator.engine import run
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
-from codebotler.trace import Status
-from codebotler.world import Person, Room, World
 from roboeval.suites.load import Suite
 from ros_graph import Graph, free_port, started
 

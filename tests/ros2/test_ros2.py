@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import Waits
 from codebotler.robots.ros2 import NOTE, SCRIPT, Ros2, readiness
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS
 
 STUB = Path(__file__).parent / "stub"
 WAITS = Waits(patience=1.0, silence=0.5, longest=20.0)

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import (
     ActAtFirst,
     ActAtSome,
@@ -27,7 +28,6 @@ from codebotler.rtl import (
     Without,
     Words,
 )
-from codebotler.trace import Event, Option, Trace
 
 NAMES = st.sampled_from(["a", "b", "ab", "a b", "No"])
 PATTERNS = st.sampled_from([".*", "a", "b", "ab", "a|b", "^b", r"\bb\b", "no", "[", ""]).map(

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from codebotler.core.trace import Event, Option
 from codebotler.rtl import Claim, Element, Number, RtlSyntaxError, Time, explain, holds, parse
 from codebotler.rtl.clock import times_in
-from codebotler.trace import Event, Option
 
 SAVORY = [
     ("2 people chose savory snacks", {2}),

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import And, CannotJudge, Formula, Not, Or, explain, holds, parse
-from codebotler.trace import Event, Option, Trace
 
 VERBS = {
     "going": "goto",

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
+from codebotler.core.trace import Event, Trace
 from codebotler.rtl import And, Formula, Not, Regex, Without, Words, holds, parse
 from codebotler.rtl.formula import CutName
 from codebotler.rtl.reasoning import (
@@ -23,7 +24,6 @@ from codebotler.rtl.reasoning import (
 from codebotler.rtl.reasoning.automaton import Automaton
 from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
-from codebotler.trace import Event, Trace
 
 SPEAKS, GOES, STAYS = map(
     parse, ('tr.Exists(say("hello"))', 'tr.Exists(goto("kitchen"))', 'not tr.Exists(goto("kitchen"))')

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import (
     ActAtFirst,
     ActAtSome,
@@ -35,7 +36,6 @@ from codebotler.rtl import (
     parse,
 )
 from codebotler.rtl.semantics import cut
-from codebotler.trace import Event, Option, Trace
 
 Placed = list[tuple[int, Event]]
 """A copied part of a trace, each event with its position in the whole."""

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.trace import Event, Option, Trace
 from codebotler.rtl import explain, parse
-from codebotler.skills import SKILLS, Parameter, Recording, Skill
-from codebotler.trace import Event, Option, Trace
 
 WAVE = Skill("wave", (Parameter("person"),), "None", "Wave at a person.", Recording("wave", "person"))
 WITH_WAVE = SKILLS.with_skill(WAVE)

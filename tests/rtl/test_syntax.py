@@ -8,6 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.trace import Event
 from codebotler.rtl import (
     ActAtFirst,
     And,
@@ -27,8 +29,6 @@ from codebotler.rtl import (
     parse,
 )
 from codebotler.rtl.syntax import DEEPEST
-from codebotler.skills import SKILLS, Parameter, Recording, Skill
-from codebotler.trace import Event
 
 LOBBY = Exists(Element("goto", Regex("lobby")))
 ASK = Element("ask", Regex("lunch"), Regex(".*"))

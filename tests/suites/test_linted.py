@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from codebotler.core.trace import Event, Option
 from codebotler.rtl import holds
-from codebotler.trace import Event, Option
 from roboeval.linting.findings import Finding, render
 from roboeval.linting.lint import lint
 from roboeval.linting.trials import tried

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import yaml
 
+from codebotler.core.world import World
 from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
-from codebotler.world import World
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judge
 from roboeval.linting.lint import lint

@@ -10,10 +10,10 @@ from functools import partial
 from typing import Protocol, TypeAlias
 from urllib.parse import urlsplit
 
-from codebotler.arguments import expect_number, expect_whole
-from codebotler.badinput import BadInput
+from codebotler.core.arguments import expect_number, expect_whole
+from codebotler.core.badinput import BadInput
 from codebotler.prompts import Prompt
-from codebotler.reply import program_of
+from codebotler.prompts.extract import program_of
 
 Heard: TypeAlias = Callable[[str], None]
 

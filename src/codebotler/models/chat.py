@@ -29,7 +29,7 @@ from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
 from codebotler.models.bounded import bound, limit_of
 from codebotler.models.faults import (

@@ -9,7 +9,7 @@ import time
 import openai
 from openai.types import Completion
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
 from codebotler.models.bounded import bound, limit_of
 from codebotler.models.faults import broken_off, fault, late, refused, retry_after, told_before, unreachable

@@ -14,7 +14,7 @@ import jinja2
 import torch
 import transformers
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
 from codebotler.models.faults import brief, fault
 from codebotler.models.redaction import guard_logs

@@ -7,8 +7,8 @@ from typing import Protocol, TypeAlias
 
 from PIL.Image import Image
 
-from codebotler.badinput import BadInput
-from codebotler.terminal import visible
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import visible
 
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom as shares of a picture's width and height, from its upper left corner."""

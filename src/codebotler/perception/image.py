@@ -10,10 +10,10 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.unwarned import unwarned
 from codebotler.models.faults import brief
 from codebotler.perception.base import Sighting
-from codebotler.unwarned import unwarned
 
 FORMATS = ("JPEG", "PNG", "WEBP")
 MAX_BYTES = 50_000_000

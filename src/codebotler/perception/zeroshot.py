@@ -10,7 +10,7 @@ import torch
 import transformers
 from PIL.Image import Image
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
 from codebotler.models.faults import brief
 from codebotler.models.redaction import guard_logs
 from codebotler.perception.base import PerceptionError, Sighting, named

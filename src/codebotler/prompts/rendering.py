@@ -13,10 +13,10 @@ from pathlib import Path
 from string import Template
 from typing import Literal, TypeAlias
 
-from codebotler.arguments import expect_skills, expect_text, expect_texts
-from codebotler.program import TASK
-from codebotler.skills import SKILLS, Skill, SkillTable
-from codebotler.syntaxtree import parse
+from codebotler.core.arguments import expect_skills, expect_text, expect_texts
+from codebotler.core.program import TASK
+from codebotler.core.skills import SKILLS, Skill, SkillTable
+from codebotler.core.syntaxtree import parse
 
 Role: TypeAlias = Literal["system", "user", "assistant"]
 

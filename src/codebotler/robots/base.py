@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, TypeAlias
 
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.world import World
 from codebotler.robots.clock import Clock
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.world import World
 
 Argument: TypeAlias = str | tuple[str, ...]
 """What a skill is given: a text, or the options of a question."""

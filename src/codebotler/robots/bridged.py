@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeAlias
 
+from codebotler.core.skills import RosAction
 from codebotler.robots.base import Argument
-from codebotler.skills import RosAction
 
 Message: TypeAlias = dict[str, Any]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, untold
 from codebotler.robots.clock import Clock
 from codebotler.robots.face import Face
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS, SkillTable
 
 SAY, ASK = "say", "ask"
 SPOKEN = frozenset({SAY, ASK})

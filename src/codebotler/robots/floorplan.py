@@ -13,8 +13,8 @@ from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
 from shapely.geometry.polygon import orient
 from shapely.ops import nearest_points
 
+from codebotler.core.world import HALLWAY, ROOM_DEPTH, World, laid_out
 from codebotler.robots.base import NotReadyError
-from codebotler.world import HALLWAY, ROOM_DEPTH, World, laid_out
 
 XY: TypeAlias = tuple[float, float]
 

@@ -12,7 +12,9 @@ from importlib import metadata
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.world import World
 from codebotler.robots.base import (
     Argument,
     CancelledError,
@@ -26,8 +28,6 @@ from codebotler.robots.base import (
 from codebotler.robots.clock import Clock
 from codebotler.robots.scripted import AS_WRITTEN, SECONDS, performed
 from codebotler.simulator.robot import SimulatedRobot, Thing, resolve_room
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.world import World
 
 if TYPE_CHECKING:
     from codebotler.robots.pyrobosim_world import Stage

@@ -20,12 +20,12 @@ from pyrobosim.utils.pose import Pose, wrap_angle
 from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
 from shapely.geometry import LineString
 
+from codebotler.core.world import World
 from codebotler.robots.base import CancelledError, Feedback, untold
 from codebotler.robots.clock import Clock
 from codebotler.robots.floorplan import RADIUS, Floorplan, Table, planned
 from codebotler.robots.scripted import METRES_PER_SECOND, SECONDS, TELLS_EVERY
 from codebotler.simulator.robot import RobotError
-from codebotler.world import World
 
 RADIANS_PER_SECOND = math.pi / 2
 MOVES_EVERY = 0.05

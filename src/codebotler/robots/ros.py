@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from codebotler.core.skills import SKILLS, Skill, SkillTable
 from codebotler.robots.base import (
     Argument,
     CancelledError,
@@ -22,7 +23,6 @@ from codebotler.robots.base import (
 from codebotler.robots.clock import Clock
 from codebotler.robots.worker import ENDED, Message, Worker
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS, Skill, SkillTable
 
 PYTHON = Path("/usr/bin/python3")
 OTHER_PYTHON = f"codebotler robots --ros-python {PYTHON}"

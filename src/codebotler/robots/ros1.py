@@ -6,12 +6,12 @@ import os
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.robots.address import endpoint
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
-from codebotler.skills import SKILLS, SkillTable
 
 SCRIPT = Path(__file__).with_name("ros1_worker.py")
 MASTER = "http://localhost:11311"

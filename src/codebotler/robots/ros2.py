@@ -9,11 +9,11 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
-from codebotler.skills import SKILLS, SkillTable
 
 SCRIPT = Path(__file__).with_name("ros2_worker.py")
 NEEDS = ("rclpy", "action_msgs", "robot_actions_pkg")

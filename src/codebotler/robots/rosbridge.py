@@ -16,6 +16,8 @@ from types import MappingProxyType
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
+from codebotler.core.skills import SKILLS, RosAction, Skill, SkillTable
+from codebotler.core.terminal import visible
 from codebotler.robots.address import endpoint
 from codebotler.robots.base import (
     Argument,
@@ -34,8 +36,6 @@ from codebotler.robots.clock import Clock
 from codebotler.robots.ros import Waits, error_of
 from codebotler.robots.worker import Worker
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS, RosAction, Skill, SkillTable
-from codebotler.terminal import visible
 
 ADDRESS = "ws://localhost:9090"
 GUARD = Path(__file__).with_name("bridge_guard.py")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from codebotler.core.trace import Option
 from codebotler.robots.base import Argument, Result
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import ENDLESS, Rules
-from codebotler.trace import Option
 
 AS_WRITTEN = Rules(literals="as-written", limits=ENDLESS)
 METRES_PER_SECOND = 0.5

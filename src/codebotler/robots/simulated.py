@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.world import World, laid_out
 from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Readiness, Result, untold
 from codebotler.robots.clock import Clock
 from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY, performed
 from codebotler.simulator.robot import SimulatedRobot, resolve_room
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.world import World, laid_out
 
 
 class Simulated:

@@ -9,14 +9,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.world import World
 from codebotler.robots.base import Argument, CancelledError, RobotLostError, untold
 from codebotler.robots.ros import PYTHON, actions_of
 from codebotler.robots.ros1 import master_uri
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.worker import Message, Worker
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.world import World
 
 SCRIPT = Path(__file__).with_name("ros1_servers.py")
 NODE = "virtual_robot"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, assert_never
 
-from codebotler.english import listed, times
+from codebotler.core.english import listed, times
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, AtLeast, Count, Exists, Stay
 from codebotler.rtl.phrases import is_any, missing, room, room_name
 from codebotler.rtl.semantics import CannotJudge, at_place, first, first_stay, matches
@@ -15,9 +15,9 @@ from codebotler.rtl.wording import did, happened, lacking, pastimes
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from codebotler.core.trace import Trace
     from codebotler.rtl.formula import Element, Formula, Test
     from codebotler.rtl.wording import Deed
-    from codebotler.trace import Trace
 
 _MOST = 5
 _MOST_COMPARED = 50_000

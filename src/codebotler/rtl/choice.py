@@ -8,7 +8,7 @@ from importlib import import_module
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from codebotler.unwarned import unwarned
+from codebotler.core.unwarned import unwarned
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
-from codebotler.cachedproperty import cached_property
+from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.clauses import clauses, sentences
 from codebotler.rtl.clock import TimeOfDay, times_in
 from codebotler.rtl.numerals import numerals

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
-from codebotler.english import listed, times
+from codebotler.core.english import listed, times
 from codebotler.rtl.absence import Absence, Reason, seen, steps_of
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or
 from codebotler.rtl.phrases import is_any, shortened
@@ -17,8 +17,8 @@ from codebotler.rtl.wording import did, happened, offered
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from codebotler.core.trace import Trace
     from codebotler.rtl.formula import Formula, Test
-    from codebotler.trace import Trace
 
 _ROBOT = "the robot "
 

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from codebotler.cachedproperty import cached_property
+from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from codebotler.unwarned import unwarned
+from codebotler.core.unwarned import unwarned
 
 
 def compile_regex(pattern: str) -> re.Pattern[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from codebotler.english import listed
+from codebotler.core.english import listed
 from codebotler.rtl.choice import PLAIN, choices
 from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.formula import Regex, Text, Without, Words

@@ -14,8 +14,8 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from codebotler.core.trace import Event, Option, Trace
     from codebotler.rtl.formula import Cut, Cuts, Element, Formula, Stay, Test
-    from codebotler.trace import Event, Option, Trace
 
 Span: TypeAlias = tuple[int, int]
 """The events from the first position on and before the second."""

@@ -8,6 +8,8 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, get_args
 
+from codebotler.core.skills import SKILLS
+from codebotler.core.syntaxtree import parse_expression
 from codebotler.rtl.claims import Claim, Number, Time, minutes
 from codebotler.rtl.formula import (
     ActAtFirst,
@@ -27,14 +29,12 @@ from codebotler.rtl.formula import (
     Without,
     Words,
 )
-from codebotler.skills import SKILLS
-from codebotler.syntaxtree import parse_expression
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from codebotler.core.skills import SkillTable
     from codebotler.rtl.formula import Cuts, Text
-    from codebotler.skills import SkillTable
 
 CUTS: dict[str, CutName] = {name: name for name in get_args(CutName)}
 TESTS = {"Exists": 1, "ActAtFirst": 2, "ActAtSome": 2, "Count": 2, "AtLeast": 2}

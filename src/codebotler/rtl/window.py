@@ -8,8 +8,8 @@ from codebotler.rtl.semantics import CannotJudge, cut_at, find
 from codebotler.rtl.wording import did, happened
 
 if TYPE_CHECKING:
+    from codebotler.core.trace import Trace
     from codebotler.rtl.formula import Cut, Cuts
-    from codebotler.trace import Trace
 
 
 class Window:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from codebotler.english import listed
+from codebotler.core.english import listed
 from codebotler.rtl.formula import Element, Regex, Text, Without
 from codebotler.rtl.phrases import either, is_any, lacks, literals, quoted, room, room_name, with_texts
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from codebotler.trace import Event
+    from codebotler.core.trace import Event
 
 Form: TypeAlias = Literal["base", "past", "ing"]
 Deed: TypeAlias = tuple[Element, ...]

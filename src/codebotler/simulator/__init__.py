@@ -4,8 +4,8 @@ from __future__ import annotations
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from codebotler.trace import Outcome
-    from codebotler.world import World
+    from codebotler.core.trace import Outcome
+    from codebotler.core.world import World
 
 
 def run(program: str, world: World, *, require_isolation: bool = False) -> Outcome:

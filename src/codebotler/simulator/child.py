@@ -14,7 +14,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from codebotler.cachedproperty import cached_property
+from codebotler.core.cachedproperty import cached_property
+from codebotler.core.trace import RunError, Status
 from codebotler.simulator.sandbox import (
     CPU_SECONDS,
     HEADER,
@@ -23,7 +24,6 @@ from codebotler.simulator.sandbox import (
     PIECE,
     WITHOUT_REFERENCES,
 )
-from codebotler.trace import RunError, Status
 
 PROCESSOR_TIME = "seconds of processor time"
 """How the sentence ends that tells of a program which computed for too long."""

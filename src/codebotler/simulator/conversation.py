@@ -8,12 +8,12 @@ from json.encoder import encode_basestring_ascii as quoted
 from math import inf
 from typing import Protocol, TypeAlias
 
+from codebotler.core.skills import Skill, SkillTable
+from codebotler.core.trace import Option, Outcome, RunError, Status, Trace
 from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import ACTS, CPU_SECONDS, LIVE_CPU_SECONDS, LOOKS, TELLS
-from codebotler.skills import Skill, SkillTable
-from codebotler.trace import Option, Outcome, RunError, Status, Trace
 
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 LAST_LINE = 1_000_000

@@ -12,14 +12,14 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, ParamSpec, Self, TypeVar, overload
 
-from codebotler.arguments import expect_whole
+from codebotler.core.arguments import expect_whole
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.trace import Outcome
+from codebotler.core.world import World
 from codebotler.simulator.distinct import Distinct
 from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.trace import Outcome
-from codebotler.world import World
 
 __all__ = ["EngineError", "Lanes", "digest", "run"]
 

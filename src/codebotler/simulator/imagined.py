@@ -8,6 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.trace import Option
+from codebotler.core.world import Room, World
 from codebotler.simulator import robot as real
 from codebotler.simulator.lots import Answer, Draw, Lot, Presence
 from codebotler.simulator.robot import (
@@ -19,9 +22,6 @@ from codebotler.simulator.robot import (
     is_found_by_itself,
 )
 from codebotler.simulator.rules import Rules
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.trace import Option
-from codebotler.world import Room, World
 
 AS_WRITTEN = Rules(literals="as-written")
 """The rules for a program that a robot is to run: nothing in it is changed."""

@@ -7,12 +7,12 @@ import os
 import zlib
 from collections.abc import Callable
 
+from codebotler.core.trace import Outcome
 from codebotler.simulator.child import LostChildError
 from codebotler.simulator.conversation import Conversation, ImportsMoreError, Robot
 from codebotler.simulator.preparer import Prepared, Preparer
 from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, LIVE_ZYGOTE, ZYGOTE
 from codebotler.simulator.zygote import Zygote
-from codebotler.trace import Outcome
 
 EVENTS = logging.getLogger("codebotler.engine.events")
 """What happens to each run: started, how it ended and why; at level DEBUG, so that it is off by default."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import marshal
 
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.sandbox import WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.ticks import prepared
-from codebotler.world import Person, Room, World
 
 STAGE = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
 

@@ -8,10 +8,10 @@ import socket
 from collections import OrderedDict
 from dataclasses import dataclass
 
+from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
 from codebotler.simulator.isolated import start
 from codebotler.simulator.sandbox import IMPORTING, MAX_CODE, PREPARER, REFUSED
-from codebotler.trace import Outcome, RunError, Status
 
 MAX_SOURCE = 5_000_000
 LONG = 100_000  # characters of a program that is prepared in a process of its own

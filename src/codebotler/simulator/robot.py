@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from typing import TypeAlias
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.trace import Event, Option, Trace
+from codebotler.core.world import Answer, Person, World
 from codebotler.simulator.rules import PAPER, Matching, Rules
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.trace import Event, Option, Trace
-from codebotler.world import Answer, Person, World
 
 
 class RobotError(Exception):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from nicegui import ui
 
+from codebotler.core.terminal import shortened
 from codebotler.robots.face import AnswerError, Face, Question
-from codebotler.terminal import shortened
 from codebotler.web.words import Press, Words, warn
 
 MOST_OPTIONS, MOST_TEXT = 50, 200

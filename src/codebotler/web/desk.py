@@ -8,13 +8,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
 
-from codebotler.archive import recover
-from codebotler.checker import check
-from codebotler.home import make_folder
-from codebotler.mission import GRACE, MissionError
-from codebotler.missionlog import Line, Summary
+from codebotler.checking.check import check
+from codebotler.checking.problems import Check
+from codebotler.core.home import make_folder
+from codebotler.core.world import World
+from codebotler.missions.log import Line, Summary
+from codebotler.missions.mission import GRACE, MissionError
+from codebotler.missions.store import recover
 from codebotler.models.base import Model
-from codebotler.problems import Check
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
 from codebotler.simulator.engine import Lanes
@@ -22,7 +23,6 @@ from codebotler.simulator.imagined import Plan
 from codebotler.web.board import Board
 from codebotler.web.turn import Means, Turn
 from codebotler.web.view import Order, View
-from codebotler.world import World
 
 MOST_PROGRAM = 200_000
 """Characters of a program or an instruction; longer ones are mistakes."""

@@ -13,9 +13,9 @@ from fastapi import APIRouter, HTTPException, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.mission import UNCONFIRMED
+from codebotler.core.terminal import visible_lines
+from codebotler.missions.mission import UNCONFIRMED
 from codebotler.robots.face import AnswerError, Ended, Face, Question
-from codebotler.terminal import visible_lines
 from codebotler.web.desk import Desk
 
 PAGE = Path(__file__).with_name("static") / "face.html"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
-from codebotler.terminal import shortened
-from codebotler.world import Point, World, laid_out
+from codebotler.core.terminal import shortened
+from codebotler.core.world import Point, World, laid_out
 
 MARGIN = 0.6
 MOST_ROOMS = 100

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from fastapi import FastAPI
 
-from codebotler.terminal import note
+from codebotler.core.terminal import note
 from codebotler.web.frame import Frame
 
 GROUP = "codebotler.pages"

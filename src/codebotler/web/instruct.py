@@ -6,16 +6,16 @@ import asyncio
 
 from nicegui import html, ui
 
-from codebotler.archive import missions
-from codebotler.badinput import BadInput
-from codebotler.drives import named_rooms
-from codebotler.mission import MissionError
-from codebotler.missionlog import Summary
+from codebotler.checking.room_names import named_rooms
+from codebotler.core.badinput import BadInput
+from codebotler.core.program import called_skills
+from codebotler.core.terminal import shortened, visible, visible_lines
+from codebotler.missions.log import Summary
+from codebotler.missions.mission import MissionError
+from codebotler.missions.preflight import unknown_rooms
+from codebotler.missions.store import missions
 from codebotler.models.recorded import recorded_model
-from codebotler.program import called_skills
-from codebotler.running import unknown_rooms
 from codebotler.simulator.imagined import Plan
-from codebotler.terminal import shortened, visible, visible_lines
 from codebotler.web.desk import Desk
 from codebotler.web.view import Order, View
 from codebotler.web.words import Press, Words, scroll_up, warn

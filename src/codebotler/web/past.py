@@ -8,12 +8,12 @@ from datetime import datetime
 
 from nicegui import html, ui
 
-from codebotler.archive import find, missions, summary_of
-from codebotler.badinput import BadInput
-from codebotler.mission import State
-from codebotler.missionlog import Line, Summary, events_of
-from codebotler.missionview import told
-from codebotler.terminal import shortened, visible
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import shortened, visible
+from codebotler.missions.log import Line, Summary, events_of
+from codebotler.missions.mission import State
+from codebotler.missions.store import find, missions, summary_of
+from codebotler.missions.view import told
 from codebotler.web.desk import Desk
 from codebotler.web.frame import Frame
 from codebotler.web.words import Words

@@ -12,10 +12,10 @@ from typing import Any
 from nicegui import ui
 from nicegui.events import GenericEventArguments
 
-from codebotler.mission import MissionError, State
-from codebotler.problems import Check
-from codebotler.skills import SKILLS
-from codebotler.terminal import shortened, visible
+from codebotler.checking.problems import Check
+from codebotler.core.skills import SKILLS
+from codebotler.core.terminal import shortened, visible
+from codebotler.missions.mission import MissionError, State
 from codebotler.web.desk import MOST_PROGRAM, Desk
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import Strip, strips

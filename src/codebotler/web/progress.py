@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-from codebotler.missionlog import Line
-from codebotler.missionview import told
-from codebotler.program import parsed
-from codebotler.skills import SKILLS
-from codebotler.terminal import shortened
-from codebotler.world import Point
+from codebotler.core.program import parsed
+from codebotler.core.skills import SKILLS
+from codebotler.core.terminal import shortened
+from codebotler.core.world import Point
+from codebotler.missions.log import Line
+from codebotler.missions.view import told
 
 AT = re.compile(r"at \((-?\d+(?:\.\d+)?), (-?\d+(?:\.\d+)?)\)")
 MOST = 200

@@ -24,8 +24,8 @@ from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp
 
 from codebotler import __version__
-from codebotler.english import listed
-from codebotler.terminal import note
+from codebotler.core.english import listed
+from codebotler.core.terminal import note
 from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
 from codebotler.web.desk import Desk

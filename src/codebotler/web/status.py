@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from codebotler.mission import State
+from codebotler.core.world import Room, World, laid_out
+from codebotler.missions.mission import State
 from codebotler.web.asking import Asking
 from codebotler.web.desk import Desk
 from codebotler.web.floorplan import floorplan
 from codebotler.web.progress import Moment
 from codebotler.web.view import View
 from codebotler.web.words import Press, Words
-from codebotler.world import Room, World, laid_out
 
 HEADLINES = {
     None: "Nothing is asked for",

@@ -6,9 +6,9 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from codebotler.problems import Check, Sample
-from codebotler.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, steps_of
-from codebotler.terminal import shortened
+from codebotler.checking.problems import Check, Sample
+from codebotler.checking.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, steps_of
+from codebotler.core.terminal import shortened
 from codebotler.web.supposing import supposed
 
 MOST_TEXT, MOST_WORLD = 300, 800

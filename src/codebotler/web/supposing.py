@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from codebotler.english import listed
+from codebotler.core.english import listed
 from codebotler.simulator.imagined import SOMEBODY, Fact, Reply, Whereabouts, brief
 
 PLAIN = re.compile(r"[\w' -]+")

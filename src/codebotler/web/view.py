@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field
 
-from codebotler.mission import State
-from codebotler.problems import Check
+from codebotler.checking.problems import Check
+from codebotler.missions.mission import State
 from codebotler.simulator.imagined import Plan
 from codebotler.web.progress import Progress
 

@@ -11,7 +11,7 @@ from typing import Any
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from codebotler.terminal import visible_lines
+from codebotler.core.terminal import visible_lines
 
 
 class Words(TextElement):

@@ -10,7 +10,7 @@ from difflib import SequenceMatcher
 from functools import cache
 from typing import Any, TypeAlias
 
-from codebotler.program import TASK, names_bound, parsed
+from codebotler.core.program import TASK, names_bound, parsed
 from roboeval.evaluation.explanation import reason
 from roboeval.evaluation.runs.completions import Key, name_of
 from roboeval.evaluation.runs.results import Results

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from math import fsum
 from typing import Any
 
-from codebotler.badinput import BadInput
-from codebotler.english import counted
-from codebotler.terminal import visible
+from codebotler.core.badinput import BadInput
+from codebotler.core.english import counted
+from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import Estimate
 from roboeval.analysis.statistics import (
     DIFFERENCE,

@@ -9,9 +9,9 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
+from codebotler.core.trace import Trace
+from codebotler.core.tracefile import trace_from
 from codebotler.rtl import CannotJudge, Formula, holds, parse
-from codebotler.trace import Trace
-from codebotler.tracefile import trace_from
 from roboeval.evaluation.runs.completions import Key
 from roboeval.evaluation.runs.rows import key_of
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.badinput import BadInput
-from codebotler.terminal import visible
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, completions_of, overall, task_scores
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import how_many

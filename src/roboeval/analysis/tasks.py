@@ -9,8 +9,8 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.badinput import BadInput
-from codebotler.terminal import visible
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import completions_of
 from roboeval.evaluation.explanation import reason
 from roboeval.evaluation.runs.completions import Completion, Key

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.cli import STOPPED
+from codebotler.cli.app import STOPPED
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -53,7 +53,7 @@ def evaluate(
     json: JsonOption = False,
 ) -> None:
     """Say of every completion whether it does what is asked."""
-    from codebotler.files import to_line
+    from codebotler.core.files import to_line
     from roboeval.analysis.summary import summary
     from roboeval.evaluation.evaluate import evaluate_run
     from roboeval.evaluation.judge import evaluate as judge_all

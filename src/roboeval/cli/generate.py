@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.cli import STOPPED
-from codebotler.english import counted
-from codebotler.options import (
+from codebotler.cli.app import STOPPED
+from codebotler.cli.options import (
     BaseUrlOption,
     MaxTokensOption,
     ModelOption,
@@ -20,6 +19,7 @@ from codebotler.options import (
     TimeoutOption,
     TopPOption,
 )
+from codebotler.core.english import counted
 from roboeval.cli.evaluate import evaluate
 from roboeval.cli.options import (
     BudgetOption,

@@ -8,7 +8,7 @@ from datetime import timedelta
 from time import monotonic
 from typing import NoReturn, TypeVar
 
-from codebotler.terminal import QUIET_S, note, print_json, print_rich, print_text, progress
+from codebotler.core.terminal import QUIET_S, note, print_json, print_rich, print_text, progress
 
 __all__ = ["fail", "metered", "note", "print_json", "print_rich", "print_text", "watched"]
 

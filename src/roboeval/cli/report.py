@@ -44,7 +44,7 @@ def report(
 
     gc.disable()  # a fifth of the time would go into looking for cycles among all that a report holds,
     atexit.register(gc.freeze)  # for the last time when Python ends
-    from codebotler.terminal import busy
+    from codebotler.core.terminal import busy
     from roboeval.evaluation.engines import Local
     from roboeval.report.cost import expect_known, read_prices
     from roboeval.report.runs import named_apart

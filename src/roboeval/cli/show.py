@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.options import HostOption, NameOption, NoTokenOption, PortOption, TokenOption
+from codebotler.cli.options import HostOption, NameOption, NoTokenOption, PortOption, TokenOption
 from roboeval.cli.options import (
     AblationOption,
     JsonOption,
@@ -110,7 +110,7 @@ def export(
     ablation: AblationOption = False,
 ) -> None:
     """Write a run's verdicts as one flat table."""
-    from codebotler.replacing import expect_replaceable
+    from codebotler.core.replacing import expect_replaceable
     from roboeval.evaluation.runs.table import BEGINNINGS, kind_of, write_table
 
     kind = format or kind_of(out)
@@ -137,7 +137,7 @@ def serve(
 
     They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
     """
-    from codebotler.badinput import BadInput
+    from codebotler.core.badinput import BadInput
     from codebotler.web.place import entrance
     from codebotler.web.serving import serve as serve_page
     from roboeval.web.pages import pages

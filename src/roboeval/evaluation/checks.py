@@ -8,9 +8,9 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from codebotler import __version__
-from codebotler.badinput import BadInput
-from codebotler.checker import Check, Settings, check_on
-from codebotler.files import Appender, read_rows, to_line, to_text, write_whole
+from codebotler.checking.check import Check, Settings, check_on
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import Appender, read_rows, to_line, to_text, write_whole
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.lane import Lane
 from roboeval.evaluation.engines import PYTHON, OpenEngine, Work

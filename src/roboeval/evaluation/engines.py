@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from typing import Protocol, Self, TypeAlias, TypeVar
 
-from codebotler.arguments import expect_whole
+from codebotler.core.arguments import expect_whole
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.lane import Lane
 

@@ -9,8 +9,8 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from codebotler.badinput import BadInput
-from codebotler.files import Appender, to_line, to_text, write_whole
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import Appender, to_line, to_text, write_whole
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import evaluation, head, judgements
 from roboeval.evaluation.runs.completions import Completion, Key, name_of

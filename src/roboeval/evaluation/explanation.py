@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from functools import cache, partial
 from typing import Any
 
-from codebotler.english import counted
+from codebotler.checking.storyboard import steps_of
+from codebotler.core.english import counted
+from codebotler.core.trace import Event, Trace
+from codebotler.core.tracefile import trace_from
 from codebotler.rtl import explain
 from codebotler.simulator.robot import located, resolve_room
-from codebotler.storyboard import steps_of
-from codebotler.trace import Event, Trace
-from codebotler.tracefile import trace_from
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite
 

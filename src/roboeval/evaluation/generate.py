@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field
 
-from codebotler.files import MAX_ROW, Appender, to_line, to_text, write_whole
+from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_whole
 from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Settings, unheard
 from codebotler.models.paced import Paced
 from codebotler.prompts import Prompt, prompt_for

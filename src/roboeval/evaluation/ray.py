@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
 from codebotler.simulator.distinct import MOST_AHEAD, Done
 from codebotler.simulator.engine import NO_SECCOMP, digest
 from codebotler.simulator.lane import EngineError, Lane

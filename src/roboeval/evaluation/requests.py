@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
-from codebotler.badinput import BadInput
-from codebotler.files import Appender, read_rows, to_line, write_whole
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.models.base import Settings
 from codebotler.prompts import template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions

@@ -6,13 +6,13 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
+from codebotler.core.syntaxtree import parse_expression
+from codebotler.core.world import Room
 from codebotler.rtl import Element, Regex
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import patterns
 from codebotler.simulator.robot import found_in
-from codebotler.syntaxtree import parse_expression
-from codebotler.world import Room
 from roboeval.suites.load import Requirement, Scenario, Task
 
 ANYBODY = ("person", "people", "human", "anybody", "anyone", "somebody", "someone")

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import NamedTuple
 
-from codebotler.badinput import YamlFile
+from codebotler.core.badinput import YamlFile
+from codebotler.core.world import World
 from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.robot import whole_words
-from codebotler.world import World
 from roboeval.evaluation.failures import failure
 from roboeval.linting.backtracking import slow_text
 from roboeval.linting.findings import Finding

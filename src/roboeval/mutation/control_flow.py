@@ -6,7 +6,7 @@ import ast
 from collections.abc import Iterator
 from itertools import pairwise
 
-from codebotler.program import TASK
+from codebotler.core.program import TASK
 from roboeval.mutation.operator import Context, Edits
 from roboeval.mutation.program_tree import ProgramTree, expression, is_pause, rewritten, skill_of, skills_in
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, zip_longest
 
-from codebotler.cachedproperty import cached_property
+from codebotler.core.cachedproperty import cached_property
 from roboeval.mutation import control_flow, counting, manipulation, navigation, speech
 from roboeval.mutation.operator import Context, Operator, operators_in
 from roboeval.mutation.program_tree import ProgramTree, changed, read

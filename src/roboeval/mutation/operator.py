@@ -10,7 +10,7 @@ from inspect import isfunction
 from types import ModuleType
 from typing import TypeAlias
 
-from codebotler.world import World
+from codebotler.core.world import World
 from roboeval.mutation.program_tree import Edit, ProgramTree, text_of
 
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
-from codebotler.cachedproperty import cached_property
-from codebotler.program import Problem, parsed
-from codebotler.skills import SKILLS
+from codebotler.core.cachedproperty import cached_property
+from codebotler.core.program import Problem, parsed
+from codebotler.core.skills import SKILLS
 
 Node = TypeVar("Node", bound=ast.AST)
 Edit: TypeAlias = Mapping[Any, ast.AST | list[ast.stmt]]  # replacements of nodes; a list for a statement

@@ -12,8 +12,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.files import to_line, to_text, write_whole
-from codebotler.terminal import visible
+from codebotler.core.files import to_line, to_text, write_whole
+from codebotler.core.terminal import visible
 from roboeval.mutation.mutants import OPERATORS, Mutant
 from roboeval.mutation.score import CHANGED, MutantStatus, MutationScore
 

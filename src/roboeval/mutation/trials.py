@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.trace import Outcome, Status
+from codebotler.core.world import World
 from codebotler.simulator.engine import Lanes, digest
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.trace import Outcome, Status
-from codebotler.world import World
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judge
 from roboeval.mutation.mutants import Mutant, Original, drawn, mutants, originals

@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D, Bbox
 from PIL import Image
 
-from codebotler.terminal import visible
+from codebotler.core.terminal import visible
 
 WIDE, NARROW = 7.16, 3.5  # inches: both columns of a paper, and one
 DPI, POINTS = 300, 72  # of an inch

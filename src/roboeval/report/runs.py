@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import polars as pl
 
-from codebotler.cachedproperty import cached_property
-from codebotler.terminal import visible
+from codebotler.core.cachedproperty import cached_property
+from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import TaskScore, completions_of, task_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results

@@ -11,11 +11,11 @@ from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 
-from codebotler.arguments import expect_whole
-from codebotler.badinput import BadInput, YamlFile
-from codebotler.english import counted
+from codebotler.core.arguments import expect_whole
+from codebotler.core.badinput import BadInput, YamlFile
+from codebotler.core.english import counted
+from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.simulator.rules import Rules
-from codebotler.skills import SKILLS, SkillTable
 from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MOST_WORLDS, Accepted, Fact, SuiteFile
 from roboeval.suites.task import Check, Requirement, Scenario, Task

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from codebotler.badinput import BadInput
-from codebotler.files import write_whole
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import write_whole
 from roboeval.suites.load import ABLATED, shipped_suites
 
 _TEMPLATE = Path(__file__).parent / "template"

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from codebotler.core.world import AnswerFile, Name, PersonFile, Text, WorldFile
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.world import AnswerFile, Name, PersonFile, Text, WorldFile
 
 MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw
 

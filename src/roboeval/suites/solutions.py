@@ -7,9 +7,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from codebotler.badinput import YamlFile
+from codebotler.core.badinput import YamlFile
+from codebotler.core.world import Name, Text
 from codebotler.models.recorded import NAMES, Recording, Solution
-from codebotler.world import Name, Text
 from roboeval.suites.load import Task
 
 LENDER = Path(__file__).with_name("paper")  # the suite whose instructions others take

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.english import counted
+from codebotler.core.english import counted
+from codebotler.core.world import Answer, Person, World
 from codebotler.rtl import Formula
-from codebotler.world import Answer, Person, World
 from roboeval.suites.schema import Ability, Accepted, Category, Fact
 
 

@@ -8,11 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.badinput import BadInput, Place, YamlFile
+from codebotler.core.badinput import BadInput, Place, YamlFile
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.syntaxtree import parse_expression
+from codebotler.core.world import expect_regex
 from codebotler.rtl import RtlSyntaxError, parse
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.syntaxtree import parse_expression
-from codebotler.world import expect_regex
 from roboeval.suites.schema import DrawnTaskFile, ScenarioFile, TaskFile
 from roboeval.suites.task import Check, Requirement, Scenario, Task
 from roboeval.suites.worlds import WorldSampler

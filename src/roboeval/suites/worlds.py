@@ -12,9 +12,9 @@ from random import Random
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
-from codebotler.badinput import YamlFile
-from codebotler.cachedproperty import cached_property
-from codebotler.world import OptionFile, Person, Room, World
+from codebotler.core.badinput import YamlFile
+from codebotler.core.cachedproperty import cached_property
+from codebotler.core.world import OptionFile, Person, Room, World
 from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
 from roboeval.suites.pairwise import Row, spread
 from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile

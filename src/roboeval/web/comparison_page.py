@@ -8,8 +8,8 @@ from typing import Any
 
 from nicegui import html, ui
 
-from codebotler.badinput import BadInput
-from codebotler.terminal import shortened
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import shortened
 from codebotler.web.words import Words
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore

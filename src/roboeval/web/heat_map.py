@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 from urllib.parse import quote
 
-from codebotler.terminal import shortened
+from codebotler.core.terminal import shortened
 from roboeval.analysis.summary import Failures
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.failures import label_of

@@ -11,8 +11,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from codebotler.badinput import BadInput
-from codebotler.terminal import note, shortened
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import note, shortened
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
 from roboeval.suites.installed import installed_suites

@@ -9,9 +9,9 @@ from typing import Any, TypeAlias
 
 from nicegui import html, ui
 
-from codebotler.badinput import BadInput
-from codebotler.pasted import runnable
-from codebotler.terminal import shortened
+from codebotler.core.badinput import BadInput
+from codebotler.core.pasted import runnable
+from codebotler.core.terminal import shortened
 from codebotler.web.words import Press, Words
 from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList

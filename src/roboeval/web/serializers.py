@@ -10,8 +10,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from codebotler.badinput import BadInput
-from codebotler.terminal import shortened
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import shortened
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import GONE, completion_data
 from roboeval.evaluation.runs.completions import Key, how_many, name_of

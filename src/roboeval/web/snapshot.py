@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 import polars as pl
 from fastapi import Query
 
-from codebotler.cachedproperty import cached_property
+from codebotler.core.cachedproperty import cached_property
 from roboeval.analysis.metrics import Estimate, TaskScore, overall, task_scores
 from roboeval.analysis.summary import Failures, failures
 from roboeval.evaluation.runs.completions import Key

@@ -11,9 +11,9 @@ from typing import Any
 from nicegui import html, ui
 from nicegui.element import Element
 
-from codebotler.badinput import BadInput
-from codebotler.skills import SKILLS
-from codebotler.terminal import shortened
+from codebotler.core.badinput import BadInput
+from codebotler.core.skills import SKILLS
+from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame
 from codebotler.web.words import Words
 from roboeval.web.heat_map import NONE

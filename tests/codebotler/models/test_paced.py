@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import pytest
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
 from codebotler.models.base import BudgetSpentError, Heard, ModelError, Reply, Settings, Usage, unheard
 from codebotler.models.open import open_model
 from codebotler.models.paced import Paced

@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.trace import Status
+from codebotler.core.world import Room, World
 from codebotler.models import base
 from codebotler.models.base import Settings
 from codebotler.models.open import expect_server, open_model
 from codebotler.models.recorded import NAMES, _words, recorded_model
 from codebotler.prompts import prompt_for
 from codebotler.simulator.engine import run
-from codebotler.trace import Status
-from codebotler.world import Room, World
 
 
 def write(path: Path, text: str) -> Path:

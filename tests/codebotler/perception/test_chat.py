@@ -12,7 +12,7 @@ from functools import partial
 import pytest
 from PIL import Image
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
 from codebotler.models import paced
 from codebotler.perception import Detector, PerceptionError, Sighting, image_of, jpeg_of, open_detector
 from codebotler.perception.chat import LONGEST_REPLY, SYSTEM, TRIES, sighting_in

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from codebotler import missionpictures
+from codebotler.missions import pictures as missionpictures
 from codebotler.perception import Sighting, read_image
 from codebotler.perception.base import LONGEST_LABEL
 from codebotler.perception.image import ENCODINGS, LONGEST_SIDE, MAX_BYTES, MAX_PIXELS, MIN_SIDE

@@ -5,14 +5,14 @@ from difflib import SequenceMatcher
 import pytest
 
 from codebotler import prompts
-from codebotler.program import Program
+from codebotler.core.program import Program
+from codebotler.core.skills import SKILLS, Parameter, Skill
+from codebotler.core.trace import Event, Option, Status
+from codebotler.core.world import Person, Room, World
 from codebotler.prompts import Message, Prompt, prompt_for, rendering, template_hash
+from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import Example, examples, task_end
-from codebotler.reply import program_of
 from codebotler.simulator import run
-from codebotler.skills import SKILLS, Parameter, Skill
-from codebotler.trace import Event, Option, Status
-from codebotler.world import Person, Room, World
 from roboeval.suites.load import Suite
 
 WAVE = Skill("wave", (Parameter("person"),), "None", "Wave at a person in the room.")

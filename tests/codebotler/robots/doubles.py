@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
+from codebotler.core.skills import SKILLS
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, untold
 from codebotler.robots.clock import Clock
-from codebotler.skills import SKILLS
 
 
 class Answering:

@@ -11,18 +11,18 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.mission import Mission, State
-from codebotler.missionlog import events_of
+from codebotler.core.skills import SKILLS
+from codebotler.core.world import Room, World
+from codebotler.missions.log import events_of
+from codebotler.missions.mission import Mission, State
+from codebotler.missions.preflight import beyond
 from codebotler.robots.base import Argument, CancelledError, Options
 from codebotler.robots.face import SILENCE, AnswerError, Ending, Face, Question
 from codebotler.robots.faced import SPOKEN, Faced, unspoken
 from codebotler.robots.open import KINDS, open_faced
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.running import beyond
 from codebotler.simulator.robot import RobotError
-from codebotler.skills import SKILLS
-from codebotler.world import Room, World
 from doubles import Answering
 
 TEA = """def task_program():

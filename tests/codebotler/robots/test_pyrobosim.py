@@ -17,18 +17,18 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.live import LiveRobot
+from codebotler.core.world import Person, Point, Room, World
+from codebotler.missions.live import LiveRobot
+from codebotler.missions.preflight import preflight
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, Picture
 from codebotler.robots.open import all_readiness
 from codebotler.robots.pyrobosim import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY
-from codebotler.running import preflight
 from codebotler.simulator.engine import run
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
-from codebotler.world import Person, Point, Room, World
 from roboeval.suites.load import Suite
 
 REASON = "pyrobosim is not installed; `make test-pyrobosim` has it"
@@ -314,7 +314,7 @@ sys.addaudithook(lambda event, _: event.startswith(watched) and seen.append(even
 import numpy
 before = numpy.random.get_state()[1].tolist()
 from codebotler.robots.pyrobosim import Pyrobosim
-from codebotler.world import World
+from codebotler.core.world import World
 from pathlib import Path
 robot = Pyrobosim(World.read(Path(sys.argv[1])), speed=None)
 robot.connect()

@@ -8,11 +8,11 @@ from importlib import metadata
 
 import pytest
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.world import Room, World
 from codebotler.robots.base import NotReadyError, Options, Robot
 from codebotler.robots.open import all_readiness, open_robot
 from codebotler.robots.pyrobosim import Pyrobosim, readiness
-from codebotler.world import Room, World
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
 MEND = 'pip install "codebotler[pyrobosim]"'

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.world import Person, Room, World
 from codebotler.robots import ros1
 from codebotler.robots.base import CancelledError, Options, Picture, Robot
 from codebotler.robots.open import all_readiness, open_robot
@@ -18,7 +19,6 @@ from codebotler.robots.ros2 import mend_of
 from codebotler.robots.scripted import METRES_PER_SECOND
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.robot import RobotError
-from codebotler.world import Person, Room, World
 
 WORLD = World(
     (

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.world import Room, World
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, SimulatedRobot
 from codebotler.simulator.sandbox.walls import NOBODY
-from codebotler.world import Room, World
 from processes import children_of, lives
 
 WORLD = World((Room("start_loc"),), "start_loc")

@@ -16,6 +16,9 @@ from tempfile import TemporaryFile
 
 import pytest
 
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.trace import Outcome, RunError, Status
+from codebotler.core.world import Room, World
 from codebotler.simulator import isolated
 from codebotler.simulator.child import Child
 from codebotler.simulator.conversation import OVERRUN, Answer, Conversation
@@ -25,9 +28,6 @@ from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.zygote import Zygote
-from codebotler.skills import SKILLS, SkillTable
-from codebotler.trace import Outcome, RunError, Status
-from codebotler.world import Room, World
 from processes import are_gone, children_of, zygotes
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
@@ -340,7 +340,7 @@ def script_with_the_engine() -> tuple[subprocess.Popen[str], set[int]]:
     code = (
         "from itertools import count\n"
         "from codebotler.simulator.engine import run\n"
-        "from codebotler.world import Room, World\n"
+        "from codebotler.core.world import Room, World\n"
         "world = World((Room('a'),), 'a')\n"
         "long = 'def task_program():\\n    for i in range(190_000): str({})\\n'\n"
         "for n, outcome in enumerate(run(((long.format(n), world) for n in count()), workers=2)):\n"
@@ -689,7 +689,7 @@ def test_a_preparer_that_is_killed_from_outside_is_no_verdict() -> None:
 
 FROM_A_SHELL = """
 from codebotler.simulator import run
-from codebotler.world import Room, World
+from codebotler.core.world import Room, World
 program = '''
 import signal
 def f(n): return f(n + 1)

@@ -14,12 +14,12 @@ import pytest
 from hypothesis import HealthCheck, example, given, note, settings
 from hypothesis import strategies as st
 
-from codebotler.program import Problem, Program
+from codebotler.core.program import Problem, Program
+from codebotler.core.trace import Outcome, Status
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import Lanes, run
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.trace import Outcome, Status
-from codebotler.world import Person, Room, World
 from in_process import OrdinaryProcess, without_addresses
 from random_programs import broken_programs, programs
 

@@ -29,15 +29,15 @@ from typing import IO
 
 import pytest
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
+from codebotler.core.trace import Event, Outcome, Status
+from codebotler.core.tracefile import outcome_data
+from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
 from codebotler.simulator.child import PROCESSOR_TIME
 from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
-from codebotler.trace import Event, Outcome, Status
-from codebotler.tracefile import outcome_data
-from codebotler.world import Person, Room, World
 from roboeval.evaluation.judge import judge
 from roboeval.suites.load import Requirement, Scenario
 

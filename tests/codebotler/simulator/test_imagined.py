@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
+from codebotler.core.trace import Option
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.imagined import Fact, ImaginedRobot, Plan, Whereabouts, meant
 from codebotler.simulator.lots import Lot
 from codebotler.simulator.robot import Argument, Result, RobotError
-from codebotler.trace import Option
-from codebotler.world import Person, Room, World
 
 PLAN = Plan(("start_loc", "kitchen", "lab"), "start_loc")
 YES_NO = (Option("Yes"), Option("No"))

@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from codebotler.core.skills import SKILLS
+from codebotler.core.trace import Event, Option
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.robot import Result, RobotError, SimulatedRobot, Thing, _pattern, choose, located
 from codebotler.simulator.rules import Rules
-from codebotler.skills import SKILLS
-from codebotler.trace import Event, Option
-from codebotler.world import Person, Room, World
 
 Texts: TypeAlias = tuple[str, ...]
 

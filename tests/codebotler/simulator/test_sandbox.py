@@ -5,10 +5,10 @@ from typing import TypeAlias
 
 import pytest
 
+from codebotler.core.trace import Event, Option, Outcome, RunError, Status
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.rules import Rules
-from codebotler.trace import Event, Option, Outcome, RunError, Status
-from codebotler.world import Person, Room, World
 
 Outcomes: TypeAlias = dict[str, Outcome]
 

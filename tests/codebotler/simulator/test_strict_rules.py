@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.badinput import BadInput
+from codebotler.core.badinput import BadInput
+from codebotler.core.trace import Option, Status
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError, SimulatedRobot, choose, resolve_room
 from codebotler.simulator.rules import PAPER, Rules
-from codebotler.trace import Option, Status
-from codebotler.world import Person, Room, World
 
 STRICT = Rules(
     literals="as-written",

@@ -10,17 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.archive import missions, summary_of
-from codebotler.mission import Mission, MissionError, State
+from codebotler.checking.problems import Check
+from codebotler.core.world import Room, World
+from codebotler.missions.mission import Mission, MissionError, State
+from codebotler.missions.store import missions, summary_of
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
-from codebotler.problems import Check
 from codebotler.prompts import Prompt
 from codebotler.robots.base import Result, Robot
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.imagined import Plan
 from codebotler.web.desk import MOST_PROGRAM, Desk
 from codebotler.web.view import Order, View, digest
-from codebotler.world import Room, World
 from doubles import Answering
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from codebotler.checker import check
+from codebotler.checking.check import check
+from codebotler.core.world import Room, World
 from codebotler.simulator.imagined import Fact, Reply, Whereabouts
 from codebotler.web.floorplan import MOST_ROOMS, floorplan
 from codebotler.web.progress import MOST, Moment, Progress, line_of
 from codebotler.web.strip import MOST_STRIPS, Deed, strips
 from codebotler.web.supposing import supposed
-from codebotler.world import Room, World
 
 PROGRAM = """def task_program():
     for room in get_all_rooms():

@@ -15,9 +15,10 @@ import pytest
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from codebotler.archive import missions
-from codebotler.mission import UNCONFIRMED, State
-from codebotler.missionlog import events_of
+from codebotler.core.world import Room, World
+from codebotler.missions.log import events_of
+from codebotler.missions.mission import UNCONFIRMED, State
+from codebotler.missions.store import missions
 from codebotler.robots.face import Face, Question
 from codebotler.robots.simulated import Simulated
 from codebotler.web.access import SHORTEST_TOKEN
@@ -25,7 +26,6 @@ from codebotler.web.desk import Desk
 from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
 from codebotler.web.guard import MOST_BYTES
 from codebotler.web.view import View
-from codebotler.world import Room, World
 from command_line import ENVIRONMENT
 from forked import Forked
 from pageserver import PageServer

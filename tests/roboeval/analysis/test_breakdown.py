@@ -7,7 +7,7 @@ from typing import Any
 import polars as pl
 import pytest
 
-from codebotler.world import Room, World
+from codebotler.core.world import Room, World
 from made_results import VERDICT, results_of
 from made_up_runs import SUITE, made_up
 from roboeval.analysis.breakdown import by_ability, coming_back, never_returned, phrasing, spread

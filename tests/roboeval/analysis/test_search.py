@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
 from command_line import refused, roboeval
 from roboeval.analysis import search as searching
 from roboeval.analysis.search import Found, Question, Search

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from codebotler.badinput import BadInput
-from codebotler.terminal import visible
+from codebotler.core.badinput import BadInput
+from codebotler.core.terminal import visible
 from made_results import results_of, table_of
 from roboeval.analysis.summary import summary
 from roboeval.analysis.tasks import Selection, parse_selection, task_data

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 from rich.console import Console, RenderableType
 
+from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
+from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Explanation, Formula, explain, parse
 from codebotler.simulator.rules import Rules
-from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
-from codebotler.world import Person, Room, World
 from made_results import results_of
 from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion

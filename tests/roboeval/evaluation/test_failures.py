@@ -1,7 +1,7 @@
 import pytest
 
+from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.rtl import parse
-from codebotler.trace import Outcome, RunError, Status
 from roboeval.evaluation.failures import CLASSES, Verdict, failure
 from roboeval.evaluation.runs.rows import Failure
 from roboeval.suites.load import Requirement

@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from codebotler.badinput import BadInput
-from codebotler.files import Appender, read_rows, to_line
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import Appender, read_rows, to_line
 from codebotler.models.base import ModelError, Settings
 from roboeval.evaluation.generate import Pace, Progress, generate_run
 from roboeval.evaluation.requests import GenerationPlan, RequestLog

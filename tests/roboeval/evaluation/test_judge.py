@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from codebotler.badinput import BadInput
-from codebotler.trace import Event, Option, Outcome, RunError, Status, Trace
-from codebotler.world import Room, World
+from codebotler.core.badinput import BadInput
+from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
+from codebotler.core.world import Room, World
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.judge import evaluate, judge
 from roboeval.evaluation.runs.completions import Completion

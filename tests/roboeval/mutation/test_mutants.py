@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from codebotler.world import Room, World
+from codebotler.core.world import Room, World
 from roboeval.mutation.mutants import OPERATORS, Mutant, Original, drawn, mutants, originals
 from roboeval.mutation.operator import Context
 from roboeval.suites.load import Suite

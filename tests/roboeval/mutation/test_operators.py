@@ -13,10 +13,10 @@ from typing import TypedDict
 import pytest
 import yaml
 
+from codebotler.core.trace import Event, Outcome, Status
+from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.trace import Event, Outcome, Status
-from codebotler.world import Person, Room, World
 from roboeval.mutation.mutants import OPERATORS
 from roboeval.mutation.operator import Context, Operator
 from roboeval.mutation.program_tree import changed, read

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
 from made_up_runs import HOSTILE, UNCHECKED, made_up, unfinished, usual
 from roboeval.analysis.resample import accepted_after
 from roboeval.evaluation.evaluate import evaluate_run

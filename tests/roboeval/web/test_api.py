@@ -16,7 +16,7 @@ from urllib.parse import quote
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
 from codebotler.web.access import Access
 from codebotler.web.guard import Guard, Rules
 from command_line import refused, roboeval
@@ -319,7 +319,7 @@ def test_a_folder_that_is_not_there_is_refused(tmp_path: Path) -> None:
 
 def test_help_needs_none_of_the_pages() -> None:
     """Start-up counts, so that NiceGUI is imported by what serves a page alone."""
-    code = "import sys, roboeval.cli.app, codebotler.cli; print('nicegui' in sys.modules)"
+    code = "import sys, roboeval.cli.app, codebotler.cli.app; print('nicegui' in sys.modules)"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout == "False\n"
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
 from roboeval.evaluation.runs.folder import Run
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import State, state_of

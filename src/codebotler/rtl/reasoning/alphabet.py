@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
+from codebotler.core.trace import Event, Option
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, Element, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
-from codebotler.trace import Event, Option
 
 
 def elements(formula: Formula) -> Iterator[Element]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias, assert_never
 
-from codebotler.cachedproperty import cached_property
+from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.formula import (
     ActAtFirst,
     ActAtSome,

@@ -5,9 +5,9 @@ A question raises `Undecided` if its answer would take too long to find.
 
 from __future__ import annotations
 
+from codebotler.core.trace import Trace
 from codebotler.rtl.formula import Formula, Not
 from codebotler.rtl.reasoning.satisfiability import Reasoner
-from codebotler.trace import Trace
 
 
 def is_satisfiable(*formulas: Formula) -> bool:

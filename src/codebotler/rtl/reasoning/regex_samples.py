@@ -10,8 +10,8 @@ from itertools import chain, zip_longest
 from random import Random
 from typing import Any
 
+from codebotler.core.unwarned import unwarned
 from codebotler.rtl.formula import Regex
-from codebotler.unwarned import unwarned
 
 Tree = Any
 """A regex as Python parses it, or a part: pairs of an operation and its arguments, of private classes."""

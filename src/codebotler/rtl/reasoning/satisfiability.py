@@ -13,11 +13,11 @@ from itertools import chain, compress, count
 from operator import getitem
 from typing import TypeAlias
 
+from codebotler.core.trace import Event, Trace
 from codebotler.rtl.formula import Formula, Not
 from codebotler.rtl.reasoning.alphabet import alphabet, elements
 from codebotler.rtl.reasoning.automaton import Automaton, Undecided
 from codebotler.rtl.semantics import holds, matches
-from codebotler.trace import Event, Trace
 
 MOST_VISITED = 20_000
 """States of a product that are visited before a search gives up."""

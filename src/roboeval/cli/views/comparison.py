@@ -9,8 +9,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.storyboard import grid
-from codebotler.terminal import visible
+from codebotler.checking.storyboard import grid
+from codebotler.core.terminal import visible
 from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.compare import Comparison, prompts, to_tell, verdict
 from roboeval.analysis.statistics import FEW

@@ -10,8 +10,8 @@ from rich.padding import Padding
 from rich.syntax import Syntax
 from rich.text import Text
 
-from codebotler.storyboard import grid, storyboard
-from codebotler.terminal import shortened, visible
+from codebotler.checking.storyboard import grid, storyboard
+from codebotler.core.terminal import shortened, visible
 from roboeval.analysis.tasks import by_hand
 from roboeval.cli.views.results import kind_view, prompt_lines
 from roboeval.evaluation.explanation import GONE, NOT_RECORDED, cut_told

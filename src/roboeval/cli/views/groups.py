@@ -11,7 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.terminal import shortened, visible
+from codebotler.core.terminal import shortened, visible
 from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found

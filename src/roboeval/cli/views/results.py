@@ -12,8 +12,8 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from codebotler.storyboard import grid
-from codebotler.terminal import visible
+from codebotler.checking.storyboard import grid
+from codebotler.core.terminal import visible
 from roboeval.analysis.summary import Failures, Missing, Summary, judged_count
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED

@@ -11,10 +11,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, SupportsIndex, TypeAlias
 
-from codebotler.arguments import expect_text, expect_whole
-from codebotler.badinput import BadInput
-from codebotler.english import counted
-from codebotler.files import MAX_ROW, parsed_row, read_lines, to_line
+from codebotler.core.arguments import expect_text, expect_whole
+from codebotler.core.badinput import BadInput
+from codebotler.core.english import counted
+from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.models.recorded import recorded_model
 from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from codebotler import __version__
-from codebotler.badinput import BadInput, read_text
-from codebotler.files import sync_folder, to_line, to_text, write_whole, written_whole
+from codebotler.core.badinput import BadInput, read_text
+from codebotler.core.files import sync_folder, to_line, to_text, write_whole, written_whole
 from roboeval.evaluation.runs.completions import (
     COMPLETIONS,
     EXAMPLE,

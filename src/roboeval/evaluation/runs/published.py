@@ -12,9 +12,9 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
-from codebotler.badinput import BadInput, read_text, text_of
-from codebotler.files import MAX_ROW
-from codebotler.syntaxtree import parse
+from codebotler.core.badinput import BadInput, read_text, text_of
+from codebotler.core.files import MAX_ROW
+from codebotler.core.syntaxtree import parse
 from roboeval.evaluation.runs.completions import Completion, Key, check_length, name_of, unknown
 from roboeval.suites.load import Suite
 

@@ -14,8 +14,8 @@ from typing import Any
 import msgspec
 import polars as pl
 
-from codebotler.badinput import BadInput
-from codebotler.files import read_rows
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import read_rows
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, add_or_raise, read_lines_of

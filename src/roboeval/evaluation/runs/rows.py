@@ -11,10 +11,10 @@ from typing import Any, TypeAlias, TypedDict
 
 import msgspec
 
-from codebotler.badinput import BadInput
-from codebotler.files import read_lines, to_line
-from codebotler.skills import SKILLS
-from codebotler.trace import Status
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import read_lines, to_line
+from codebotler.core.skills import SKILLS
+from codebotler.core.trace import Status
 
 MOST = 1_000_000  # bytes of a row
 MOST_OF_WORLD = 20_000  # bytes for each world, where there are so many worlds that they come to more

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from codebotler.badinput import BadInput
-from codebotler.files import write_whole
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import write_whole
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.rows import JudgedRow
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.badinput import BadInput
-from codebotler.files import MAX_ROW, Appender, sync_folder, to_line, write_whole
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import MAX_ROW, Appender, sync_folder, to_line, write_whole
 from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.folder import Run, open_source
 from roboeval.suites.load import Suite

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from codebotler.badinput import BadInput
-from codebotler.files import read_rows, to_line
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.judge import TimeLimitExceeded, time_limit

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from codebotler.badinput import BadInput
-from codebotler.files import to_line
+from codebotler.core.badinput import BadInput
+from codebotler.core.files import to_line
 from roboeval.analysis.search import Question, Search
 from roboeval.evaluation.evaluate import evaluate_run
 from roboeval.evaluation.runs.folder import Run

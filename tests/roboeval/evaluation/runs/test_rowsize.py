@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from codebotler.files import to_line
+from codebotler.core.files import to_line
+from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
+from codebotler.core.world import Room, World
 from codebotler.rtl import parse
-from codebotler.trace import Event, Outcome, RunError, Status, Trace
-from codebotler.world import Room, World
 from made_results import table_of
 from roboeval.analysis.search import Question, answer
 from roboeval.cli.views.completions import completion_view

@@ -1,0 +1,270 @@
+"""Where a program drives, as far as its text tells without running it."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from codebotler.core.program import Problem, names_bound, parsed
+from codebotler.core.skills import SKILLS, Skill, SkillTable
+
+DRIVE, LIST, HERE = "goto", "get_all_rooms", "get_current_location"
+MOST_ROOMS = 100
+ROUNDS = 6
+"""How often names are passed on from variable to variable; nobody writes longer chains."""
+SAME_VALUES = frozenset({"sorted", "list", "set", "tuple", "reversed", "iter", "filter", "frozenset"})
+OF_A_LIST = frozenset({"copy", "keys", "lower", "strip", "casefold", "title", "pop"})
+COMPARING = frozenset({"startswith", "endswith"})
+
+
+def fixed_drives(source: str, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
+    """The line and the request of each drive that is written out, and that depends on no other mention of it.
+
+    A program that compares something with a name of a room may drive there only if there is one.
+
+    Args:
+        source: of the program; of one that does not parse, there are none.
+        skills: what it may call.
+    """
+    tree = parsed(source)
+    if isinstance(tree, Problem):
+        return []
+    try:
+        bound = names_bound(tree)
+        if "*" in bound:
+            return []
+        compared = {text for node in ast.walk(tree) if isinstance(node, ast.Compare) for text in _texts(node)}
+        drives = {name: skill for name, skill in _drives(skills).items() if name not in bound}
+        return [
+            (call.lineno, request.value)
+            for call, request in _requests(tree, drives)
+            if isinstance(request, ast.Constant) and isinstance(request.value, str)
+            if request.value.strip().casefold() not in compared
+        ]
+    except RecursionError:
+        return []
+
+
+def _texts(expression: ast.expr) -> Iterator[str]:
+    """The texts that stand in an expression, in small letters."""
+    for node in ast.walk(expression):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value.strip().casefold()
+
+
+def named_rooms(source: str, skills: SkillTable = SKILLS) -> tuple[str, ...]:
+    """The rooms that a program drives to or compares rooms with, by the names that it writes out, in order.
+
+    Args:
+        source: of the program; one that does not parse names none.
+        skills: what it may call.
+    """
+    tree = parsed(source)
+    if isinstance(tree, Problem):
+        return ()
+    try:
+        return tuple(dict.fromkeys(Rooms(tree, _drives(skills)).names()))[:MOST_ROOMS]
+    except RecursionError:
+        return ()
+
+
+def lists_rooms(source: str) -> bool:
+    """Whether a program asks for the list of all rooms."""
+    tree = parsed(source)
+    return not isinstance(tree, Problem) and any(
+        isinstance(node, ast.Name) and node.id == LIST for node in ast.walk(tree)
+    )
+
+
+def _drives(skills: SkillTable) -> dict[str, Skill]:
+    return {
+        skill.name: skill
+        for skill in skills.rows
+        if skill.recording is not None and skill.recording.kind == DRIVE
+    }
+
+
+def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.Call, ast.expr]]:
+    """The calls that drive, with where to."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(ast.Name(name), [first, *_]) if name in drives:
+                yield node, first
+            case ast.Call(ast.Name(name)) if name in drives:
+                recording = drives[name].recording
+                assert recording is not None
+                yield from ((node, k.value) for k in node.keywords if k.arg == recording.text)
+
+
+@dataclass(frozen=True, order=True)
+class Text:
+    """A text that a program writes out.
+
+    Args:
+        line: counted from 1.
+        column: counted from 0.
+        value: the text; None for what the simulator says of rooms.
+    """
+
+    line: int
+    column: int
+    value: str = ""
+
+
+A_ROOM = Text(0, 0)
+"""Stands for the name of a room that the robot was told."""
+
+
+class Rooms:
+    """Follows texts through the variables of a program, roughly: a name means the same all over it.
+
+    Args:
+        tree: the program.
+        drives: the skills that drive.
+    """
+
+    def __init__(self, tree: ast.Module, drives: dict[str, Skill]) -> None:
+        self.tree, self.drives = tree, drives
+        self.held: defaultdict[str, set[Text]] = defaultdict(set)
+        self.functions = {
+            node.name: [*node.args.posonlyargs, *node.args.args]
+            for node in ast.walk(tree)
+            if isinstance(node, ast.FunctionDef)
+        }
+        for _ in range(ROUNDS):
+            before = sum(map(len, self.held.values()))
+            for node in ast.walk(tree):
+                self._pass_on(node)
+            if sum(map(len, self.held.values())) == before:
+                break
+
+    def names(self) -> list[str]:
+        """The names of rooms, in the order in which they stand in the program."""
+        found = {text for _, request in _requests(self.tree, self.drives) for text in self.texts(request)}
+        driven = {_name(request) for _, request in _requests(self.tree, self.drives)} - {None}
+        for node in ast.walk(self.tree):
+            found |= self._compared(node, driven)
+        return [text.value for text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text.value))]
+
+    def texts(self, node: ast.expr) -> set[Text]:
+        """What an expression may be, or what may be among its elements."""
+        match node:
+            case ast.Constant(str(value)):
+                return {Text(node.lineno, node.col_offset, value.strip())}
+            case ast.Name(name):
+                return self.held[name]
+            case ast.Call(ast.Name(name)) if name in {LIST, HERE}:
+                return {A_ROOM}
+        return self._all(_parts(node))
+
+    def _all(self, nodes: list[ast.expr]) -> set[Text]:
+        return set().union(*map(self.texts, nodes))
+
+    def _pass_on(self, node: ast.AST) -> None:
+        match node:
+            case ast.Assign(targets, value):
+                for target in targets:
+                    self._bind(target, value)
+            case (
+                ast.AnnAssign(target, value=ast.expr() as value)
+                | ast.AugAssign(target, ast.Add(), value)
+                | ast.NamedExpr(target, value)
+            ):
+                self._bind(target, value)
+            case ast.For(target, over) | ast.comprehension(target, over):
+                self._bind_each(target, over)
+            case ast.Call(ast.Attribute(ast.Name(name), "append" | "add" | "extend"), [value]):
+                self.held[name] |= self.texts(value)
+            case ast.Call(ast.Name(name), arguments) if name in self.functions:
+                given = {p.arg: value for p, value in zip(self.functions[name], arguments, strict=False)}
+                given |= {k.arg: k.value for k in node.keywords if k.arg is not None}
+                for parameter, argument in given.items():
+                    self.held[parameter] |= self.texts(argument)
+
+    def _bind(self, target: ast.expr, value: ast.expr) -> None:
+        match target, value:
+            case ast.Name(name), _:
+                self.held[name] |= self.texts(value)
+            case ((ast.Tuple(targets) | ast.List(targets)), (ast.Tuple(values) | ast.List(values))):
+                for one, its in zip(targets, values, strict=False):
+                    self._bind(one, its)
+            case ((ast.Tuple(targets) | ast.List(targets)), _):
+                for one in targets:
+                    self._bind(one, value)
+
+    def _bind_each(self, target: ast.expr, over: ast.expr) -> None:
+        """Bind the target of a loop to what it runs over."""
+        match target, over:
+            case ast.Tuple([_, second]), ast.Call(ast.Name("enumerate"), [many, *_]):
+                self._bind_each(second, many)
+            case ast.Tuple(targets), ast.Call(ast.Name("zip"), many):
+                for one, those in zip(targets, many, strict=False):
+                    self._bind_each(one, those)
+            case ast.Tuple([first, second]), ast.Call(ast.Attribute(ast.Dict() as pairs, "items")):
+                self._bind_each(first, pairs)
+                self._bind_each(second, ast.List(pairs.values))
+            case ast.Tuple([first, _]), ast.Call(ast.Attribute(value, "items")):
+                self._bind_each(first, value)
+            case ast.Tuple(), ast.List(rows) | ast.Tuple(rows) | ast.Set(rows):
+                for row in rows:
+                    self._bind(target, row)
+            case _:
+                self._bind(target, over)
+
+    def _compared(self, node: ast.AST, driven: set[str | None]) -> set[Text]:
+        """The texts with which an expression compares a room."""
+
+        def is_room(side: ast.expr) -> bool:
+            return A_ROOM in self.texts(side) or _name(side) in driven
+
+        match node:
+            case ast.Compare(left, _, [right]):
+                sides = ((left, right), (right, left))
+                return {text for one, other in sides if is_room(one) for text in self.texts(other)}
+            case ast.Call(ast.Attribute(value, name), [text]) if name in COMPARING and is_room(value):
+                return self.texts(text)
+        return set()
+
+
+def _parts(node: ast.expr) -> list[ast.expr]:
+    """The expressions of which one may be the value of an expression, or among its elements."""
+    parts: list[ast.expr] = []
+    match node:
+        case ast.List(some) | ast.Tuple(some) | ast.Set(some) | ast.BoolOp(_, some):
+            parts = some
+        case ast.Dict(keys):
+            parts = [key for key in keys if key is not None]
+        case ast.IfExp(_, one, other):
+            parts = [one, other]
+        case ast.BinOp(one, ast.Add(), other) if not _is_text(one) and not _is_text(other):
+            parts = [one, other]
+        case ast.ListComp(part) | ast.SetComp(part) | ast.GeneratorExp(part):
+            parts = [part]
+        case ast.Subscript(part) | ast.Starred(part) | ast.NamedExpr(_, part):
+            parts = [part]
+        case ast.Call(ast.Name(name), some) if name in SAME_VALUES:
+            parts = some[-1:]
+        case ast.Call(ast.Attribute(part, name)) if name in OF_A_LIST:
+            parts = [part]
+    return parts
+
+
+def _name(node: ast.expr) -> str | None:
+    """The variable that an expression is, or takes something from."""
+    match node:
+        case ast.Name(name):
+            return name
+        case ast.Subscript(value) | ast.Call(ast.Attribute(value)):
+            return _name(value)
+    return None
+
+
+def _is_text(node: ast.expr) -> bool:
+    match node:
+        case ast.Constant(str()) | ast.JoinedStr() | ast.Call(ast.Name("str")):
+            return True
+        case ast.BinOp(left, _, right):
+            return _is_text(left) or _is_text(right)
+    return False

@@ -1,0 +1,124 @@
+"""What a robot did, step by step: as plain data, and drawn room by room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from typing import Any, Literal
+
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from codebotler.core.terminal import shortened, visible
+from codebotler.core.trace import Event, Trace
+
+DID = {"say": "said", "pick": "picked up", "place": "put down"}
+
+MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
+MOST_OPTIONS = 20
+
+
+def steps_of(trace: Trace, room: Callable[[str], str | None] | None = None) -> list[dict[str, Any]]:
+    """The events of a trace as plain data, counted from 1.
+
+    Args:
+        trace: of a run.
+        room: tells which room a request to drive finds; without it, no step says where it happened.
+    """
+    return [_step_data(number, event, room) for number, event in enumerate(trace, 1)]
+
+
+def _step_data(number: int, event: Event, room: Callable[[str], str | None] | None) -> dict[str, Any]:
+    data: dict[str, Any] = {"step": number, "kind": event.kind, "text": event.text}
+    if room is not None:
+        data["place"] = event.place
+        if event.kind == "goto":
+            data["to"] = room(event.text)
+    if event.found is not None:
+        data["found"] = event.found
+    if event.kind == "ask":
+        data["options"] = [o.text if o.is_text else {"no text": o.text} for o in event.options]
+        data["answer"] = event.answer
+    return data
+
+
+def storyboard(steps: Sequence[Mapping[str, Any]], needed: set[int | None]) -> Table:
+    """The steps room by room; a long trace keeps its ends and the steps that explanations name."""
+    table = grid("right", "left")
+    if not steps:
+        table.add_row(Text(), Text("the robot did nothing", "dim"))
+        return table
+    if steps[0]["kind"] != "goto" and "place" in steps[0]:
+        table.add_row(Text(), Text(f"in {visible(steps[0]['place'])}", "bold"))
+    last = len(steps) - LAST_STEPS
+
+    def is_shown(step: Mapping[str, Any]) -> bool:
+        number = step["step"]
+        return len(steps) <= MOST_STEPS or number <= FIRST_STEPS or number > last or number in needed
+
+    for shown, some in groupby(steps, key=is_shown):
+        if shown:
+            for step in some:
+                indent = 0 if step["kind"] == "goto" else 4
+                table.add_row(Text(str(step["step"]), "dim"), Padding(step_text(step), (0, 0, 0, indent)))
+        else:
+            hidden = list(some)
+            table.add_row(Text(), Text(f"... {len(hidden):,} more{_repeating(steps, hidden)} ...", "dim"))
+    return table
+
+
+def _repeating(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str, Any]]) -> str:
+    def same(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+        return {**a, "step": 0} == {**b, "step": 0}
+
+    first = hidden[0]["step"] - 1
+    for period in range(1, min(LONGEST_PERIOD, first) + 1):
+        if all(same(steps[at], steps[at - period]) for at in range(first, first + len(hidden))):
+            repeated = f"step {first}" if period == 1 else f"steps {first - period + 1} to {first}"
+            return f", repeating {repeated}"
+    return ""
+
+
+def step_text(step: Mapping[str, Any]) -> Text:
+    """A step as one line.
+
+    Args:
+        step: as `steps_of` gives it.
+    """
+    text = f'"{shortened(step["text"])}"'
+    if step["kind"] == "goto":
+        return _drive(step, text)
+    match step["kind"]:
+        case "check":
+            told = f"looked for {text}: {'found' if step.get('found') else 'not found'}"
+        case "ask":
+            answer = "no answer" if step["answer"] is None else shortened(step["answer"])
+            told = f"asked {text} {_options(step['options'])} → {answer}"
+        case kind:
+            told = f"{DID.get(kind) or visible(kind)} {text}"
+    return Text(told)
+
+
+def _drive(step: Mapping[str, Any], request: str) -> Text:
+    if "place" not in step:
+        return Text(f"→ {request}", "bold")
+    start = f"{visible(step['place'])} → "
+    if step["to"] is None:
+        return Text.assemble((f"{start}{request}", "bold"), ("  failed: there is no such room", "red"))
+    drive = Text(start + visible(step["to"]), "bold")
+    return drive if step["to"] == step["text"] else drive.append(f"  (asked for {request})", "not bold")
+
+
+def _options(options: Sequence[str | Mapping[str, str]]) -> str:
+    shown = [shortened(o) if isinstance(o, str) else f"{shortened(o['no text'])} (no text)" for o in options]
+    left = len(shown) - MOST_OPTIONS
+    return f"[{' | '.join(shown[:MOST_OPTIONS] + [f'{left:,} more'] * (left > 0))}]"
+
+
+def grid(*justify: Literal["left", "right"]) -> Table:
+    """A table without lines; numbers stand on the right and are never broken."""
+    table = Table.grid(padding=(0, 2, 0, 0))
+    for side in justify:
+        table.add_column(justify=side, no_wrap=side == "right", overflow="fold")
+    return table

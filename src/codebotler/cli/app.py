@@ -1,0 +1,434 @@
+"""The command line of CodeBotler, and what all command lines of this package share."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from typer.main import get_command
+
+from codebotler import __version__
+from codebotler.cli.options import (
+    ROS_PYTHON,
+    AddressOption,
+    BaseUrlOption,
+    HostOption,
+    MaxTokensOption,
+    ModelOption,
+    NameOption,
+    NoTokenOption,
+    PortOption,
+    RosPythonOption,
+    SeedOption,
+    SpeedOption,
+    TemperatureOption,
+    TimeoutOption,
+    TokenOption,
+    TopPOption,
+    WorldOption,
+)
+from codebotler.core.terminal import (
+    FULL,
+    drop_output,
+    flush_output,
+    note,
+    noting_all,
+    open_streams,
+    print_text,
+    system_sentence,
+)
+
+ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
+STOPPED = 130  # the status after Ctrl-C, as shells have it
+USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
+ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
+
+app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+def robot_names(incomplete: str) -> list[str]:
+    """What a shell completes where a kind of robot belongs."""
+    from codebotler.robots.open import KINDS
+
+    return [name for name in KINDS if name.startswith(incomplete)]
+
+
+RobotOption = Annotated[
+    str,
+    typer.Option(
+        help="Which robot: sim, or another that `codebotler robots` lists.", autocompletion=robot_names
+    ),
+]
+
+
+@app.callback(invoke_without_command=True)
+def codebotler(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    """Robot programs from plain words: checked before a robot moves."""
+    if version:
+        print_text(f"codebotler {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print_text(context.get_help())
+
+
+@app.command()
+def generate(
+    instruction: Annotated[str, typer.Argument(help="What the robot is to do, in plain words.")],
+    model: ModelOption = "recorded",
+    world: WorldOption = None,
+    retries: Annotated[
+        int | None, typer.Option(min=0, help="Ask so many times more while there are problems.")
+    ] = None,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Ask again with the program and its problems; once by default.")
+    ] = False,
+    record: Annotated[
+        Path | None, typer.Option(help="Add a line of JSON for every attempt to this file.")
+    ] = None,
+    show_prompt: Annotated[
+        bool, typer.Option("--show-prompt", help="Print what the model would be asked, and ask nobody.")
+    ] = False,
+    temperature: TemperatureOption = 0.2,
+    top_p: TopPOption = 0.95,
+    max_tokens: MaxTokensOption = 512,
+    seed: SeedOption = None,
+    timeout: TimeoutOption = 60.0,
+    base_url: BaseUrlOption = None,
+) -> None:
+    """Have a model write a program, and print it.
+
+    The status is 1 if a check finds problems in it.
+    """
+    from codebotler.cli.generate import show, write
+    from codebotler.core.badinput import BadInput
+    from codebotler.core.world import World
+    from codebotler.models.base import Settings
+    from codebotler.prompts import prompt_for
+
+    if not instruction.strip():
+        raise BadInput("the instruction is empty; say what the robot is to do")
+    known = None if world is None else World.read(world)
+    prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
+    if show_prompt:
+        show(prompt, model)
+        return
+    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    tries = int(repair) if retries is None else retries
+    accepted = write(prompt, model, settings, world=known, retries=tries, repair=repair, record=record)
+    raise typer.Exit(0 if accepted else 1)
+
+
+@app.command()
+def check(
+    program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
+    world: WorldOption = None,
+    samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
+    seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Draw also what the program never looks for.")
+    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+    workers: Annotated[int, typer.Option(min=1, help="Runs that go on at the same time.")] = 1,
+) -> None:
+    """Look for problems in a program before it is run.
+
+    It looks in the text and in imagined worlds; the status is 1 if there are any.
+    """
+    from codebotler.checking.check import check as look_for_problems
+    from codebotler.cli.check import check_view, read_program
+    from codebotler.core.terminal import busy, print_json, print_rich
+    from codebotler.core.world import World
+
+    known = None if world is None else World.read(world)
+    source = read_program(program)
+    with busy("checking"):
+        found = look_for_problems(
+            source,
+            rooms=None if known is None else [room.name for room in known.rooms],
+            start=None if known is None else known.robot,
+            samples=samples,
+            seed=seed,
+            strict=strict,
+            workers=workers,
+        )
+    if json:
+        print_json(found.data())
+    else:
+        print_rich(check_view(found, source, "the program" if program == "-" else program))
+    raise typer.Exit(1 if found.problems else 0)
+
+
+@app.command()
+def run(
+    program: Annotated[
+        str, typer.Argument(metavar="PROGRAM|INSTRUCTION", help="A file, -, or what to do in plain words.")
+    ],
+    robot: RobotOption = "sim",
+    world: Annotated[Path | None, typer.Option(help="The world file of a simulated robot.")] = None,
+    model: Annotated[str, typer.Option(help="Who writes the program for an instruction.")] = "recorded",
+    yes: Annotated[bool, typer.Option("--yes", help="Run it without asking.")] = False,
+    despite_problems: Annotated[
+        bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
+    ] = False,
+    speed: SpeedOption = 1.0,
+    address: AddressOption = "",
+    ros_python: RosPythonOption = ROS_PYTHON,
+) -> None:
+    """Check a program, ask, and run it on a robot.
+
+    Ctrl-C stops the robot, with status 130.
+    """
+    from codebotler.cli.run import Request
+    from codebotler.cli.run import run as run_mission
+    from codebotler.core.home import home
+    from codebotler.core.world import World
+    from codebotler.models.base import Settings
+    from codebotler.models.open import open_model
+    from codebotler.robots.base import Options
+    from codebotler.robots.open import open_robot
+
+    request = Request(program, lambda: open_model(model, Settings()), yes, despite_problems)
+    options = Options(
+        world=None if world is None else World.read(world),
+        speed=speed or None,
+        address=address,
+        ros_python=ros_python,
+    )
+    raise typer.Exit(run_mission(open_robot(robot, options), request, home()))
+
+
+@app.command()
+def missions(
+    mission: Annotated[
+        str | None, typer.Argument(metavar="ID", help="Show this one; `last` is the last one.")
+    ] = None,
+    mcap: Annotated[
+        Path | None, typer.Option(help="Write it to this file, which Foxglove opens, with the program in it.")
+    ] = None,
+    clock: Annotated[str, typer.Option(help="With --mcap: wall, or robot for simulated time.")] = "wall",
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """List past missions, or show what happened in one."""
+    from codebotler.cli.missions import show_mission, show_missions, write_mission
+    from codebotler.core.badinput import BadInput
+    from codebotler.core.home import home
+
+    if mcap is not None and mission is None:
+        raise BadInput("--mcap writes one mission; name it, or `last`")
+    if clock not in {"wall", "robot"}:
+        raise BadInput(f'"{clock}" is no clock; write wall or robot')
+    if mission is None:
+        show_missions(home(), json=json)
+    elif mcap is None:
+        show_mission(home(), mission, json=json)
+    else:
+        write_mission(home(), mission, mcap, clock="robot" if clock == "robot" else "wall")
+
+
+@app.command()
+def robots(
+    ros_python: RosPythonOption = ROS_PYTHON,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
+) -> None:
+    """List the kinds of robots, and which of them work here.
+
+    For the others it says what is missing, and the mend.
+    """
+    from dataclasses import asdict
+
+    from codebotler.core.terminal import print_json, print_rich
+    from codebotler.missions.view import robots_view
+    from codebotler.robots.open import all_readiness
+
+    found = all_readiness(ros_python)
+    if json:
+        print_json([asdict(kind) for kind in found])
+    else:
+        print_rich(robots_view(found))
+
+
+@app.command()
+def serve(
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    name: NameOption = None,
+    token: TokenOption = None,
+    no_token: NoTokenOption = False,
+    robot: RobotOption = "sim",
+    world: Annotated[Path | None, typer.Option(help="The world file, for the robot and for the map.")] = None,
+    model: Annotated[
+        list[str] | None, typer.Option(help="Who may write programs; more than one may be named.")
+    ] = None,
+    base_url: BaseUrlOption = None,
+    speed: SpeedOption = 1.0,
+    address: AddressOption = "",
+    ros_python: RosPythonOption = ROS_PYTHON,
+    face: Annotated[
+        bool, typer.Option("--face", help="Have the robot speak and ask on a page of its own, /face.")
+    ] = False,
+    face_timeout: Annotated[
+        float, typer.Option(min=1, help="Seconds that people have to answer there.")
+    ] = 60.0,
+    face_token: Annotated[str | None, typer.Option(help="What opens the face; a new one by default.")] = None,
+    stop_when_alone: Annotated[
+        float | None, typer.Option(min=1, help="Stop the robot so many seconds after the last page closed.")
+    ] = None,
+    runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
+) -> None:
+    """Serve the page from which a robot is operated.
+
+    Ctrl-C ends it, which also stops the robot.
+    """
+    from codebotler.core.home import home
+    from codebotler.core.world import World
+    from codebotler.models.base import Model, Settings
+    from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
+    from codebotler.robots.base import Options
+    from codebotler.robots.face import Face
+    from codebotler.robots.open import open_faced, open_robot
+    from codebotler.web.desk import Desk
+    from codebotler.web.place import entrance
+
+    place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)
+    known = None if world is None else World.read(world)
+    models = tuple(model or ("recorded:careful", "recorded:hasty"))
+    for each in models:
+        kind_of(each)
+    if base_url is not None:
+        expect_server(*models)
+
+    def opened(name: str) -> Model:
+        return open_model(name, Settings(base_url=base_url if runs_on_server(name) else None))
+
+    options = Options(known, speed or None, address, ros_python)
+    shown = Face(face_timeout) if face else None
+    body = open_robot(robot, options) if shown is None else open_faced(robot, options, shown)
+    desk = Desk(body, home(), opened, models=models, world=known, face=shown)
+
+    from codebotler.web.further import installed
+    from codebotler.web.serving import serve as serve_page
+
+    serve_page(desk, place, access, installed(), runs, alone_for=stop_when_alone)
+
+
+@app.command("virtual-robot")
+def virtual_robot(
+    world: Annotated[Path, typer.Option(help="The world file that tells where the robot is.")],
+    port: Annotated[
+        int | None,
+        typer.Option(
+            min=1, max=65535, help="Of the ROS master; that of ROS_MASTER_URI, or 11311, by default."
+        ),
+    ] = None,
+    speed: Annotated[float, typer.Option(help="How many of the robot's seconds pass in a real one.")] = 1.0,
+    ros_python: Annotated[
+        Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
+    ] = ROS_PYTHON,
+) -> None:
+    """Offer a simulated robot's skills on ROS 1.
+
+    It starts a ROS master if none answers; Ctrl-C ends it.
+    """
+    from contextlib import suppress
+
+    from codebotler.core.world import World
+    from codebotler.robots.virtual import VirtualRobot
+
+    def show(line: str) -> None:
+        with suppress(OSError):  # the robot goes on where nobody reads any more
+            print_text(line)
+
+    robot = VirtualRobot(World.read(world), speed=speed, port=port, python=ros_python, told=show)
+    try:
+        started = robot.start()
+        what = "a ROS master was started" if started else "joined the ROS master"
+        note(f"{what} at {robot.address}; the robot is ready, Ctrl-C ends it")
+        robot.wait()
+    finally:
+        robot.stop()
+
+
+_command = cache(get_command)
+
+
+def obey(app: typer.Typer, name: str) -> NoReturn:
+    """Run a command line and end the process; what a user can cause ends in one sentence.
+
+    The status is 2 for what was asked wrongly, 1 for what the machine could not do.
+
+    Args:
+        app: its commands.
+        name: how a user calls it.
+    """
+    if sys.platform == "win32":
+        note(f"{name}: {ON_WINDOWS}")
+        raise SystemExit(1)
+    open_streams()
+    if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
+        del os.environ["COLUMNS"]
+    try:
+        status = _command(app)(standalone_mode=False, prog_name=name)
+        flush_output()
+    except KeyboardInterrupt:
+        status = STOPPED
+    except BrokenPipeError:  # whoever read the results has read enough
+        drop_output()
+        status = 1
+    except Exception as error:
+        ending = _ending(error)
+        if ending is None:
+            raise
+        status, sentence = ending
+        note(f"{name}: {sentence}")
+        if isinstance(error, OSError) and error.filename is None:  # what is left of the output
+            drop_output()
+    if status == STOPPED:
+        note(f"{name}: stopped")
+    raise SystemExit(status if isinstance(status, int) else 0)
+
+
+def _ending(error: Exception) -> tuple[int, str] | None:
+    """The status and the sentence for an error; None for one that a user cannot cause."""
+    from codebotler.core.badinput import BadInput
+    from codebotler.models.base import BudgetSpentError, ModelError
+    from codebotler.robots.base import NotReadyError, RobotLostError
+    from codebotler.simulator.engine import EngineError
+
+    if isinstance(error, USAGE):
+        return 2, _usage_sentence(error)
+    if isinstance(error, BadInput):
+        return 2, str(error)
+    if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
+        return 1, str(error)
+    if isinstance(error, ModelError):
+        return (1 if error.may_pass else 2), error.sentence
+    if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
+        return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
+    return None
+
+
+def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' own
+    message = " ".join(error.format_message().split()).rstrip(".")
+    message = message[:1].lower() + message[1:]
+    if error.ctx is None:
+        return message
+    after = " " if message.endswith("?") else "; "
+    return f"{message}{after}`{error.ctx.command_path} --help` lists what there is"
+
+
+def main() -> None:
+    """Run the command line."""
+    with noting_all():
+        obey(app, "codebotler")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""What `codebotler check` reads and shows."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.text import Text
+
+from codebotler.checking.problems import Check, Problem, Sample
+from codebotler.checking.storyboard import steps_of, storyboard
+from codebotler.core.badinput import MAX_BYTES, BadInput, read_text, text_of
+from codebotler.core.program import TASK, bound_names
+from codebotler.core.terminal import shortened, visible
+from codebotler.prompts.extract import program_of
+
+INPUT = "standard input"
+AROUND = 1
+"""Lines that are shown before and after one that is to blame."""
+
+MOST_ROOMS = 12
+
+
+def read_program(name: str) -> str:
+    """Read a program that a user names.
+
+    Args:
+        name: a file, or `-` for standard input, where also a model's whole reply is understood.
+
+    Raises:
+        BadInput: there is no such file, or nothing in it.
+    """
+    if name != "-":
+        if not name:
+            raise BadInput("nothing is named; name a file, or - for standard input")
+        text = read_text(Path(name))
+        if not text.strip():
+            raise BadInput("there is no program in it", file=name)
+        return text
+    text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
+    if not text.strip():
+        raise BadInput("nothing came; write a program or a model's reply to it", file=INPUT)
+    return text if TASK in bound_names(text) else program_of(text).source
+
+
+def check_view(found: Check, program: str, name: str) -> RenderableType:
+    """What a check found, for a person: the verdict, the problems, and what the robot would do.
+
+    Args:
+        found: by the check.
+        program: its source.
+        name: what the user calls it.
+    """
+    parts: list[RenderableType] = [_verdict(found, name)]
+    lines = program.rstrip("\n").split("\n")
+    for problem in found.problems:
+        parts += [Text(), *_problem(problem, lines)]
+    parts += [Text(), _rooms(found), *_in_vain(found)]
+    if found.samples:
+        parts += [Text(), *_sample(_telling(found), found)]
+    return Group(*parts)
+
+
+def _verdict(found: Check, name: str) -> Text:
+    count = len(found.problems)
+    if not count:
+        verdict = Text.assemble(("accepted", "bold green"), f": no problem in {visible(name)}")
+    else:
+        what = "1 problem" if count == 1 else f"{count} problems"
+        verdict = Text.assemble(("rejected", "bold red"), f": {what} in {visible(name)}")
+    if not found.samples:
+        ran = "it was not run"
+    elif not any(sample.draws for sample in found.samples):
+        ran = "it does the same in every world"
+    else:
+        ran = f"run in {len(found.samples)} imagined world{'s'[: len(found.samples) > 1]}"
+    return verdict.append(f"\n{ran}", "dim")
+
+
+def _problem(problem: Problem, lines: list[str]) -> Iterator[RenderableType]:
+    yield Text(shortened(problem.sentence), "red")
+    if problem.line is None:
+        return
+    first, last = max(1, problem.line - AROUND), min(len(lines), problem.line + AROUND)
+    width = len(str(last))
+    for number in range(first, last + 1):
+        mark, style = (">", "bold") if number == problem.line else (" ", "dim")
+        text = shortened(lines[number - 1].expandtabs(4))
+        yield Text(f"{mark} {number:{width}} | {text}", style)
+
+
+def _rooms(found: Check) -> Text:
+    shown = [f'"{shortened(room, 60)}"' for room in found.rooms[:MOST_ROOMS]]
+    left = len(found.rooms) - len(shown)
+    rooms = ", ".join([*shown, *([f"and {left} more"] if left > 0 else [])])
+    if not found.rooms_are_guessed:
+        return Text(f"rooms: {rooms}", "dim")
+    told = f"rooms, taken from the program itself: {rooms}"
+    return Text(f"{told}\nwhether it misspells one shows only with --world FILE", "yellow")
+
+
+def _in_vain(found: Check) -> Iterator[Text]:
+    count = sum(sample.in_vain for sample in found.samples)
+    if 0 < count < len(found.samples):
+        often = f"{count} of {len(found.samples)} worlds"
+        yield Text(
+            f"in {often} the robot waits or searches in vain, which is not held against the program", "dim"
+        )
+
+
+def _telling(found: Check) -> Sample:
+    """The sample that says most about what the robot is to do: one that ends well, if there is one."""
+
+    def rank(sample: Sample) -> tuple[bool, bool, int]:
+        return sample.outcome.error is not None, sample.in_vain, -len(sample.outcome.trace)
+
+    return min(found.samples, key=rank)
+
+
+def _sample(sample: Sample, found: Check) -> Iterator[RenderableType]:
+    where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
+    yield Text.assemble(("what the robot would do", "bold"), where)
+    steps = steps_of(sample.outcome.trace, found.plan.room)
+    yield storyboard(steps, set())
+    if sample.outcome.error is not None:
+        told = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"
+        yield Padding(Text(told, "red"), (0, 0, 0, 4))

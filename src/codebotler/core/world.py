@@ -1,0 +1,367 @@
+"""Worlds: rooms, objects, people with scripted answers, and where the robot starts."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, TypeAlias
+
+import yaml
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    model_validator,
+)
+
+from codebotler.core.badinput import Place, YamlFile
+from codebotler.core.english import counted
+
+Point: TypeAlias = tuple[float, float]
+
+
+Answer: TypeAlias = str | int
+"""A regex for the option that is chosen, or its position: 1 is the first, -1 the last."""
+
+
+@dataclass(frozen=True)
+class Person:
+    """Somebody in a room who answers questions.
+
+    Args:
+        name: a regex for the names they answer to.
+        answers: one per question, in order; the last one stays for ever. Without any, every question fails.
+        topics: regexes, and what is answered to a question in which one is found, instead of the next answer.
+        after_looks: how often the robot looks into the room in vain before they come; 0 if they are there.
+        leaves: whether they go when they have given their last answer.
+    """
+
+    name: str
+    answers: tuple[Answer, ...] = ()
+    topics: tuple[tuple[str, Answer], ...] = ()
+    after_looks: int = 0
+    leaves: bool = False
+
+
+@dataclass(frozen=True)
+class Room:
+    """A place the robot can drive to.
+
+    Args:
+        name: a regex that is looked for in what a program asks for.
+        objects: labels of what lies there, in order.
+        people: who is there, in order.
+        footprint: its corners in metres; None where nobody measured it.
+        stand_at: where the robot stops in it, in metres.
+    """
+
+    name: str
+    objects: tuple[str, ...] = ()
+    people: tuple[Person, ...] = ()
+    footprint: tuple[Point, ...] | None = None
+    stand_at: Point | None = None
+
+
+@dataclass(frozen=True)
+class World:
+    """An initial state of the world (paper, section IV.A).
+
+    Args:
+        rooms: at least one, in the order in which the robot knows them, with unique names.
+        robot: the room in which the robot starts.
+        about: what is special here, in a few words.
+        may_wait_forever: whether a program may wait here for something that never comes.
+    """
+
+    rooms: tuple[Room, ...]
+    robot: str
+    about: str = ""
+    may_wait_forever: bool = False
+
+    def __repr__(self) -> str:
+        return f"World({counted(len(self.rooms), 'room')}, robot={self.robot!r})"
+
+    @classmethod
+    def read(cls, path: Path) -> World:
+        """Read a world file.
+
+        Raises:
+            BadInput: the file is missing or wrong; the sentence names the line and the mend.
+        """
+        file = YamlFile.read(path)
+        return file.validate(WorldFile).world(file)
+
+    def to_yaml(self) -> str:
+        """This world as the text of a world file."""
+        return yaml.dump(self.to_data(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+
+    def to_data(self) -> dict[str, object]:
+        """What a world file would say of this world."""
+        data: dict[str, object] = {
+            "about": self.about,
+            "robot": self.robot,
+            "rooms": [_room_data(room) for room in self.rooms],
+        }
+        if any(room.objects for room in self.rooms):
+            data["objects"] = {room.name: list(room.objects) for room in self.rooms if room.objects}
+        if any(room.people for room in self.rooms):
+            data["people"] = {
+                room.name: [_person_data(person) for person in room.people]
+                for room in self.rooms
+                if room.people
+            }
+        if self.may_wait_forever:
+            data["may_wait_forever"] = True
+        return data
+
+
+ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
+
+
+def laid_out(world: World) -> World:
+    """The world with a footprint and a standing point for every room: a grid on both sides of a hallway.
+
+    Rooms that have a footprint keep it; the others are placed beyond the rightmost of them.
+    """
+    taken = [x for room in world.rooms for x, _ in room.footprint or ()]
+    start = max(taken, default=0.0) + (HALLWAY if taken else 0.0)
+    rooms, placed = [], 0
+    for room in world.rooms:
+        footprint = room.footprint
+        if footprint is None:
+            left = start + placed // 2 * ROOM_WIDTH
+            low = 0.0 if placed % 2 == 0 else ROOM_DEPTH + HALLWAY
+            right, high = left + ROOM_WIDTH, low + ROOM_DEPTH
+            footprint = ((left, low), (right, low), (right, high), (left, high))
+            placed += 1
+        centre = (
+            sum(x for x, _ in footprint) / len(footprint),
+            sum(y for _, y in footprint) / len(footprint),
+        )
+        rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
+    return replace(world, rooms=tuple(rooms))
+
+
+Text = Annotated[str, StringConstraints(strict=True)]
+Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
+Metres = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
+Corner: TypeAlias = tuple[Metres, Metres]
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def _not_zero(option: int) -> int:
+    if option == 0:
+        raise ValueError("there is no option 0; 1 is the first, and -1 the last")
+    return option
+
+
+class OptionFile(_Form):
+    """An answer as a world file writes it where it is a position among the options."""
+
+    option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
+
+
+def _kind_of_answer(value: object) -> str:
+    return "option" if isinstance(value, dict | OptionFile) else "text"
+
+
+AnswerFile = Annotated[
+    Annotated[Text, Tag("text")] | Annotated[OptionFile, Tag("option")], Discriminator(_kind_of_answer)
+]
+
+
+class PersonFile(_Form):
+    """A person as a world file writes them."""
+
+    name: Name
+    answers: list[AnswerFile] = []
+    topics: dict[Name, AnswerFile] = {}
+    after_looks: Annotated[int, Field(strict=True, ge=0, le=1_000)] = 0
+    leaves: Annotated[bool, Field(strict=True)] = False
+
+    def person(self) -> Person:
+        """The person it describes."""
+        topics = tuple((topic, _answer(answer)) for topic, answer in self.topics.items())
+        answers = tuple(map(_answer, self.answers))
+        return Person(self.name, answers, topics, self.after_looks, self.leaves)
+
+
+def _answer(form: AnswerFile) -> Answer:
+    return form.option if isinstance(form, OptionFile) else form
+
+
+class RoomFile(_Form):
+    """A room as a world file writes it: its name alone, or with geometry."""
+
+    name: Name
+    footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
+    stand_at: Corner | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_alone(cls, data: object) -> object:
+        return data if isinstance(data, dict | RoomFile) else {"name": data}
+
+
+class WorldFile(_Form):
+    """A world as a file writes it, alone or inside a task."""
+
+    about: Text = ""
+    robot: Name
+    rooms: Annotated[list[RoomFile], Field(min_length=1)]
+    objects: dict[Text, list[Name]] = {}
+    people: dict[Text, list[PersonFile]] = {}
+    may_wait_forever: Annotated[bool, Field(strict=True)] = False
+
+    def world(self, file: YamlFile, at: Place = ()) -> World:
+        """The world it describes.
+
+        Args:
+            file: where it stands, for the sentences of errors.
+            at: where in the file.
+
+        Raises:
+            BadInput: a room does not exist or stands twice, or a regex is invalid.
+        """
+        names = [room.name for room in self.rooms]
+        for index, name in enumerate(names):
+            expect_regex(name, file, (*at, "rooms", index))
+            if name in names[:index]:
+                raise file.wrong(f'the room "{name}" stands here twice; remove one', *at, "rooms", index)
+            room = self.rooms[index]
+            if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
+                point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
+                sentence = f'the robot would stand at {point}, outside of the footprint of "{name}"; move one'
+                raise file.wrong(sentence, *at, "rooms", index, "stand_at")
+        self._check_places(file, at, names)
+        return World(
+            rooms=tuple(
+                Room(
+                    name=room.name,
+                    objects=tuple(self.objects.get(room.name, ())),
+                    people=tuple(person.person() for person in self.people.get(room.name, ())),
+                    footprint=None if room.footprint is None else tuple(room.footprint),
+                    stand_at=room.stand_at,
+                )
+                for room in self.rooms
+            ),
+            robot=self.robot,
+            about=self.about,
+            may_wait_forever=self.may_wait_forever,
+        )
+
+    def _check_places(self, file: YamlFile, at: Place, rooms: list[str]) -> None:
+        known = ", ".join(rooms)
+        if self.robot not in rooms:
+            raise file.wrong(f'the robot starts in "{self.robot}", but the rooms are: {known}', *at, "robot")
+        for room, labels in self.objects.items():
+            if room not in rooms:
+                raise file.wrong(
+                    f'there are objects in "{room}", but the rooms are: {known}', *at, "objects", room
+                )
+            for index, label in enumerate(labels):
+                expect_regex(label, file, (*at, "objects", room, index))
+        for room, people in self.people.items():
+            if room not in rooms:
+                raise file.wrong(
+                    f'there are people in "{room}", but the rooms are: {known}', *at, "people", room
+                )
+            for index, person in enumerate(people):
+                here = (*at, "people", room, index)
+                expect_regex(person.name, file, (*here, "name"))
+                for number, answer in enumerate(person.answers):
+                    expect_regex(answer, file, (*here, "answers", number))
+                for topic, answer in person.topics.items():
+                    expect_regex(topic, file, (*here, "topics", topic))
+                    expect_regex(answer, file, (*here, "topics", topic))
+
+
+_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
+
+
+def _is_within(point: Point, corners: list[Point]) -> bool:
+    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
+    x, y = point
+    odd = False
+    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
+    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
+            return True
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            odd = not odd
+    return odd
+
+
+def _distance(point: Point, start: Point, end: Point) -> float:
+    """How far a point is from a line between two others."""
+    (x, y), (x1, y1), (x2, y2) = point, start, end
+    dx, dy = x2 - x1, y2 - y1
+    square = dx * dx + dy * dy
+    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
+    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
+
+
+def expect_regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
+    """Refuse a text of a file that is no regular expression.
+
+    Args:
+        text: what stands there; an option by its position is none.
+        file: the file.
+        place: where in it.
+
+    Raises:
+        BadInput: it is none.
+    """
+    if isinstance(text, OptionFile):
+        return
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise file.wrong(f'"{text}" is no valid regular expression: {error}', *place) from None
+
+
+class _Dumper(yaml.SafeDumper):
+    """Writes texts so that they read back; PyYAML folds rare line breaks away where it need not quote."""
+
+
+def _written_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    rare = any(character in text for character in "\x85\u2028\u2029")
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"' if rare else None)
+
+
+_Dumper.add_representer(str, _written_text)
+
+
+def _person_data(person: Person) -> dict[str, object]:
+    data: dict[str, object] = {"name": person.name, "answers": list(map(_answer_data, person.answers))}
+    if person.topics:
+        data["topics"] = {topic: _answer_data(answer) for topic, answer in person.topics}
+    if person.after_looks:
+        data["after_looks"] = person.after_looks
+    if person.leaves:
+        data["leaves"] = True
+    return data
+
+
+def _answer_data(answer: Answer) -> object:
+    return {"option": answer} if isinstance(answer, int) else answer
+
+
+def _room_data(room: Room) -> object:
+    if room.footprint is None and room.stand_at is None:
+        return room.name
+    data: dict[str, object] = {"name": room.name}
+    if room.footprint is not None:
+        data["footprint"] = [list(corner) for corner in room.footprint]
+    if room.stand_at is not None:
+        data["stand_at"] = list(room.stand_at)
+    return data

@@ -1,0 +1,217 @@
+"""A mission as an MCAP file, which Foxglove and other tools of roboticists open."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import IO, Any, Literal, TypeAlias
+from uuid import uuid4
+
+from mcap.writer import Writer
+
+from codebotler import __version__
+from codebotler.core.replacing import expect_replaceable
+from codebotler.core.skills import SKILLS, Skill, SkillTable
+from codebotler.missions.log import Line, Summary
+from codebotler.missions.pictures import picture_of
+
+Clock: TypeAlias = Literal["wall", "robot"]
+Schema: TypeAlias = Mapping[str, Any]
+
+TEXT: Schema = {"type": "string"}
+TEXTS: Schema = {"type": "array", "items": TEXT}
+NUMBER: Schema = {"type": "number"}
+TYPES: Mapping[str, Schema] = {"str": TEXT, "list[str]": TEXTS, "bool": {"type": "boolean"}}
+SECOND = 1_000_000_000
+LATEST = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
+STATES, NOTES = "/mission/state", "/mission/log"
+DETAILS = ("text", "message", "reason", "by", "file")
+"""Where an event that is no skill's has what it says."""
+IMAGE = "foxglove.CompressedImage"
+"""By this name of their schema Foxglove knows messages that are pictures, wherever they come from."""
+WHOLE: Schema = {"type": "integer"}
+TIME: Schema = {"type": "object", "title": "time", "properties": {"sec": WHOLE, "nsec": WHOLE}}
+IMAGE_SCHEMA: Mapping[str, Schema] = {
+    "timestamp": TIME,
+    "frame_id": TEXT,
+    "data": {**TEXT, "contentEncoding": "base64"},
+    "format": TEXT,
+}
+FORMATS = {"jpg": "jpeg", "png": "png"}
+GOES_ON: Mapping[str, Schema] = {
+    "number": {"type": "integer"},
+    "event": TEXT,
+    "text": TEXT,
+    "clock": NUMBER,
+}
+
+
+def write_mcap(
+    file: IO[bytes],
+    summary: Summary,
+    events: Sequence[Line],
+    *,
+    folder: Path | None = None,
+    clock: Clock = "wall",
+    skills: SkillTable = SKILLS,
+) -> None:
+    """Write a mission: a channel for each skill, one for its pictures, one for states and one for the rest.
+
+    The program is attached.
+
+    Args:
+        file: open for writing.
+        summary: of the mission.
+        events: in their order.
+        folder: of the mission, for its pictures; None to leave them out.
+        clock: by which the messages are timed: the wall's, or the robot's, put to start with the mission.
+        skills: what the robot could be asked to do.
+
+    Raises:
+        OSError: it cannot be written.
+    """
+    began = round(min(summary.created * SECOND, LATEST))
+
+    def time(line: Line) -> int:
+        seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
+        return round(min(seconds * SECOND, LATEST))
+
+    writer = Writer(file)
+    writer.start(profile="", library=f"codebotler {__version__}")
+    channels = Channels(writer)
+    for number, line in enumerate(events):
+        topic, properties, message = _message(line, skills)
+        channel = channels.channel(topic, properties)
+        at = time(line)
+        writer.add_message(channel, at, json.dumps(message).encode(), at, sequence=number)
+        if folder is not None and (picture := picture_of(folder, line)) is not None:
+            channel = channels.channel(f"{topic}/picture", IMAGE_SCHEMA, IMAGE)
+            writer.add_message(channel, at, json.dumps(_image(*picture, at)).encode(), at, sequence=number)
+    last = time(events[-1]) if events else began
+    name = "program.py"
+    writer.add_attachment(began, last, name, "text/x-python", summary.program.encode(errors="surrogatepass"))
+    writer.add_metadata("mission", _about(summary))
+    writer.finish()  # type: ignore[no-untyped-call]  # theirs
+
+
+class Channels:
+    """The channels of a file, each with a schema of its own.
+
+    Args:
+        writer: of the file.
+    """
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._numbers: dict[str, int] = {}
+
+    def channel(self, topic: str, properties: Mapping[str, Schema], name: str = "") -> int:
+        """The channel of a topic.
+
+        Args:
+            topic: such as `/skill/go_to`.
+            properties: of its messages, with their types.
+            name: of the schema, where others know it by one.
+        """
+        if topic not in self._numbers:
+            name = name or "codebotler." + topic.strip("/").replace("/", ".")
+            schema = {"type": "object", "properties": properties}
+            number = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
+            self._numbers[topic] = self._writer.register_channel(topic, "json", number)
+        return self._numbers[topic]
+
+
+def schema_of(skill: Skill) -> dict[str, Schema]:
+    """What messages about a skill may hold: its arguments, what it gave back, and how it went on."""
+    arguments = {f"{p.name}": TYPES[p.annotation] for p in skill.parameters}
+    result = {"result": TYPES[skill.returns]} if skill.returns in TYPES else {}
+    return {**GOES_ON, **arguments, **result}
+
+
+def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema], dict[str, object]]:
+    """The topic, the schema and the message of an event."""
+    event, name = line["event"], str(line.get("skill"))
+    message: dict[str, object] = {"event": event, "clock": line["clock"]}
+    text = next((str(line[key]) for key in DETAILS if key in line), None)
+    if text is not None:
+        message["text"] = f"{line['kind']}: {text}" if "kind" in line else text
+    if name not in skills:
+        if event == "state":
+            return STATES, {**GOES_ON, "state": TEXT}, {**message, "state": line["state"]}
+        if "seconds" in line:
+            message["seconds"] = line["seconds"]
+        return NOTES, {**GOES_ON, "seconds": NUMBER}, message
+    result = {"result": line["result"]} if line.get("result") is not None else {}
+    arguments = line.get("arguments", {})
+    return (
+        f"/skill/{name}",
+        schema_of(skills[name]),
+        {
+            **message,
+            "number": line["number"],
+            **arguments,
+            **result,
+        },
+    )
+
+
+def _image(kind: str, data: bytes, at: int) -> dict[str, object]:
+    """A picture as Foxglove has it."""
+    return {
+        "timestamp": {"sec": at // SECOND, "nsec": at % SECOND},
+        "frame_id": "",
+        "data": base64.b64encode(data).decode(),
+        "format": FORMATS[kind],
+    }
+
+
+def _about(summary: Summary) -> dict[str, str]:
+    began = datetime.fromtimestamp(summary.created).astimezone()
+    about = {
+        "id": summary.id,
+        "state": summary.state,
+        "reason": summary.reason,
+        "robot": summary.robot,
+        "instruction": summary.instruction,
+        "model": summary.model,
+        "began": began.isoformat(timespec="seconds"),
+    }
+    return {name: text.encode(errors="backslashreplace").decode() for name, text in about.items()}
+
+
+def export(
+    path: Path, summary: Summary, events: Sequence[Line], clock: Clock, folder: Path | None = None
+) -> None:
+    """Write a mission as an MCAP file, whole or not at all; what is no file, such as a pipe, is written into.
+
+    Args:
+        path: the file, or a link to it.
+        summary: of the mission.
+        events: in their order.
+        clock: by which the messages are timed.
+        folder: of the mission, for its pictures; None to leave them out.
+
+    Raises:
+        BadInput: the file holds something else.
+        OSError: it cannot be written.
+    """
+    path = path.resolve()
+    expect_replaceable(path, b"\x89MCAP")
+    if path.exists() and not path.is_file():
+        whole = io.BytesIO()
+        write_mcap(whole, summary, events, folder=folder, clock=clock)
+        path.write_bytes(whole.getvalue())
+        return
+    new = path.with_name(f".{uuid4().hex}.mcap")  # nobody's own file, and not too long where the name is
+    try:
+        with new.open("xb") as file:
+            write_mcap(file, summary, events, folder=folder, clock=clock)
+        new.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
+        new.unlink(missing_ok=True)

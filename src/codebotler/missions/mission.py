@@ -1,0 +1,367 @@
+"""A mission: one instruction's life, from its program to the end of the robot's work, and its stop."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from types import TracebackType
+from typing import Self, TypeAlias
+
+from codebotler.core.home import make_folder
+from codebotler.core.terminal import visible
+from codebotler.core.trace import Outcome, RunError, Status, Trace
+from codebotler.missions.live import LiveRobot, StoppedError
+from codebotler.missions.log import Line, Log, Summary
+from codebotler.missions.pictures import Pictures
+from codebotler.robots.base import RobotLostError
+from codebotler.robots.reservation import Reservation
+from codebotler.simulator.lane import EngineError, Lane
+
+GRACE = 10.0
+"""Real seconds in which a robot has to end what it does once it was told to stop."""
+
+UNCONFIRMED = (
+    "the robot was told to stop and has not confirmed it; go and look, and use its emergency stop if it moves"
+)
+
+
+class State(StrEnum):
+    """Where a mission stands."""
+
+    DRAFTING = "drafting"
+    CHECKED = "checked"
+    APPROVED = "approved"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    STOPPING = "stopping"
+    STOPPED = "stopped"
+    INTERRUPTED = "interrupted"
+
+
+STEPS: dict[State, frozenset[State]] = {
+    State.DRAFTING: frozenset({State.DRAFTING, State.CHECKED, State.FAILED, State.STOPPED}),
+    State.CHECKED: frozenset(
+        {State.DRAFTING, State.CHECKED, State.APPROVED, State.FAILED, State.STOPPED},
+    ),
+    State.APPROVED: frozenset({State.DRAFTING, State.RUNNING, State.FAILED, State.STOPPED}),
+    State.RUNNING: frozenset({State.DONE, State.FAILED, State.STOPPING}),
+    State.STOPPING: frozenset({State.STOPPED, State.FAILED}),
+}
+"""From each state to which; a tool that dies leaves any of these as interrupted. The others are ends."""
+
+
+class MissionError(Exception):
+    """A mission cannot do that now.
+
+    Args:
+        sentence: why.
+    """
+
+    def __init__(self, sentence: str) -> None:
+        super().__init__(sentence)
+        self.sentence = sentence
+
+
+Told: TypeAlias = Callable[[Line], None]
+"""Told each event after it was written; one at a time, from any thread."""
+
+
+def untold(_line: Line) -> None:
+    """Tell nobody."""
+
+
+class Mission:
+    """One mission; as a context manager it ends on leaving, if it has not ended before.
+
+    Args:
+        home: the folder of missions.
+        robot: the kind of robot.
+        instruction: what somebody asks for; empty where the program came as it is.
+        told: told each event.
+
+    Raises:
+        OSError: nothing can be written there.
+    """
+
+    def __init__(self, home: Path, robot: str, instruction: str = "", told: Told = untold) -> None:
+        self.folder = _new_folder(home / "missions")
+        self._log, self._pictures = Log(self.folder), Pictures(self.folder)
+        self.told = told
+        self._book = threading.RLock()  # held while something is written and told; a stop waits for it last
+        self._gate = threading.Lock()  # held for moments only
+        self._stopped_by: str | None = None
+        self._asked, self._passed_on = 0.0, math.inf  # when it was first to stop, and when the robot knew
+        self._live: LiveRobot | None = None
+        self._lane: Lane | None = None
+        self._over, self._wake = threading.Event(), threading.Event()
+        self._fault: Exception | None = None
+        self.trace: Trace = ()
+        self.summary = Summary(self.folder.name, State.DRAFTING, robot, time.time(), instruction)
+        self._write("state", state=State.DRAFTING)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if not self.has_ended:
+                self._leave(error)
+        finally:
+            self._log.close()
+
+    @property
+    def id(self) -> str:
+        """Its name, by which it is found."""
+        return self.summary.id
+
+    @property
+    def state(self) -> State:
+        """Where it stands."""
+        return State(self.summary.state)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing can happen any more."""
+        return self.state not in STEPS
+
+    def draft(self, program: str, model: str = "") -> None:
+        """Take a program, the first one or another; it has to be checked.
+
+        Args:
+            program: its source.
+            model: who wrote it, if a model did.
+
+        Raises:
+            MissionError: it is too late for that.
+        """
+        with self._book:
+            self._step(State.DRAFTING, "take another program", program=program, model=model, problems=())
+
+    def check(self, problems: Sequence[str]) -> None:
+        """Take what a check of the program found, each in a sentence.
+
+        Raises:
+            MissionError: there is no program, or it is too late for that.
+        """
+        with self._book:
+            if not self.summary.program:
+                raise MissionError(f"mission {self.id} has no program that could be checked")
+            self._step(State.CHECKED, "be checked", problems=tuple(problems))
+
+    def approve(self, *, despite_problems: bool = False) -> None:
+        """Take somebody's word that the program may be run.
+
+        Args:
+            despite_problems: whether they say so although the check found problems.
+
+        Raises:
+            MissionError: the program was not checked, or has problems.
+        """
+        with self._book:
+            if self.state is State.CHECKED and self.summary.problems and not despite_problems:
+                raise MissionError(
+                    f"the program of mission {self.id} has problems; approve it despite them, or mend it"
+                )
+            self._step(State.APPROVED, "be approved")
+
+    def fail(self, reason: str) -> None:
+        """End it before it runs.
+
+        Raises:
+            MissionError: it runs, or has ended.
+        """
+        with self._book:
+            if self.state in {State.RUNNING, State.STOPPING}:
+                raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
+            self._step(State.FAILED, "fail", reason=reason)
+
+    def note(self, text: str) -> None:
+        """Take down a sentence, such as what a check of the robot's rooms found."""
+        self._write("log", text=text)
+
+    def stop(self, by: str = "somebody") -> None:
+        """Stop it, from any thread: end what the robot does, start nothing more, and end the program.
+
+        Back when the robot was told so; `run` comes back when it has ended what it did.
+
+        Args:
+            by: who wants it, in words, such as `Ctrl-C`.
+
+        Raises:
+            MissionError: it has ended.
+        """
+        had_ended, asked = self.has_ended, time.monotonic()
+        with self._gate:
+            if self._stopped_by is None:
+                self._stopped_by, self._asked = by, asked
+            live, lane = self._live, self._lane
+        self._wake.set()  # a robot that cannot be told must not keep anybody from hearing so
+        try:
+            if live is not None:
+                live.stop()
+        finally:
+            self._passed_on = min(self._passed_on, time.monotonic())
+            if lane is not None:
+                lane.stop()
+        with self._book:
+            if self.state is State.STOPPED and not had_ended:
+                return  # by this very stop, whose end was written first
+            if self.has_ended:
+                raise MissionError(f"mission {self.id} is {self.state}; there is nothing to stop")
+            if self.state is State.RUNNING:
+                self._be_stopping()
+            elif self.state is not State.STOPPING:
+                self._step(State.STOPPED, "be stopped", reason=f"stopped by {by} before it ran")
+
+    def run(self, reserved: Reservation, place: str = "") -> State:
+        """Run the program on a robot, and come back when all has ended.
+
+        It is back even if a robot that was stopped does not end what it does; then the mission has failed.
+
+        Args:
+            reserved: the robot.
+            place: the room in which it is, as far as that is known.
+
+        Returns:
+            done, failed or stopped.
+
+        Raises:
+            MissionError: it is not approved.
+            NotReadyError: the robot is on another mission, or was.
+            OSError: what happens could not be written or told, and so the robot was stopped.
+        """
+        live = LiveRobot(reserved.robot, self._write, place=place)
+        with self._book:
+            if self.state is State.APPROVED:
+                reserved.use()
+                self._live = live
+            self._step(State.RUNNING, "run", if_tool_dies=reserved.robot.if_tool_dies)
+        threading.Thread(target=self._execute, args=(live,), name=self.id, daemon=True).start()
+        try:
+            self._wake.wait()
+        except BaseException:
+            with suppress(MissionError):
+                self.stop("the end of the tool")
+            raise
+        finally:
+            if not self._over.wait(GRACE):
+                self._end(State.FAILED, UNCONFIRMED)
+        if self._fault is not None:
+            raise self._fault
+        return self.state
+
+    def _execute(self, live: LiveRobot) -> None:
+        """Run the program; on a thread of its own, since a robot may never come back from a skill."""
+        try:
+            outcome = self._outcome(live)
+        except BaseException as error:  # noqa: BLE001 - whatever it is, the robot must not go on
+            try:
+                live.stop()
+            finally:
+                self._end(State.FAILED, _reason(error))
+        else:
+            done = outcome.status is Status.FINISHED
+            why = outcome.error or RunError("", "")
+            reason = "" if done else f"{why.kind}: {visible(why.message)}"
+            self._end(State.DONE if done else State.FAILED, reason, line=outcome.line)
+
+    def _outcome(self, live: LiveRobot) -> Outcome:
+        lane = Lane()
+        try:
+            with self._gate:
+                self._lane = lane
+                is_stopped = self._stopped_by is not None
+            if is_stopped:
+                raise StoppedError
+            return lane.run_live(self.summary.program, live)
+        finally:
+            lane.close()
+
+    def _end(self, state: State, reason: str = "", line: int | None = None) -> None:
+        """Come to an end, the first that is told; what ends because it was stopped is stopped."""
+        try:
+            with self._book:
+                if self.has_ended:
+                    return
+                if self._live is not None:
+                    self.trace = self._live.trace
+                if self._stopped_by is not None and reason != UNCONFIRMED:
+                    state, reason, line = State.STOPPED, f"stopped by {self._stopped_by}", None
+                if self._stopped_by is not None and self.state is State.RUNNING:
+                    self._be_stopping()
+                self._step(state, "end", reason=reason, line=line)
+        except Exception as error:  # noqa: BLE001 - thrown where somebody hears it
+            self._fault = error
+        finally:
+            self._over.set()
+            self._wake.set()
+
+    def _be_stopping(self) -> None:
+        """Write who stopped it; the robot may have ended before whoever told it so is back."""
+        passed_on = min(self._passed_on, time.monotonic())
+        self._write("stop", by=self._stopped_by, seconds_to_cancel=round(passed_on - self._asked, 6))
+        self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
+
+    def _leave(self, error: BaseException | None) -> None:
+        if self.state in {State.RUNNING, State.STOPPING}:
+            self.stop("the end of the tool")
+        elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
+            self.stop("whoever began it")
+        else:
+            self.fail(visible(str(error)) or type(error).__name__)
+
+    def _step(self, to: State, what: str, **changes: object) -> None:
+        """Go to a state, and write so; the caller has the book."""
+        if to not in STEPS.get(self.state, ()):
+            raise MissionError(f"mission {self.id} is {self.state}, and cannot {what}")
+        self.summary.state = to
+        for name, value in changes.items():
+            setattr(self.summary, name, value)
+        if self.has_ended:
+            self.summary.ended = time.time()
+        shown = {name: value for name, value in changes.items() if value not in ("", None, ())}
+        self._write("state", state=to, **shown)
+        if self.has_ended:
+            self._log.close()
+
+    def _write(self, event: str, /, **data: object) -> None:
+        """Write an event and tell it; of what comes after the end there is nothing to tell."""
+        clock = 0.0 if self._live is None else self._live.now
+        with self._book:
+            if not self._log.is_open:
+                return
+            if isinstance(picture := data.pop("picture", None), bytes):
+                data |= self._pictures.keep(picture)
+            line = self._log.add(event, clock=clock, **data)
+            if event == "state":
+                self.summary.write(self.folder)
+            self.told(line)
+
+
+def _reason(error: BaseException) -> str:
+    if isinstance(error, RobotLostError):
+        return f"the robot was lost: {error.sentence}"
+    told = visible(str(error))
+    return told if isinstance(error, EngineError) else f"{type(error).__name__}: {told}"
+
+
+def _new_folder(missions: Path) -> Path:
+    """A folder that no mission has, named by the time."""
+    make_folder(missions)
+    name = f"{datetime.now().astimezone():%Y%m%d-%H%M%S}"
+    number = 1
+    while True:
+        folder = missions / (name if number == 1 else f"{name}-{number}")
+        with suppress(FileExistsError):
+            folder.mkdir()
+            return folder
+        number += 1

@@ -1,0 +1,150 @@
+"""Missions as they lie on the disk: found, listed, and closed where the tool died."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from codebotler.core.badinput import BadInput
+from codebotler.core.pasted import mission_command
+from codebotler.missions.live import in_words
+from codebotler.missions.log import SUMMARY, Line, Log, Summary, doing, events_of
+from codebotler.missions.mission import STEPS, State
+
+ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
+
+
+def missions(home: Path) -> list[Summary]:
+    """All missions in the order in which they began.
+
+    Args:
+        home: the folder of missions.
+
+    Raises:
+        BadInput: one cannot be read, or the folder is none.
+        OSError: the folder cannot be read.
+    """
+    return sorted(map(summary_of, _folders(home)), key=lambda summary: (summary.created, summary.id))
+
+
+def find(home: Path, name: str) -> Path:
+    """The folder of a mission.
+
+    Args:
+        home: the folder of missions.
+        name: the mission's own, or `last`.
+
+    Raises:
+        BadInput: there is none of that name.
+    """
+    if name == "last" and (known := missions(home)):
+        return home / "missions" / known[-1].id
+    folder = home / "missions" / name
+    if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
+        lists = mission_command("missions")
+        raise BadInput(f'there is no mission "{name}"; `{lists}` lists those there are')
+    return folder
+
+
+def summary_of(folder: Path) -> Summary:
+    """The summary of a mission.
+
+    Raises:
+        BadInput: it is none.
+        OSError: it cannot be read.
+    """
+    summary = Summary.read(folder)
+    if summary.state not in tuple(State):
+        raise BadInput("this is no summary of a mission; remove its folder", file=folder / SUMMARY)
+    return summary
+
+
+def untold(_mission: str, _error: OSError) -> None:
+    """Tell nobody."""
+
+
+def recover(home: Path, unclosed: Callable[[str, OSError], None] = untold) -> list[Summary]:
+    """Close the missions that a tool left behind when it died: they were interrupted.
+
+    Args:
+        home: the folder of missions.
+        unclosed: told each mission that cannot be closed, such as one on a disk that is full, and why.
+
+    Returns:
+        those that were not known to be before; what cannot be read is left to `missions` to complain about,
+        so that it keeps no robot from working.
+
+    Raises:
+        BadInput: the folder is none.
+        OSError: the folder cannot be read.
+    """
+    found = []
+    for folder in _folders(home):
+        try:
+            found += _interrupted(folder)
+        except BadInput:
+            continue
+        except OSError as error:
+            unclosed(folder.name, error)
+    return found
+
+
+def _folders(home: Path) -> list[Path]:
+    """The folders of missions; none where there has been no mission yet."""
+    folder = home / "missions"
+    try:
+        found = sorted(folder.iterdir())
+    except FileNotFoundError:
+        return []
+    except NotADirectoryError:
+        raise BadInput(
+            "this cannot be a folder of missions; name another by CODEBOTLER_HOME", file=folder
+        ) from None
+    return [path for path in found if os.path.exists(path / SUMMARY)]  # noqa: PTH110 - raises nothing
+
+
+def _interrupted(folder: Path) -> list[Summary]:
+    """The mission, if it was, and nobody had noticed."""
+    if State(summary_of(folder).state) not in STEPS:
+        return []
+    try:
+        log = Log(folder)
+    except BlockingIOError:
+        return []  # another tool is on it
+    try:
+        summary = summary_of(folder)
+        if State(summary.state) not in STEPS:
+            return []
+        events = events_of(folder)
+        told = _last_told(events)
+        if told is not None and State(told["state"]) not in STEPS:
+            summary.state, summary.reason, summary.ended = told["state"], told.get("reason", ""), told["time"]
+            summary.write(folder)
+            return []
+        summary.reason, clock = _how(summary, events), events[-1]["clock"] if events else 0.0
+        summary.state, summary.ended = State.INTERRUPTED, time.time()
+        log.add("state", clock=clock, state=summary.state, reason=summary.reason)
+        summary.write(folder)
+        return [summary]
+    finally:
+        log.close()
+
+
+def _last_told(events: list[Line]) -> Line | None:
+    """The last event that tells of a state."""
+    return next((line for line in reversed(events) if line["event"] == "state"), None)
+
+
+def _how(summary: Summary, events: list[Line]) -> str:
+    if State(summary.state) not in {State.RUNNING, State.STOPPING}:
+        return f"the tool died while the mission was {summary.state}; nothing had moved"
+    skill = doing(events)
+    if skill is None:
+        return "the tool died while the robot did nothing"
+    going = in_words(skill["skill"], list(skill["arguments"].values()))
+    where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
+    where = f" ({where})" if where else ""
+    return f"the tool died during {going}{where}; {summary.if_tool_dies}"

@@ -1,0 +1,390 @@
+"""What counts against a program, what does not, and that equal checks give equal data."""
+
+import json
+import re
+from collections.abc import Iterator
+
+import pytest
+
+from codebotler.checking.check import MORE, Check, Sample, Settings, check, check_on
+from codebotler.core.badinput import BadInput
+from codebotler.core.trace import Status
+from codebotler.simulator.engine import Lanes
+from codebotler.simulator.imagined import Plan
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.lots import Lot
+
+ROOMS = ("start_loc", "kitchen", "alice's office", "bob's office")
+START = "def task_program():\n    "
+
+
+@pytest.fixture(scope="module")
+def lanes() -> Iterator[Lanes]:
+    with Lanes(1) as started:
+        yield started
+
+
+class Checks:
+    """Checks bodies of `task_program` on lanes that stay open."""
+
+    def __init__(self, lanes: Lanes) -> None:
+        self.lanes = lanes
+
+    def __call__(
+        self,
+        *lines: str,
+        rooms: tuple[str, ...] | None = ROOMS,
+        samples: int = 5,
+        seed: int = 0,
+        strict: bool = False,
+    ) -> Check:
+        source = START + "\n    ".join(lines) + "\n"
+        return check(source, rooms=rooms, samples=samples, seed=seed, strict=strict, lanes=self.lanes)
+
+    def kinds(self, *lines: str, strict: bool = False) -> list[tuple[int | None, str]]:
+        return [(problem.line, problem.kind) for problem in self(*lines, strict=strict).problems]
+
+
+@pytest.fixture(scope="module")
+def checks(lanes: Lanes) -> Checks:
+    return Checks(lanes)
+
+
+# --- what counts
+
+
+@pytest.mark.parametrize(
+    ("lines", "kind", "line"),
+    [
+        (["x = 1 // 0"], "ZeroDivisionError", 2),
+        (["x = {}", "x['a']"], "KeyError", 3),
+        (["import sys", "sys.exit('no')"], "SystemExit", 3),
+        (["go_to('lab')"], "GoToInvalidLocation", 2),
+        (["room = 'la' + 'b'", "go_to(room)"], "GoToInvalidLocation", 3),
+        (["place('mug')"], "PlaceNoObject", 2),
+        (["pick('mug')", "pick('cup')"], "PickWhileHolding", 3),
+        (["options = []", "ask('', 'Tea?', options)"], "AskEmptyOptions", 3),
+        (["while True:", "    pass"], "TimeoutError", 3),
+        (["say(mesage)"], "NameError", 2),
+        (["go_to(1)"], "TypeError", 2),
+        (["say('a'"], "SyntaxError", 2),
+    ],
+)
+def test_what_counts_in_every_world(checks: Checks, lines: list[str], kind: str, line: int) -> None:
+    assert checks.kinds(*lines) == [(line, kind)]
+
+
+def test_a_program_without_problems_is_accepted(checks: Checks) -> None:
+    found = checks("go_to('kitchen')", "pick('mug')", "go_to('start_loc')", "place('mug')")
+    assert found.problems == ()
+    assert [sample.outcome.status for sample in found.samples] == [Status.FINISHED] * 5
+    assert [sample.number for sample in found.samples] == [0, 1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ["if 'lab' in get_all_rooms():", "    go_to('lab')"],
+        ["return", "go_to('lab')"],
+        ["if False:", "    go_to('lab')"],
+        ["while 0:", "    say(mesage)"],
+        ["for room in get_all_rooms():", "    continue", "    say(mesage)"],
+        ["def other():", "    go_to('lab')"],
+        ["try:", "    ask('Bob', 'Tea?', [])", "except Exception:", "    pass"],
+        ["try:", "    say(mesage)", "except (KeyError, NameError):", "    pass"],
+        ["import contextlib", "with contextlib.suppress(Exception):", "    go_to('lab')"],
+    ],
+)
+def test_an_error_that_does_no_harm_is_no_problem(checks: Checks, lines: list[str]) -> None:
+    assert checks.kinds(*lines) == []
+
+
+@pytest.mark.parametrize(
+    ("lines", "kind", "line"),
+    [
+        (["if True:", "    go_to('lab')"], "GoToInvalidLocation", 3),
+        (["if is_in_room('mug'):", "    return", "say(mesage)"], "NameError", 4),
+        (["def other():", "    go_to('lab')", "other()"], "GoToInvalidLocation", 3),
+        (["try:", "    say(mesage)", "except KeyError:", "    pass"], "NameError", 3),
+        (["try:", "    pass", "except Exception:", "    say(mesage)"], "NameError", 5),
+        (["try:", "    say(mesage)", "finally:", "    pass"], "NameError", 3),
+        (["if False:", "    break"], "SyntaxError", 3),
+    ],
+)
+def test_an_error_that_may_do_harm_is_a_problem(
+    checks: Checks, lines: list[str], kind: str, line: int
+) -> None:
+    assert checks.kinds(*lines) == [(line, kind)]
+
+
+def test_options_that_are_no_texts_do_not_count(checks: Checks) -> None:
+    assert checks.kinds("say(str(ask('alice', 'How many?', [1, 2]) + 1))") == []
+
+
+def test_an_absence_that_it_saw_counts_and_is_told_in_words(checks: Checks) -> None:
+    found = checks("go_to('kitchen')", "is_in_room('person')", "ask('person', 'Tea?', ['Yes', 'No'])")
+    (problem,) = found.problems
+    assert (problem.kind, problem.line, problem.where) == ("AskNoPerson", 4, 'nobody is in "kitchen"')
+    assert problem.sentence.startswith("line 4: AskNoPerson: ")
+    assert problem.sentence.endswith(problem.where)
+    alone = [s.number for s in found.samples if 'nobody is in "kitchen"' in s.world]
+    assert list(problem.samples) == alone
+    assert 0 < len(alone) < 5
+
+
+def test_an_absence_that_it_never_looked_for_does_not_count(checks: Checks) -> None:
+    lines = ("go_to('kitchen')", "answer = ask('alice', 'Tea?', ['Yes', 'No'])", "pick('cup')", "say(answer)")
+    assert checks.kinds(*lines) == []
+    assert checks.kinds(*lines, strict=True) == [(3, "AskNoPerson"), (4, "PickInvalidObject")]
+
+
+def test_an_error_that_the_program_catches_does_not_count(checks: Checks) -> None:
+    assert checks.kinds("try:", "    go_to('lab')", "except Exception:", "    say('no lab')") == []
+
+
+def test_an_error_after_some_answers_only_is_told_with_them(checks: Checks) -> None:
+    found = checks(
+        "look = is_in_room('mug')",
+        "if ask('', 'Tea?', ['Yes', 'No']) == 'No':",
+        "    place('tea')",
+        samples=12,
+    )
+    (problem,) = found.problems
+    assert re.findall('".+?"', problem.where) == ['"start_loc"', '"Tea?"', '"No"']
+
+
+def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
+    always = next(
+        name
+        for name in map(str, range(10_000))
+        if all(Lot(0, n).is_there("start_loc", name) for n in range(8))
+    )
+    found = checks(
+        f"is_in_room('{always}')",
+        "if ask('', 'Tea?', ['Yes', 'No']) == 'No':",
+        "    place('tea')",
+        samples=8,
+    )
+    assert f'"{always}" is in "start_loc"' in found.samples[0].world
+    (where,) = [problem.where for problem in found.problems]
+    assert re.findall('".+?"', where) == ['"start_loc"', '"Tea?"', '"No"']
+
+
+def test_a_line_is_blamed_once(checks: Checks) -> None:
+    found = checks("say(a, b)", "go_to('lab'); say(c)")
+    assert [(p.line, p.kind) for p in found.problems] == [(2, "NameError"), (3, "NameError")]
+    assert all(name in found.problems[0].message for name in (" a ", " b "))
+    assert '"lab"' in found.problems[1].message
+
+
+def test_a_program_that_does_not_parse_is_not_run(checks: Checks) -> None:
+    assert checks("say(").samples == ()
+
+
+def test_a_program_without_a_task_is_told_so_once(lanes: Lanes) -> None:
+    (problem,) = check("x = 1\n", rooms=ROOMS, lanes=lanes).problems
+    assert (problem.kind, problem.line) == ("NameError", None)
+
+
+def test_the_closest_room_is_named(checks: Checks) -> None:
+    for lines in (["go_to('alices office')"], ["for name in ['Alices']:", "    go_to(name + ' office')"]):
+        (problem,) = checks(*lines).problems
+        assert '"alice\'s office"' in problem.message
+
+
+# --- waiting and searching
+
+
+WAITS = ("go_to('kitchen')", "while not is_in_room('person'):", "    time.sleep(1)", "say('hello')")
+
+
+def test_a_robot_that_waits_is_not_wrong(checks: Checks) -> None:
+    for seed in range(20):
+        found = checks(*WAITS, samples=1, seed=seed)
+        assert found.problems == ()
+        assert found.samples[-1].outcome.status is Status.FINISHED
+        assert all(sample.in_vain for sample in found.samples[:-1])
+
+
+def test_waiting_in_many_places_ends_in_some_world(checks: Checks) -> None:
+    lines = (
+        "for room in ('kitchen', 'alice', 'bob', 'start'):",
+        "    go_to(next(r for r in get_all_rooms() if room in r))",
+        "    while not is_in_room('person'):",
+        "        time.sleep(1)",
+        "    while not is_in_room('mug'):",
+        "        time.sleep(1)",
+    )
+    assert not any(checks(*lines, seed=seed).problems for seed in range(10))
+
+
+def test_what_waits_for_ever_in_every_world_is_told_once(checks: Checks) -> None:
+    found = checks("while is_in_room('mug') or True:", "    time.sleep(1)")
+    assert len(found.samples) == 5 + MORE
+    (problem,) = found.problems
+    assert (problem.kind, problem.line) == ("TimeoutError", 2)
+    assert "25 imagined worlds" in problem.message
+
+
+def test_who_computes_for_ever_does_not_wait(checks: Checks) -> None:
+    found = checks("for room in get_all_rooms():", "    is_in_room(room)", "sum(range(10**12))", samples=2)
+    assert [problem.kind for problem in found.problems] == ["TimeoutError"]
+    assert len(found.samples) == 2
+
+
+def test_waiting_at_several_lines_is_one_problem(checks: Checks) -> None:
+    found = checks(
+        "while not is_in_room('mug'):",
+        "    time.sleep(1)",
+        "while True:",
+        "    time.sleep(1)",
+    )
+    assert len({sample.outcome.line for sample in found.samples}) == 2
+    assert len(found.problems) == 1
+
+
+def test_what_waits_for_ever_without_a_look_is_run_once() -> None:
+    known: dict[Plan, list[Sample]] = {}
+    plan = Plan(ROOMS, ROOMS[0])
+    lane = Lane()
+    try:
+        found = check_on(lane, START + "while True:\n        time.sleep(1)\n", plan, known=known)
+    finally:
+        lane.close()
+    assert len(known[plan]) == 1
+    assert len(found.samples) == 5
+    assert "imagined worlds" not in found.problems[0].message
+
+
+def test_a_search_takes_for_granted_that_there_is_one(checks: Checks) -> None:
+    lines = (
+        "for room in get_all_rooms():",
+        "    go_to(room)",
+        "    if is_in_room('bag'):",
+        "        pick('bag')",
+        "        break",
+        "place('bag')",
+    )
+    for seed in range(10):
+        assert checks(*lines, seed=seed, samples=2).problems == ()
+
+
+def test_a_search_that_goes_on_takes_for_granted_that_there_is_only_one(checks: Checks) -> None:
+    lines = (
+        "for room in get_all_rooms():",
+        "    go_to(room)",
+        "    if is_in_room('bag'):",
+        "        pick('bag')",
+        "place('bag')",
+    )
+    for seed in range(10):
+        assert checks(*lines, rooms=ROOMS[:3], seed=seed, samples=2).problems == ()
+
+
+def test_one_look_is_no_search(checks: Checks) -> None:
+    lines = ("go_to('kitchen')", "if is_in_room('mug'):", "    pick('mug')", "place('mug')")
+    (problem,) = checks(*lines).problems
+    assert (problem.kind, problem.where) == ("PlaceNoObject", '"mug" is not in "kitchen"')
+
+
+# --- rooms
+
+
+def test_rooms_are_guessed_from_the_program(checks: Checks) -> None:
+    found = checks("go_to('lab')", "for n in (1, 2):", "    go_to(f'office {n}')", rooms=None)
+    assert found.problems == ()
+    assert found.rooms_are_guessed
+    assert found.rooms == ("lab", "office 1", "office 2", "start_loc")
+    assert not checks("say('a')").rooms_are_guessed
+
+
+def test_a_program_that_visits_every_room_has_some_to_visit(checks: Checks) -> None:
+    found = checks("for room in get_all_rooms():", "    go_to(room)", rooms=None)
+    assert found.rooms == ("room 1", "room 2", "start_loc")
+    found = checks("for room in get_all_rooms():", "    if room != 'lab':", "        go_to(room)", rooms=None)
+    assert found.rooms == ("lab", "room 1", "room 2", "start_loc")
+
+
+def test_where_the_robot_starts(lanes: Lanes) -> None:
+    source = START + "say(get_current_location())\n"
+
+    def said(rooms: tuple[str, ...], start: str | None = None) -> str:
+        return check(source, rooms=rooms, start=start, lanes=lanes).samples[0].outcome.trace[0].text
+
+    assert said(ROOMS) == "start_loc"
+    assert said(("lab", "start_loc")) == "start_loc"
+    assert said(("lab", "hall")) == "lab"
+    assert said(("lab", "hall"), "hall") == "hall"
+    assert said(()) == "start_loc"
+    assert said((), "hall") == "hall"
+    assert check(source, start="hall", lanes=lanes).plan.start == "hall"
+    with pytest.raises(BadInput, match=r'"hal".* lab, hall$'):
+        said(("lab", "hall"), "hal")
+
+
+def test_a_room_that_is_no_regex_is_refused(lanes: Lanes) -> None:
+    with pytest.raises(BadInput, match=r'"c\+\+ \("'):
+        check(START + "pass", rooms=["c++ ("], lanes=lanes)
+
+
+# --- equal checks
+
+
+LOOKS = (
+    "for room in get_all_rooms():",
+    "    go_to(room)",
+    "    if is_in_room('person'):",
+    "        say(ask('', 'Tea?', ['Yes', 'No', 'Later']))",
+    "        pick(ask('', 'What?', ['mug', 'cup']))",
+)
+
+
+def test_the_number_of_workers_changes_nothing() -> None:
+    source = START + "\n    ".join(LOOKS) + "\n"
+    written = [
+        json.dumps(check(source, rooms=ROOMS, seed=4, workers=workers).data()) for workers in (1, 2, 3)
+    ]
+    assert written[0] == written[1] == written[2]
+    lane = Lane()
+    try:
+        settings = Settings(seed=4)
+        assert json.dumps(check_on(lane, source, Plan(ROOMS, ROOMS[0]), settings).data()) == written[0]
+    finally:
+        lane.close()
+
+
+def test_other_seeds_draw_other_worlds_and_the_same_seed_the_same(checks: Checks) -> None:
+    first, again, other = (checks(*LOOKS, seed=seed).data()["samples"] for seed in (1, 1, 2))
+    assert first == again
+    assert first != other
+
+
+def test_runs_that_are_known_change_nothing() -> None:
+    source = START + "\n    ".join(WAITS) + "\n"
+    known: dict[Plan, list[Sample]] = {}
+    plan = Plan(ROOMS, ROOMS[0])
+    lane = Lane()
+    try:
+        for seed in range(6):
+            alone = check_on(lane, source, plan, Settings(seed=seed))
+            assert check_on(lane, source, plan, Settings(seed=seed), known) == alone
+    finally:
+        lane.close()
+    assert len(known[plan]) == 2
+
+
+def test_data_is_what_json_can_hold(checks: Checks) -> None:
+    data = checks("is_in_room('mug')", "say(a)").data()
+    assert json.loads(json.dumps(data)) == data
+    assert list(data) == [
+        "accepted",
+        "problems",
+        "rooms",
+        "start",
+        "rooms_are_guessed",
+        "seed",
+        "strict",
+        "samples",
+    ]
+    assert not data["accepted"]
+    assert list(data["samples"][0]) == ["sample", "world", "in_vain", "status", "error", "line", "trace"]

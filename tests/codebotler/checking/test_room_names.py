@@ -1,0 +1,105 @@
+import pytest
+
+from codebotler.checking.room_names import fixed_drives, lists_rooms, named_rooms
+
+START = "def task_program():\n    "
+
+
+def rooms(*lines: str) -> tuple[str, ...]:
+    return named_rooms(START + "\n    ".join(lines) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("lines", "named"),
+    [
+        (['go_to("kitchen")', "go_to(location='lab')"], ("kitchen", "lab")),
+        (['room = "kitchen"', "go_to(room)"], ("kitchen",)),
+        (['room: str = "kitchen"', "go_to(room)"], ("kitchen",)),
+        (['for room in ["lab", "hall"]:', "    go_to(room)"], ("lab", "hall")),
+        (
+            ['rooms = ["lab"]', 'rooms += ["hall"]', 'rooms.append("attic")', "go_to(rooms[0])"],
+            ("lab", "hall", "attic"),
+        ),
+        (['for room in sorted({"lab": 1, "hall": 2}):', "    go_to(room)"], ("lab", "hall")),
+        (['for room, who in {"lab": "ann"}.items():', "    go_to(room)"], ("lab",)),
+        (['d = {"lab": "ann"}', "for room, who in d.items():", "    go_to(room)"], ("lab",)),
+        (['for who, room in {"ann": "lab"}.items():', "    go_to(room)"], ("lab",)),
+        (['for who, room in [("ann", "lab"), ("bob", "hall")]:', "    go_to(room)"], ("lab", "hall")),
+        (['for n, room in enumerate(["lab"]):', "    go_to(room)"], ("lab",)),
+        (['for who, room in zip(["ann"], ["lab"]):', "    go_to(room)"], ("lab",)),
+        (['a, b = "lab", "hall"', "go_to(a if is_in_room('x') else b)"], ("lab", "hall")),
+        (
+            [
+                "def visit(room, what):",
+                "    go_to(room)",
+                'visit("lab", "mug")',
+                'visit(what="cup", room="hall")',
+            ],
+            ("lab", "hall"),
+        ),
+        (["for room in get_all_rooms():", '    if "office" in room:', "        go_to(room)"], ("office",)),
+        (
+            [
+                "for room in get_all_rooms():",
+                '    if room.lower().startswith("printer"):',
+                "        go_to(room)",
+            ],
+            ("printer",),
+        ),
+        (['rooms = [r for r in get_all_rooms() if r != "hall"]'], ("hall",)),
+        (['if get_current_location() == "hall":', "    pass"], ("hall",)),
+        (['if "lab" in get_all_rooms():', "    pass"], ("lab",)),
+        (['go_to("b")', 'go_to("a")', 'go_to("b")'], ("b", "a")),
+    ],
+)
+def test_rooms_are_found_where_a_program_names_them(lines: list[str], named: tuple[str, ...]) -> None:
+    assert rooms(*lines) == named
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ['say("kitchen")'],
+        ['answer = ask("ann", "tea?", ["yes"])', 'if answer == "yes":', "    go_to(place)"],
+        ['for name in ["ann", "bob"]:', """    go_to(name + "'s office")"""],
+        ["for i in range(3):", '    go_to(f"room {i}")'],
+        ['go_to("1")'],
+        ["go_to(", "x"],
+    ],
+)
+def test_what_names_no_room_is_left_out(lines: list[str]) -> None:
+    assert rooms(*lines) == ()
+
+
+def test_long_programs_name_a_hundred_rooms_at_most() -> None:
+    assert len(rooms(*(f'go_to("room {number}")' for number in range(300)))) == 100
+
+
+def test_deep_programs_name_none() -> None:
+    assert named_rooms(START + "go_to(" + "-" * 5_000 + "1)\n") == ()
+    assert fixed_drives(START + "x = " + " + ".join(["a"] * 5_000) + "\n") == []
+
+
+def test_drives_that_are_written_out() -> None:
+    source = START + 'go_to("lab")\n    go_to(location="hall")\n    go_to(x)\n'
+    assert fixed_drives(source) == [(2, "lab"), (3, "hall")]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        START + 'if "Lab" in get_all_rooms():\n        go_to("lab")\n',
+        START + 'for room in get_all_rooms():\n        if room == "lab":\n            go_to("lab")\n',
+        "def go_to(x):\n    pass\n" + START + 'go_to("lab")\n',
+        "from mine import *\n" + START + 'go_to("lab")\n',
+        START + 'go_to("lab"\n',
+    ],
+)
+def test_drives_that_may_be_saved_or_mean_something_else_are_no_fixed_ones(source: str) -> None:
+    assert fixed_drives(source) == []
+
+
+def test_whether_it_asks_for_all_rooms() -> None:
+    assert lists_rooms("rooms = get_all_rooms\n")
+    assert not lists_rooms("rooms = ['get_all_rooms()']\n")
+    assert not lists_rooms("get_all_rooms(\n")

@@ -1,0 +1,199 @@
+"""The command line of CodeBotler: its help and version, and how `check` reads, says and ends."""
+
+import json
+import os
+import re
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import command_line
+from codebotler.cli.app import app, obey
+from codebotler.core.terminal import busy
+from command_line import Ended, Refusal, command
+
+GOOD = """def task_program():
+    go_to("kitchen")
+    if is_in_room("mug"):
+        pick("mug")
+        go_to("start_loc")
+        place("mug")
+"""
+BAD = """def task_program():
+    go_to("kitchn")
+    say(mesage)
+    is_in_room("person")
+    ask("person", "Tea?", ["Yes", "No"])
+"""
+WORLD = "robot: start_loc\nrooms: [start_loc, kitchen]\n"
+
+
+def codebotler(*arguments: str | Path, given: str = "") -> Ended:
+    wide = {name: value for name, value in os.environ.items() if name != "COLUMNS"} | {"NO_COLOR": "1"}
+    return command("codebotler", *arguments, given=given, environment=wide)
+
+
+def refused(*arguments: str | Path, given: str = "") -> Refusal:
+    return command_line.refused(*arguments, name="codebotler", given=given)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> Path:
+    for name, text in (("good.py", GOOD), ("bad.py", BAD), ("world.yaml", WORLD)):
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize("arguments", [(), ("--help",)])
+def test_help_lists_the_commands(arguments: tuple[str, ...]) -> None:
+    status, out, err = codebotler(*arguments)
+    assert (status, err) == (0, "")
+    assert out.startswith("Usage: codebotler [OPTIONS] COMMAND [ARGS]...\n")
+    assert re.search(r"^  check +Look for problems", out, re.MULTILINE)
+
+
+def test_the_version() -> None:
+    assert re.fullmatch(r"codebotler \d+\.\d+\.\d+\n", codebotler("--version")[1])
+
+
+def test_what_is_no_command_is_one_sentence() -> None:
+    assert "'dance'" in refused("dance").sentence
+
+
+# --- check
+
+
+def test_an_accepted_program(files: Path) -> None:
+    status, out, err = codebotler("check", files / "good.py", "--world", files / "world.yaml")
+    assert (status, err) == (0, "")
+    first, ran, *rest = out.split("\n")
+    assert first == f"accepted: no problem in {files / 'good.py'}"
+    assert "5 imagined worlds" in ran
+    assert rest[:3] == ["", 'rooms: "start_loc", "kitchen"', ""]
+    assert rest[3].endswith('"mug" is in "kitchen"')
+    assert [line.split() for line in rest[4:6]] == [
+        ["1", "start_loc", "→", "kitchen"],
+        ["2", "looked", "for", '"mug":', "found"],
+    ]
+    assert '5      put down "mug"' in rest
+
+
+def test_a_rejected_program_shows_each_line_to_blame(files: Path) -> None:
+    status, out, err = codebotler("check", files / "bad.py", "--world", files / "world.yaml")
+    assert (status, err) == (1, "")
+    assert out.startswith(f"rejected: 2 problems in {files / 'bad.py'}\n")
+    assert "in every world" in out.splitlines()[1]
+    assert re.search(r'^line 2: GoToInvalidLocation: .*"kitchn".*"kitchen"$', out, re.MULTILINE)
+    assert '\n  1 | def task_program():\n> 2 |     go_to("kitchn")\n  3 |     say(mesage)\n' in out
+    assert re.search(r"^line 3: NameError: .*\bmesage\b", out, re.MULTILINE)
+    assert '"kitchn"  failed: ' in out
+
+
+def test_what_takes_long_says_that_it_goes_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("codebotler.core.terminal.QUIET_S", 0.0)
+    with busy("checking"):
+        time.sleep(0.05)
+    assert capsys.readouterr().err == "checking ...\n"
+
+
+def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
+    status, out, _ = codebotler("check", files / "bad.py")
+    assert status == 1
+    guessed = re.search(r'^rooms, (.+): "kitchn", "start_loc"$', out, re.MULTILINE)
+    assert guessed is not None
+    assert "--world FILE" in out
+    assert guessed[1] not in codebotler("check", files / "good.py", "--world", files / "world.yaml")[1]
+
+
+def test_json_for_machines(files: Path) -> None:
+    arguments = ("check", files / "bad.py", "--json", "--seed", "3", "--samples", "4")
+    status, out, err = codebotler(*arguments)
+    assert (status, err) == (1, "")
+    data = json.loads(out)
+    assert (data["accepted"], data["rooms_are_guessed"], data["seed"]) == (False, True, 3)
+    assert [(p["kind"], p["line"]) for p in data["problems"]] == [("NameError", 3)]
+    assert len(data["samples"]) == 4
+    assert codebotler(*arguments, "--workers", "2")[1] == out
+
+
+def test_the_robot_starts_where_the_world_says(files: Path) -> None:
+    (files / "start.yaml").write_text("robot: hall\nrooms: [lab, hall]\n")
+    (files / "say.py").write_text("def task_program():\n    say(get_current_location())\n")
+    out = codebotler("check", files / "say.py", "--world", files / "start.yaml")[1]
+    assert '1      said "hall"\n' in out
+
+
+def test_a_world_in_which_all_goes_well_is_shown_if_there_is_one(files: Path) -> None:
+    lines = (
+        "def task_program():",
+        '    if ask("", "Tea?", ["Yes", "No"]) == "No":',
+        '        say("oh")',
+        '        place("tea")',
+    )
+    (files / "tea.py").write_text("\n".join(lines))
+    out = codebotler("check", files / "tea.py")[1]
+    assert out.startswith("rejected: 1 problem")
+    assert out.endswith('asked "Tea?" [Yes | No] → Yes\n')
+
+
+def test_strict_and_seed_reach_the_check(files: Path) -> None:
+    (files / "asks.py").write_text('def task_program():\n    ask("", "Tea?", ["Yes", "No"])\n')
+    assert codebotler("check", files / "asks.py")[0] == 0
+    status, out, _ = codebotler("check", files / "asks.py", "--strict", "--samples", "20")
+    assert status == 1
+    assert 'where nobody is in "start_loc"' in out
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [GOOD, f"Sure!\n\n```python\n{GOOD}```\nEnjoy.\n", "    " + GOOD.split("\n", 1)[1].lstrip(" ")],
+)
+def test_standard_input_may_be_a_whole_reply(reply: str) -> None:
+    status, out, _ = codebotler("check", "-", given=reply)
+    assert (status, out.split("\n")[0]) == (0, "accepted: no problem in the program")
+
+
+def test_lines_on_standard_input_are_counted_as_they_stand() -> None:
+    assert "line 5: NameError" in codebotler("check", "-", given="\n\n" + BAD)[1]
+
+
+def test_what_cannot_be_checked_is_refused_in_a_sentence(files: Path) -> None:
+    for path, fault in ((files / "gone.py", "no such file"), (files, "a folder")):
+        refusal = refused("check", path)
+        assert refusal.at == (str(path), None)
+        assert fault in refusal.sentence
+    assert refused("check", "fetch me a mug").sentence.startswith("fetch me a mug: ")
+    assert "- for standard input" in refused("check", "").sentence
+    assert "standard input: " in refused("check", "-", given=" \n").sentence
+    (files / "empty.py").write_text("\n")
+    refusal = refused("check", files / "empty.py")
+    assert refusal.at == (str(files / "empty.py"), None)
+    assert "no program" in refusal.sentence
+    (files / "bytes.py").write_bytes(b"def \xff")
+    assert "UTF-8" in refused("check", files / "bytes.py").sentence
+    assert refused("check", files / "good.py", "--world", files / "no.yaml").file == str(files / "no.yaml")
+    (files / "wrong.yaml").write_text("robot: hall\nrooms: [lab]\n")
+    refusal = refused("check", files / "good.py", "--world", files / "wrong.yaml")
+    assert refusal.at == (str(files / "wrong.yaml"), 1)
+    assert "samples" in refused("check", files / "good.py", "--samples", "0").sentence
+
+
+def test_what_a_terminal_would_obey_is_shown(files: Path) -> None:
+    (files / "odd.py").write_text('def task_program():\n    say("a\x1b[31mb")\n    go_to("\x1b[2J")\n')
+    out = codebotler("check", files / "odd.py", "--world", files / "world.yaml")[1]
+    assert "\x1b" not in out
+    assert "\\x1b[2J" in out
+
+
+def test_windows_is_told_of_wsl_with_the_platform_patched(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(SystemExit) as end:
+        obey(app, "codebotler")
+    assert end.value.code == 1
+    assert re.fullmatch(r"codebotler: .*\bWSL\n", capsys.readouterr().err)

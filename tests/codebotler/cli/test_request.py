@@ -1,0 +1,188 @@
+"""What `codebotler run` asks a robot before it moves, and what it makes of the answers."""
+
+from __future__ import annotations
+
+import re
+import signal
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from codebotler.checking.check import check
+from codebotler.cli.run import Request, written
+from codebotler.cli.run import run as run_mission
+from codebotler.core.world import Room, World
+from codebotler.missions.mission import Mission, State
+from codebotler.missions.preflight import preflight, unknown_rooms
+from codebotler.models.base import Heard, Reply, Usage, unheard
+from codebotler.prompts import Prompt
+from codebotler.robots.base import CancelledError, NotReadyError, Result
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.simulated import Simulated
+from codebotler.simulator.robot import RobotError
+from doubles import Answering, raising
+
+
+def knowing(rooms: object, here: object = "") -> Callable[[str, str], Result]:
+    """Answers of a robot that says which rooms it knows and where it is."""
+    answers = {"get_all_rooms": rooms, "get_current_location": here}
+    return lambda skill, _first: answers.get(skill)  # type: ignore[return-value]  # robots say anything
+
+
+@pytest.mark.parametrize(
+    ("rooms", "here", "named"),
+    [
+        ([1, None, {}], "hall", r"get_all_rooms .*\[1, None, {}\], .*list\[str\]"),
+        ("hall", "hall", r"get_all_rooms .*'hall', .*list\[str\]"),
+        (["hall"], ["hall"], r"get_current_location .*\['hall'\], .*str"),
+        (["hall"], None, r"get_current_location .*None, .*str"),
+    ],
+)
+def test_answer_that_is_none_is_said_before_the_robot_moves(rooms: object, here: object, named: str) -> None:
+    with pytest.raises(NotReadyError, match=named):
+        preflight(Answering(knowing(rooms, here)))
+
+
+def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def answers(skill: str, _first: str) -> Result:
+        if skill == "get_current_location":
+            raise RobotError("GetCurrentLocationFailed", "not localised")
+        return ["hall", "lab"]
+
+    plan, place = preflight(Answering(answers))
+    assert plan is not None
+    assert (plan.rooms, plan.start, place) == (("hall", "lab"), "hall", "")
+    assert re.fullmatch(r"[^\n]*where it is\b[^\n]*: not localised\n", capsys.readouterr().err)
+
+
+def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
+    with pytest.raises(NotReadyError, match=r"rooms .*stopped"):
+        preflight(Answering(raising(CancelledError())))
+
+
+@pytest.mark.parametrize("fault", [None, ImportError("a library failed to import")])
+def test_interrupt_that_a_library_swallows_counts_all_the_same(
+    fault: Exception | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = Answering(knowing(["hall"], "hall"))
+
+    def swallowing() -> None:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        if fault is not None:
+            raise fault
+
+    monkeypatch.setattr(robot, "connect", swallowing)
+    monkeypatch.setattr(robot, "perform", raising(AssertionError("it was asked to do something")))
+    (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        run_mission(robot, Request(str(tmp_path / "go.py"), lambda: Writing(""), yes=True), tmp_path)
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+# --- rooms
+
+LAB = "lab (2nd floor)"
+TO_THE_LAB = f"""def task_program():
+    for room in get_all_rooms():
+        if room == {LAB!r}:
+            go_to(room)
+            say("there")
+    if get_current_location() != {LAB!r}:
+        raise ValueError("elsewhere")
+    go_to("{LAB.upper()}")
+"""
+
+
+@dataclass
+class Writing:
+    """A model that writes one program, and remembers what it was asked."""
+
+    program: str
+    name: str = "writing"
+    asked: list[Prompt] = field(default_factory=list)
+
+    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+        self.asked.append(prompt)
+        heard(self.program)
+        return Reply(self.program, self.program, Usage(1, 1), float(number), "stop")
+
+    async def close(self) -> None: ...
+
+
+def test_check_and_model_see_the_robots_own_words(capsys: pytest.CaptureFixture[str]) -> None:
+    plan, place = preflight(Answering(knowing(["hall", LAB], LAB)))
+    assert plan is not None
+    assert (plan.rooms, plan.start, place) == (("hall", LAB), LAB, LAB)
+    assert check(TO_THE_LAB, plan=plan).problems == ()
+    (unknown,) = unknown_rooms('def task_program():\n    go_to("lab (2nd flor)")\n', plan)
+    assert '"lab (2nd flor)"' in unknown
+    assert f'"{LAB}"' in unknown
+    model = Writing(TO_THE_LAB)
+    assert written(model, "go to the lab", plan) == TO_THE_LAB
+    assert f"hall, {LAB}" in model.asked[0].text
+    assert f"hall, {LAB}" in model.asked[0].messages[-1].text
+    assert capsys.readouterr().err == ""
+    written(Writing('def task_program():\n    go_to("cellar")\n'), "go down", plan)
+    assert '"cellar"' in capsys.readouterr().err
+
+
+def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
+    robot = Simulated(World((Room("hall"), Room("kitchen|cafe")), "hall"), speed=None)
+    robot.connect()
+    plan, _ = preflight(robot)
+    assert plan is not None
+    assert plan.room("the cafe") == "kitchen|cafe"
+
+
+def test_robot_is_where_it_says_even_if_it_does_not_list_that_room(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    plan, place = preflight(Answering(knowing(["hall", "lab"], "dock")))
+    assert plan is not None
+    assert (plan.rooms, plan.start, place) == (("hall", "lab", "dock"), "dock", "dock")
+    assert '"dock"' in capsys.readouterr().err
+    starts_there = 'def task_program():\n    if get_current_location() != "dock":\n        raise ValueError\n'
+    assert check(starts_there, plan=plan).problems == ()
+
+
+def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
+    plan, place = preflight(Answering(knowing(["hall", "lab"])))
+    assert plan is not None
+    assert (plan.start, place) == ("hall", "")
+
+
+def test_more_rooms_than_a_check_takes_are_said(capsys: pytest.CaptureFixture[str]) -> None:
+    rooms = [f"room {number} (of many)" for number in range(100_000)]
+    began = time.monotonic()
+    assert preflight(Answering(knowing(rooms, rooms[7]))) == (None, rooms[7])
+    assert time.monotonic() - began < 2, "that is no more than a look at each"
+    assert re.search(r"\b100,000 rooms\b.*\b1,000\b", capsys.readouterr().err)
+    plan, _ = preflight(Answering(knowing(rooms[:1_000], rooms[7])))
+    assert plan is not None
+    assert len(plan.rooms) == 1_000
+
+
+def test_place_of_a_mission_is_in_the_robots_own_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places: list[str] = []
+
+    def run(mission: Mission, reserved: Reservation, place: str = "") -> State:
+        places.append(place)
+        return real(mission, reserved, place)
+
+    real = Mission.run
+    monkeypatch.setattr(Mission, "run", run)
+    program = tmp_path / "say.py"
+    program.write_text("def task_program():\n    say('hello')\n")
+    request = Request(str(program), lambda: Writing(""), yes=True)
+    assert run_mission(Answering(knowing(["hall", LAB], LAB)), request, tmp_path / "home") == 0
+    assert places == [LAB]

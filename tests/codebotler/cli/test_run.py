@@ -1,0 +1,501 @@
+"""The commands around missions: they check, ask, run, are stopped and killed, and show it all again."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+from codebotler.core.badinput import BadInput
+from codebotler.core.home import home
+from codebotler.models.recorded import recorded_model
+from command_line import Ended, command
+from forked import Forked
+from processes import are_gone, children_of
+from roboeval.suites.load import Suite
+
+GOOD = """def task_program():
+    go_to("kitchen")
+    if is_in_room("mug"):
+        pick("mug")
+        say("I have it")
+"""
+BAD = 'def task_program():\n    go_to("cellar")\n'
+FAR = """def task_program():
+    while True:
+        try:
+            for room in get_all_rooms():
+                go_to(room)
+        except BaseException:
+            pass
+"""
+WORLD = "robot: hall\nrooms: [hall, kitchen, study, lab]\nobjects: {kitchen: [mug]}\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for name, text in (("good.py", GOOD), ("bad.py", BAD), ("far.py", FAR), ("world.yaml", WORLD)):
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def variables(folder: Path) -> dict[str, str]:
+    return {**os.environ, "CODEBOTLER_HOME": str(folder / "home"), "COLUMNS": "100", "NO_COLOR": "1"}
+
+
+Process = Forked | subprocess.Popen[str]
+
+
+def started(folder: Path, *arguments: str | Path, wrapper: Sequence[str] = ()) -> Process:
+    """A command in a process of its own, to which signals can be sent."""
+    if not wrapper:
+        return Forked("codebotler", *arguments, cwd=folder, environment=variables(folder))
+    return subprocess.Popen(
+        [*wrapper, sys.executable, "-m", "codebotler", *map(str, arguments)],
+        cwd=folder,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=variables(folder),
+    )
+
+
+def ended(folder: Path, *arguments: str | Path, given: str = "") -> Ended:
+    return command("codebotler", *arguments, cwd=folder, given=given, environment=variables(folder))
+
+
+def run(folder: Path, *arguments: str | Path, given: str = "") -> Ended:
+    return ended(folder, "run", *arguments, "--world", "world.yaml", "--speed", "0", given=given)
+
+
+def states(folder: Path) -> list[str]:
+    status, out, _ = ended(folder, "missions", "--json")
+    assert status == 0
+    return [mission["state"] for mission in json.loads(out)]
+
+
+def shown(out: str) -> list[str]:
+    """What was printed while the robot worked, without times."""
+    _, _, story = out.partition("running on the robot simulated\n")
+    return [re.sub(r"^ *([\d.]+ s  )?", "", line) for line in story.splitlines()]
+
+
+# --- run
+
+
+def test_program_is_checked_then_run(folder: Path) -> None:
+    status, out, err = run(folder, "good.py", "--yes")
+    assert (status, err) == (0, "")
+    assert out.startswith("accepted: no problem in good.py\n")
+    drives = [line for line in shown(out) if not line.startswith("at (")]
+    assert drives[:6] == [
+        'drives to "kitchen"',
+        'looks for "mug"',
+        "→ found",
+        'picks up "mug"',
+        'says "I have it"',
+        "done",
+    ]
+    assert states(folder) == ["done"]
+
+
+@pytest.mark.parametrize(("answer", "status"), [("y\n", 0), ("Yes\n", 0), ("n\n", 1), ("\n", 1), ("", 1)])
+def test_person_is_asked(folder: Path, answer: str, status: int) -> None:
+    found, out, err = run(folder, "good.py", given=answer)
+    assert found == status
+    assert re.search(r"\bsimulated\b.*\? \[y/N\] ", err)
+    assert ("drives to" in out.partition("running on")[2]) == (status == 0)
+    assert states(folder) == [["done", "stopped"][status]]
+
+
+def test_program_with_problems_is_not_run_without_a_word_about_them(folder: Path) -> None:
+    status, out, err = run(folder, "bad.py", "--yes")
+    assert status == 1
+    assert re.search('line 2: GoToInvalidLocation: .*"cellar"', out)
+    assert "--despite-problems" in err
+    assert "running on" not in out
+    status, out, _ = run(folder, "bad.py", "--yes", "--despite-problems")
+    assert status == 1
+    drives, *said = shown(out)[:3]
+    assert drives == 'drives to "cellar"'
+    assert re.match('GoToInvalidLocation: .*"cellar"', said[0])
+    assert re.match(r'failed .*\bline 2: GoToInvalidLocation: .*"cellar"', said[1])
+    assert states(folder) == ["failed", "failed"]
+
+
+def test_rooms_that_the_robot_does_not_know_are_told_before_it_moves(folder: Path) -> None:
+    (folder / "careful.py").write_text(
+        'def task_program():\n    try:\n        go_to("kitchn")\n    except Exception:\n        say("oh")\n'
+    )
+    status, out, err = run(folder, "careful.py", "--yes")
+    assert status == 0
+    assert re.search('before it moves: .*"kitchn".*"kitchen"', err)
+    assert shown(out)[0] == 'drives to "kitchn"'
+
+
+def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) -> None:
+    task = paper.tasks["StaplerDelivery"]
+    instruction = task.prompts[0]
+    (folder / "world.yaml").write_text(task.scenarios[0].world.to_yaml())
+    status, out, _ = run(folder, instruction, "--yes")
+    assert status == 0
+    assert "accepted: " in out
+    program = "".join(line.removeprefix("    ") for line in out.splitlines(keepends=True)[:40])
+    assert recorded_model("recorded:careful").reply(instruction, 0).program in program
+    status, out, _ = ended(folder, "missions", "last", "--json")
+    mission = json.loads(out)
+    assert (mission["instruction"], mission["model"]) == (instruction, "recorded:careful")
+
+
+def test_program_on_standard_input(folder: Path) -> None:
+    status, out, _ = run(folder, "-", "--yes", given=GOOD)
+    assert (status, "done" in shown(out)) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["none.py", "--yes"], ["none.py: ", "no such file"]),
+        (["-"], ["--yes"]),
+        (["", "--yes"], ["nothing", "asked"]),
+        (["good.py", "--robot", "simm"], ['"simm"', "sim, pyrobosim"]),
+        (["no such thing", "--yes"], ["recorded:careful", '"no such thing"']),
+    ],
+)
+def test_what_cannot_be_run_is_said_in_a_sentence(
+    folder: Path, arguments: list[str], named: list[str]
+) -> None:
+    status, out, err = run(folder, *arguments)
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert all(name in err for name in named), err
+    assert "running" not in states(folder)
+
+
+def test_simulated_robot_needs_a_world(folder: Path) -> None:
+    status, _, err = ended(folder, "run", "good.py", "--yes")
+    assert (status, "--world FILE" in err) == (2, True)
+
+
+def test_feedback_comes_while_the_robot_drives(folder: Path) -> None:
+    process = started(folder, "run", "good.py", "--yes", "--world", "world.yaml", "--speed", "5")
+    with stopping(process):
+        read_until(process, "at (")
+        assert process.poll() is None
+        out, _ = process.communicate(timeout=60)
+    assert "says" in out
+
+
+# --- the stop
+
+
+@contextlib.contextmanager
+def stopping(process: Process) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def read_until(process: Process, text: str) -> str:
+    assert process.stdout is not None
+    lines = ""
+    watchdog = threading.Timer(30, process.kill)
+    watchdog.start()
+    try:
+        for line in process.stdout:
+            lines += line
+            if text in line:
+                return lines
+    finally:
+        watchdog.cancel()
+    raise AssertionError(lines)
+
+
+def driving(folder: Path, *wrapper: str) -> Process:
+    """A tool whose robot is on its way."""
+    arguments = ("far.py", "--yes", "--despite-problems", "--world", "world.yaml", "--speed", "1")
+    process = started(folder, "run", *arguments, wrapper=wrapper)
+    read_until(process, "at (")
+    return process
+
+
+@pytest.mark.parametrize(
+    ("signals", "status"),
+    [([signal.SIGINT], 130), ([signal.SIGINT] * 3, 130), ([signal.SIGTERM], 143), ([signal.SIGHUP], 129)],
+)
+def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: int) -> None:
+    process = driving(folder)
+    with stopping(process):
+        family = children_of(process.pid)
+        for number in signals:
+            process.send_signal(number)
+            time.sleep(0.01)
+        out, err = process.communicate(timeout=30)
+    assert process.returncode == status
+    assert re.search("^.*stopped in the middle", out, re.MULTILINE)
+    assert re.search("robot has stopped", out)
+    assert "Traceback" not in err
+    assert family
+    assert are_gone(family)
+    assert states(folder) == ["stopped"]
+
+
+def test_mission_outlives_its_terminal_with_nohup(folder: Path) -> None:
+    process = driving(folder, "nohup")
+    with stopping(process):
+        process.send_signal(signal.SIGHUP)
+        read_until(process, "at (")
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+    assert process.returncode == 130
+
+
+def test_ctrl_c_at_the_question_ends_it(folder: Path) -> None:
+    process = started(folder, "run", "good.py", "--world", "world.yaml")
+    with stopping(process):
+        assert process.stderr is not None
+        said = ""
+        while not said.endswith("[y/N] ") and (letter := process.stderr.read(1)):
+            said += letter
+        process.send_signal(signal.SIGINT)
+        process.wait(30)
+    assert process.returncode == 130
+    assert states(folder) == ["stopped"]
+
+
+def test_tool_that_is_killed_leaves_a_mission_that_was_interrupted(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        family = children_of(process.pid)
+        process.kill()
+        process.wait(30)
+        assert are_gone(family)
+    status, out, err = run(folder, "good.py", "--yes")
+    assert status == 0
+    assert re.match(r"mission \d{8}-\d{6} .*interrupted.* go_to\(\"\w+\"\) \(at .*simulated.*\n", err)
+    assert states(folder) == ["interrupted", "done"]
+    status, out, err = ended(folder, "missions")
+    assert (status, err) == (0, "")
+    assert "interrupted" in out
+
+
+def test_mission_that_cannot_be_closed_keeps_nobody_from_anything(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        process.kill()
+        process.wait(30)
+    (left,) = (folder / "home" / "missions").iterdir()
+    (left / "mission.json.new").mkdir()  # as if nothing could be written there, also for root
+    status, out, err = ended(folder, "missions")
+    assert (status, err.count("\n")) == (0, 1)
+    assert re.match(rf"mission {left.name} .*interrupted.*closed: {left}", err)
+    assert left.name in out
+    assert ended(folder, "missions", "last", "--json")[0] == 0
+    assert run(folder, "good.py", "--yes")[0] == 0
+
+
+@pytest.mark.parametrize("what", ["home", "home/missions"])
+def test_home_that_is_no_folder_is_said(folder: Path, what: str) -> None:
+    (folder / what).parent.mkdir(exist_ok=True)
+    (folder / what).touch()
+    for arguments in (
+        ["missions"],
+        ["missions", "last"],
+        ["run", "good.py", "--yes", "--world", "world.yaml"],
+    ):
+        status, out, err = ended(folder, *arguments)
+        assert (status, out, err.count("\n")) == (2, "", 1)
+        assert "home/missions: " in err
+        assert "CODEBOTLER_HOME" in err
+
+
+def test_home_that_cannot_be_made_is_said(folder: Path) -> None:
+    words = ("run", "good.py", "--yes", "--world", "world.yaml")
+    process = started(folder, *words, wrapper=["env", "CODEBOTLER_HOME=/sys/home"])
+    _, err = process.communicate("", timeout=60)
+    assert process.returncode == 2
+    assert re.fullmatch(r"codebotler: /sys/home/robots: .*\(.*CODEBOTLER_HOME\n", err)
+
+
+def test_two_tools_on_one_robot(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        status, out, err = run(folder, "good.py", "--yes")
+        assert (status, out) == (1, "")
+        assert f"another tool (process {process.pid}, since " in err
+        assert states(folder) == ["running"]
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=30)
+    assert run(folder, "good.py", "--yes")[0] == 0
+    assert states(folder) == ["stopped", "done"]
+
+
+def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
+    process = driving(folder)
+    with stopping(process):
+        assert process.stdout is not None
+        process.stdout.close()
+        process.stdout = None
+        assert process.wait(30) == 1
+    assert states(folder) == ["failed"]
+
+
+@pytest.mark.parametrize(("closed", "status"), [("0<&-", 1), ("1>&-", 0), ("2>&-", 0), ("0<&- 1>&- 2>&-", 1)])
+def test_closed_stream_leads_nowhere(folder: Path, closed: str, status: int) -> None:
+    arguments = ("run", "good.py", "--world", "world.yaml", "--speed", "0")
+    process = started(folder, *arguments, wrapper=("sh", "-c", f'exec "$0" "$@" {closed}'))
+    _, err = process.communicate("y\n", timeout=60)
+    assert process.returncode == status
+    assert "Traceback" not in err
+    assert states(folder) == [["done", "stopped"][status]]
+
+
+def test_home_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("CODEBOTLER_HOME", "XDG_STATE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(os, "getuid", lambda: 2**31 - 7)
+    with pytest.raises(BadInput, match="CODEBOTLER_HOME"):
+        home()
+
+
+# --- missions, robots
+
+
+def test_missions_are_listed_and_shown(folder: Path) -> None:
+    status, out, err = ended(folder, "missions")
+    assert (status, "no missions" in out, err) == (0, True, "")
+    assert ended(folder, "missions", "--json") == (0, "[]\n", "")
+    run(folder, "good.py", "--yes")
+    _, out, _ = ended(folder, "missions")
+    (line,) = out.splitlines()
+    name, state, robot, *_ = line.split()
+    assert (state, robot) == ("done", "simulated")
+    status, out, _ = ended(folder, "missions", name)
+    assert status == 0
+    assert 'go_to("kitchen")' in out
+    assert 'picks up "mug"' in out
+    _, out, _ = ended(folder, "missions", name, "--json")
+    data = json.loads(out)
+    assert (data["id"], data["events"][-1]["state"]) == (name, "done")
+
+
+@pytest.mark.parametrize("named", ["home", "my state/of 'missions' that has a long name"])
+def test_command_that_shows_it_again_can_be_pasted(folder: Path, named: str) -> None:
+    installed = folder / ".venv" / "bin" / "codebotler"
+    installed.parent.mkdir(parents=True)
+    installed.write_text(f"#!{sys.executable}\nfrom codebotler.cli.app import main\nmain()\n")
+    installed.chmod(0o755)
+    without = {name: value for name, value in os.environ.items() if name != "CODEBOTLER_HOME"}
+    without["PATH"] = os.defpath
+
+    def typed(line: str, **more: str) -> str:
+        environment = {**without, "COLUMNS": "60", **more}
+        return subprocess.run(
+            ["bash", "-c", line], cwd=folder, env=environment, text=True, capture_output=True, check=True
+        ).stdout
+
+    run = ".venv/bin/codebotler run good.py --world world.yaml --speed 0 --yes"
+    *_, last = typed(run, CODEBOTLER_HOME=named).splitlines()
+    again = re.search("`(.*)`", last)
+    assert again is not None, last
+    assert 'picks up "mug"' in typed(again[1])
+
+
+@pytest.mark.parametrize("seconds", ["1e300", "999_999.94", "1_000_000", "5"])
+def test_times_take_little_room_however_long_a_program_sleeps(folder: Path, seconds: str) -> None:
+    (folder / "long.py").write_text(f"def task_program():\n    time.sleep({seconds})\n    say('late')\n")
+    status, out, _ = run(folder, "long.py", "--yes", "--despite-problems")
+    assert status == 0
+    (line,) = (line for line in out.splitlines() if line.endswith('says "late"'))
+    time = f"{float(seconds):.1f}" if float(seconds) < 1e6 else f"{float(seconds):.1e}"
+    assert line == f'{time:>8} s  says "late"'
+    _, out, _ = ended(folder, "missions", "last")
+    assert max(map(len, out.splitlines())) < 100
+    assert f"{time} s" in out
+
+
+def test_long_lines_of_programs_are_shown_whole(folder: Path) -> None:
+    line = f"    say({'long ' * 40!r})"
+    (folder / "long.py").write_text(f"def task_program():\n{line}\n")
+    run(folder, "long.py", "--yes")
+    assert f"    {line}\n" in ended(folder, "missions", "last")[1]
+
+
+def test_mission_is_written_as_mcap(folder: Path) -> None:
+    run(folder, "good.py", "--yes")
+    for clock in ("wall", "robot"):
+        status, out, err = ended(folder, "missions", "last", "--mcap", "one.mcap", "--clock", clock)
+        assert (status, out) == (0, "")
+        assert err.startswith("wrote ")
+        with (folder / "one.mcap").open("rb") as file:
+            topics = {channel.topic for _, channel, _ in make_reader(file).iter_messages()}
+        assert topics == {"/mission/state", "/skill/go_to", "/skill/is_in_room", "/skill/pick", "/skill/say"}
+
+
+def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:
+    run(folder, "good.py", "--yes")
+    status, _, err = ended(folder, "missions", "last", "--mcap", "/nowhere/one.mcap")
+    assert (status, err) == (2, "codebotler: /nowhere/one.mcap: No such file or directory\n")
+    program = (folder / "good.py").read_bytes()
+    status, _, err = ended(folder, "missions", "last", "--mcap", "good.py")
+    assert status == 2
+    assert err.startswith(f"codebotler: {folder / 'good.py'}: ")
+    assert "something else" in err
+    assert (folder / "good.py").read_bytes() == program
+
+
+def test_mission_tells_each_state_once(folder: Path) -> None:
+    run(folder, "good.py", "--yes")
+    _, out, _ = ended(folder, "missions", "last")
+    assert out.count("drafting") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["none"], ['"none"', "`CODEBOTLER_HOME="]),
+        (["--mcap", "x.mcap"], ["--mcap", "`last`"]),
+        (["last", "--mcap", "x.mcap"], ['"last"']),
+        (["last", "--clock", "sun"], ['"sun"', "wall or robot"]),
+    ],
+)
+def test_what_missions_cannot_show_is_said_in_a_sentence(
+    folder: Path, arguments: list[str], named: list[str]
+) -> None:
+    status, out, err = ended(folder, "missions", *arguments)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert all(name in err for name in named), err
+    assert not (folder / "x.mcap").exists()
+
+
+def test_robots_are_listed_with_what_is_missing(folder: Path) -> None:
+    status, out, err = ended(folder, "robots")
+    assert (status, err) == (0, "")
+    assert re.search(r"^sim +works", out, re.MULTILINE)
+    _, out, _ = ended(folder, "robots", "--json")
+    kinds = json.loads(out)
+    assert [kind["name"] for kind in kinds] == ["sim", "pyrobosim", "ros1", "rosbridge", "ros2"]
+    assert all(kind["works"] or kind["missing"] for kind in kinds)
+
+
+def test_robots_are_judged_by_the_python_that_is_named(folder: Path) -> None:
+    status, out, err = ended(folder, "robots", "--json", "--ros-python", sys.executable)
+    assert (status, err) == (0, "")
+    missing = {kind["name"]: kind["missing"] for kind in json.loads(out)}
+    for name, package in (("ros1", "rospy"), ("ros2", "rclpy")):
+        assert sys.executable in missing[name]
+        assert package in missing[name]

@@ -1,0 +1,221 @@
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel, ConfigDict, Field
+
+from codebotler.core.badinput import MAX_BYTES, BadInput, YamlFile, read_text, text_of
+
+
+class Inner(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    name: str
+    size: int = Field(default=1, ge=1)
+
+
+class Outer(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    inner: Inner
+    many: list[Inner] = []
+    words: dict[str, str] = {}
+
+
+def error_about(text: str) -> BadInput:
+    with pytest.raises(BadInput) as caught:
+        YamlFile(text, "w.yaml").validate(Outer)
+    assert caught.value.file == "w.yaml"
+    return caught.value
+
+
+def test_error_names_the_file_and_the_line_where_there_are_any() -> None:
+    assert str(BadInput("is wrong")) == "is wrong"
+    assert str(BadInput("is wrong", file="a.yaml")) == "a.yaml: is wrong"
+    assert str(BadInput("is wrong", file=Path("a.yaml"), line=3)) == "a.yaml, line 3: is wrong"
+
+
+def too_large(first: str, last: str) -> list[str]:
+    return [f'"{first} ... {last}"', "too large"]
+
+
+TWICE = "second time"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "named"),
+    [
+        ("inner: [a\nmany: []\n", 2, ["YAML", "did not find expected ',' or ']'"]),
+        ("inner:\n  name: a: b\n", 2, ["YAML", "mapping values are not allowed", '": "']),
+        ("inner:\n\tname: a\n", 2, ["YAML", "cannot start any token", "spaces"]),
+        ("a: 1\n---\nb: 2\n", 2, ["YAML", "found another document"]),
+        ("inner: *a\n", 1, ["YAML", "undefined alias"]),
+        ("a: \x07\n", 1, ["U+0007"]),
+        ("a: 1\nb: !!python/name:os.system 3\n", 2, ['tag "python/name:os.system"']),
+        ("a: 1\n{b: 1}: 2\n", 2, ["key", "no text"]),
+        ("a: 1\nb: x\ud800\n", 2, ["U+D800"]),
+        ("a: 1\ninner: 2001-13-01\n", 2, ['"2001-13-01"', "a date"]),
+        ("a: 1\n0b_: 1\n", 2, ['"0b_"', "a whole number"]),
+        ("inner: !!bool x\n", 1, ['"x"', "true or false"]),
+        ("inner: !!timestamp x\n", 1, ['"x"', "a date"]),
+        (f"a: 1\nb: {'9' * 5000}\n", 2, too_large("9" * 20, "9" * 20)),
+        (f"a: 1\nb: {'9' * 400}\n", 2, too_large("9" * 20, "9" * 20)),
+        (f"a: 1\nb: 0x{'f' * 5000}\n", 2, too_large("0x" + "f" * 18, "f" * 20)),
+        ("a: 1\nb: !!set {x}\n", 2, ['tag "set"']),
+        ("a: 1\n!!set b: x\n", 2, ['tag "set"']),
+        ("a: =\n", 1, ['"="', "quotes"]),
+        ("inner: {a: 1\n\n\n", 3, ["YAML", "did not find expected ',' or '}'"]),
+        ("inner: 1\nmany: 2\ninner: 3\n", 3, ['"inner"', TWICE]),
+        ("1: a\n2: b\n'1': c\n", 3, ['"1"', TWICE]),
+        ("words:\n  a: x\n  b: y\n  a: z\n", 4, ['"a"', TWICE]),
+        ("inner:\n  <<: {name: a}\n", 2, ['"<<"']),
+    ],
+)
+def test_what_is_no_yaml_is_told_in_a_sentence_with_the_line(text: str, line: int, named: list[str]) -> None:
+    error = error_about(text)
+    assert error.line == line
+    assert all(name in error.sentence for name in named), error
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "named"),
+    [
+        ("", None, ["the file", "empty"]),
+        ("# nothing\n", None, ["the file", "empty"]),
+        ("- a\n", 1, ["the file", "a list", "a mapping"]),
+        ("hello\n", 1, ["the file", "a text", "a mapping"]),
+        ("many: []\n", 1, ['"inner"', "missing"]),
+        ("many: []\ninner: {size: 1}\n", 2, ['"name"', "missing"]),
+        ("inner: {name: a}\nmani: []\n", 2, ['"mani"', "spelling"]),
+        ("inner: {name: a}\n3: []\n", 2, ["this key", "no text"]),
+        ("inner:\n  name: 7\n", 2, ['"name"', "a number", "a text", "quotes"]),
+        ("inner:\n  name: 1.5\n", 2, ['"name"', "a number", "a text", "quotes"]),
+        ("inner:\n  name: 2001-01-01\n", 2, ['"name"', "a date", "a text", "quotes"]),
+        ("inner:\n  name: yes\n", 2, ['"name"', "a truth value", "a text", '("yes")']),
+        ("inner:\n  name: off\n", 2, ['"name"', "a truth value", "a text", '("no")']),
+        ("inner:\n  name:\n", 2, ['"name"', "empty"]),
+        ("inner:\n  name: [a]\n", 2, ['"name"', "a list", "a text"]),
+        ("inner:\n  name: {a: 1}\n", 2, ['"name"', "a mapping", "a text"]),
+        ("inner: {name: a}\nmany:\n  - {name: b}\n  - c\n", 4, ["this entry", "a text", "a mapping"]),
+        ("inner: {name: a}\nmany: b\n", 2, ['"many"', "a text", "a list"]),
+        ("inner:\n  name: a\n  size: 0\n", 3, ['"size"', " 0,", " 1"]),
+        ("inner: {name: a}\nwords:\n  b: x\n  4: y\n", 4, ["this key", "a number", "a text", "quotes"]),
+    ],
+)
+def test_what_has_another_form_is_told_in_a_sentence_with_line_and_mend(
+    text: str, line: int | None, named: list[str]
+) -> None:
+    error = error_about(text)
+    assert error.line == line
+    assert all(name in error.sentence for name in named), error
+
+
+BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 12)
+)
+
+
+DEEP = "more than 50 deep"
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        pytest.param("a: 1\ninner: " + "[" * 60 + "]" * 60, 2, id="lists"),
+        pytest.param("a: 1\ninner: " + "{a: " * 60 + "1" + "}" * 60, 2, id="mappings"),
+        pytest.param("".join(" " * depth + "a:\n" for depth in range(60)), 50, id="indented"),
+        pytest.param("a: 1\ninner: &a [*a]\n", 2, id="a list within itself"),
+        pytest.param("&a\ninner: *a\n", 1, id="a mapping within itself"),
+    ],
+)
+def test_yaml_that_is_nested_too_deeply_is_refused_in_a_sentence(text: str, line: int) -> None:
+    error = error_about(text)
+    assert error.line == line
+    assert DEEP in error.sentence
+
+
+def test_anchors_that_explode_are_refused_in_a_sentence() -> None:
+    error = error_about(f"a: 1\n{BOMB}")
+    assert error.line == 2
+    assert "100,000 entries" in error.sentence
+
+
+def test_a_sentence_is_short_and_one_line() -> None:
+    error = BadInput("a\nb" + "c" * 10_000, file="a.yaml", line=1)
+    assert str(error) == "a.yaml, line 1: a b" + "c" * 297 + " ... " + "c" * 300
+
+
+def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpreter() -> None:
+    code = (
+        "from codebotler.core.badinput import YamlFile, BadInput\n"
+        "try:\n"
+        "    YamlFile('[' * 1_000_000, 'w.yaml')\n"
+        "except BadInput as error:\n"
+        "    print(error)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout.count("\n")) == (0, 1), ended
+    assert ended.stdout.startswith("w.yaml, line 1: ")
+    assert DEEP in ended.stdout
+
+
+def test_anchors_that_repeat_a_little_are_fine() -> None:
+    file = YamlFile("inner: &a {name: b}\nmany: [*a, *a]\n", "w.yaml")
+    assert file.validate(Outer).many == [Inner(name="b"), Inner(name="b")]
+
+
+def test_every_place_has_its_line_and_an_unknown_one_that_of_what_is_around_it() -> None:
+    file = YamlFile("inner:\n  name: a\nmany:\n  - name: b\n\n  - name: c\n", "w.yaml")
+    assert [file.line(place) for place in ((), ("inner",), ("inner", "name"), ("many", 1, "name"))] == [
+        1, 1, 2, 6,
+    ]  # fmt: skip
+    assert file.line(("many", 1, "size", 3)) == 6
+    assert file.line(("elsewhere",)) == 1
+    assert YamlFile("", "w.yaml").line(("elsewhere",)) is None
+    assert str(file.wrong("is odd", "many", 0)) == "w.yaml, line 4: is odd"
+
+
+def test_part_of_a_file_is_validated_where_it_stands() -> None:
+    file = YamlFile("- {name: a}\n- {name: 3}\n", "w.yaml")
+    assert isinstance(file.data, list)
+    assert file.validate(Inner, file.data[0], at=(0,)) == Inner(name="a")
+    with pytest.raises(BadInput, match='"name"') as error:
+        file.validate(Inner, file.data[1], at=(1,))
+    assert (error.value.file, error.value.line) == ("w.yaml", 2)
+
+
+def test_byte_order_mark_is_no_part_of_the_text() -> None:
+    assert text_of(b"\xef\xbb\xbfdef f(): ...\r\n", "f.py") == "def f(): ...\n"
+
+
+def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_path: Path) -> None:
+    def refused(path: Path, fault: str, line: int | None = None) -> None:
+        with pytest.raises(BadInput, match=re.escape(fault)) as caught:
+            YamlFile.read(path)
+        assert (caught.value.file, caught.value.line) == (path, line)
+
+    missing, latin, large = tmp_path / "no.yaml", tmp_path / "latin.yaml", tmp_path / "large.yaml"
+    latin.write_bytes("a: 1\nb: café\n".encode("latin-1"))
+    large.write_bytes(b"a" * (MAX_BYTES + 1))
+    refused(missing, "no such file")
+    refused(tmp_path, "a folder")
+    refused(latin, "UTF-8", 2)
+    refused(large, "5,000,000 bytes")
+    refused(missing / "inside", "no such file")
+    refused(latin / "inside", "(Not a directory)")
+
+
+def test_file_without_an_end_is_too_large_instead_of_being_read_for_ever() -> None:
+    with pytest.raises(BadInput, match=r"/dev/zero: .*\b10 bytes"):
+        read_text(Path("/dev/zero"), limit=10)
+
+
+def test_line_ends_of_every_system_are_read_as_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_bytes("ä\r\nb\rc\n".encode())
+    assert read_text(path) == "ä\nb\nc\n"
+    assert read_text(path, limit=8) == "ä\nb\nc\n"
+    with pytest.raises(BadInput, match="7 bytes"):
+        read_text(path, limit=7)

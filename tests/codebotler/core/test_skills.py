@@ -1,0 +1,83 @@
+import inspect
+
+import pytest
+
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill, SkillTable
+from codebotler.simulator.robot import BEHAVIOURS
+
+
+def test_eight_skills_stand_as_the_paper_writes_them() -> None:
+    assert [skill.signature for skill in SKILLS.values()] == [
+        "get_current_location() -> str",
+        "get_all_rooms() -> list[str]",
+        "is_in_room(entity: str) -> bool",
+        "go_to(location: str) -> None",
+        "ask(person: str, question: str, options: list[str]) -> str",
+        "say(message: str) -> None",
+        "pick(obj: str) -> None",
+        "place(obj: str) -> None",
+    ]
+
+
+def test_trace_holds_six_kinds_of_events() -> None:
+    assert {kind: (row.text, row.options) for kind, row in SKILLS.recordings.items()} == {
+        "check": ("entity", None),
+        "goto": ("location", None),
+        "ask": ("question", "options"),
+        "say": ("message", None),
+        "pick": ("obj", None),
+        "place": ("obj", None),
+    }
+
+
+def test_texts_and_options_of_events_are_parameters_of_their_skills() -> None:
+    for skill in SKILLS.values():
+        if skill.recording is not None:
+            types = {parameter.name: parameter.type for parameter in skill.parameters}
+            assert types[skill.recording.text] is str
+            assert skill.recording.options is None or types[skill.recording.options] is list
+
+
+def test_every_skill_travels_as_a_ros_action_with_one_goal_field_a_parameter() -> None:
+    for skill in SKILLS.values():
+        assert skill.ros is not None
+        assert [field.split()[-1] for field in skill.ros.goal] == [
+            {"entity": "object"}.get(p.name, p.name) for p in skill.parameters
+        ]
+        assert (skill.ros.result is None) == (skill.returns == "None")
+        assert skill.ros.server == f"/{skill.name}_server"
+
+
+def test_behaviours_take_what_the_table_says() -> None:
+    for skill in SKILLS.values():
+        assert len(inspect.signature(BEHAVIOURS[skill.name]).parameters) == 1 + len(skill.parameters)
+
+
+WAVE = Skill("wave", (Parameter("person"),), "None", "Wave.", Recording("wave", "person"))
+
+
+def test_one_more_skill_makes_a_longer_table_and_leaves_the_old_one() -> None:
+    more = SKILLS.with_skill(WAVE)
+    assert list(more) == [*SKILLS, "wave"]
+    assert more["wave"] is WAVE
+    assert (len(more), len(SKILLS)) == (9, 8)
+    assert more != SKILLS
+    assert more == SKILLS.with_skill(WAVE)
+    assert hash(more) == hash(SKILLS.with_skill(WAVE))
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        Skill("say", (), "None", "Another skill of that name."),
+        Skill("shout", (Parameter("text"),), "None", "Another of that kind.", Recording("say", "text")),
+    ],
+)
+def test_two_skills_share_neither_a_name_nor_a_kind_of_event(row: Skill) -> None:
+    with pytest.raises(ValueError, match="two skills"):
+        SKILLS.with_skill(row)
+
+
+def test_table_knows_only_its_rows() -> None:
+    with pytest.raises(KeyError):
+        SkillTable((WAVE,))["say"]

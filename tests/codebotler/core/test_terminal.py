@@ -1,0 +1,163 @@
+"""What others wrote reaches a terminal as text alone, whatever prints it."""
+
+from __future__ import annotations
+
+import ast
+import io
+import logging
+import sys
+import threading
+import warnings
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+
+import pytest
+import typer
+from rich.text import Text
+
+import codebotler
+import roboeval
+from codebotler.cli.app import app, obey
+from codebotler.core import terminal
+from codebotler.core.badinput import BadInput
+from codebotler.models.base import ModelError
+
+EVIL = "a\x1b]0;owned\x07\x1b[2J\x9b31m\u202eb\tc\x7f"
+SHOWN = ("a\\x1b]0;owned", "\\x1b[2J\\x9b31m\\u202eb")
+
+LIBRARIES = {"click", "logging", "rich", "typer"}
+PRINTS = {"print", "echo", "secho", "confirm", "prompt", "StreamHandler", "basicConfig"} | {
+    "Console",
+    "get_console",
+    "Live",
+    "Progress",
+    "Prompt",
+    "Status",
+    "track",
+}
+STREAMS = {"stdout", "stderr", "__stdout__", "__stderr__"}
+SOURCE = [Path(package.__file__ or "").parent for package in (codebotler, roboeval)]
+WRITER = Path(terminal.__file__ or "")
+CHILDREN = {"surroundings.py", "bridge_guard.py", "ros1_worker.py", "ros2_worker.py"}
+"""Programs of their own, whose output we read."""
+
+
+def refuse(error: Exception) -> None:
+    commands = typer.Typer()
+
+    @commands.command()
+    def refused() -> None:
+        raise error
+
+    with pytest.raises(SystemExit):
+        obey(commands, "codebotler")
+
+
+def busy(text: str) -> None:
+    with terminal.busy(text):
+        terminal.note(text)
+
+
+def fail(text: str) -> None:
+    raise ValueError(text)
+
+
+def fail_in_a_thread(text: str) -> None:
+    thread = threading.Thread(target=fail, args=(text,))
+    thread.start()
+    thread.join()
+
+
+WAYS: dict[str, Callable[[str], object]] = {
+    "a text": terminal.print_text,
+    "a program": terminal.print_source,
+    "a note": terminal.note,
+    "a question": terminal.says_yes,
+    "a drawing": lambda text: terminal.print_rich(Text(text)),
+    "a line": lambda text: terminal.console(highlight=False).print(text, markup=False),
+    "what goes on": busy,
+    "a refusal": lambda text: refuse(BadInput(text)),
+    "a model's error": lambda text: refuse(ModelError(text, may_pass=False)),
+    "a file's name": lambda text: refuse(FileNotFoundError(2, "No such file", text)),
+    "a log": lambda text: logging.getLogger("anybody").warning(text),
+    "a warning": lambda text: warnings.warn(text, stacklevel=1),
+    "a bug": fail,
+    "a bug in a thread": fail_in_a_thread,
+}
+
+
+@pytest.mark.parametrize("is_terminal", [True, False])
+@pytest.mark.parametrize("way", WAYS)
+def test_a_terminal_obeys_nothing_that_others_wrote(
+    way: str, *, is_terminal: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(logging.root, "handlers", [])
+    monkeypatch.setattr(sys, "argv", ["codebotler"])
+    monkeypatch.setattr(sys, "stdin", io.StringIO())
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "200")
+    for stream in (sys.stdout, sys.stderr):
+        monkeypatch.setattr(stream, "isatty", lambda: is_terminal)
+    ends = pytest.raises(SystemExit) if way == "a bug" else nullcontext()
+    with warnings.catch_warnings(), ends:
+        warnings.simplefilter("always")
+        with terminal.noting_all():
+            WAYS[way](EVIL)
+    out = "".join(capsys.readouterr())
+    if way == "a program" and not is_terminal:
+        assert out == EVIL + "\n"
+        return
+    assert all(piece in out for piece in SHOWN)
+    assert not any(obeyed in out for obeyed in ("\x07", "\x9b", "\u202e", "\x7f", "\x1b]", "\x1b[2J"))
+
+
+def test_a_room_of_a_world_is_named_as_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    world, program = tmp_path / "world.yaml", tmp_path / "program.py"
+    world.write_text('robot: "lob\\e]0;owned\\aby"\nrooms: [kitchen]\n')
+    program.write_text('def task_program():\n    go_to("kitchen")\n')
+    monkeypatch.setattr(sys, "argv", ["codebotler", "check", str(program), "--world", str(world)])
+    with pytest.raises(SystemExit) as end:
+        obey(app, "codebotler")
+    assert end.value.code == 2
+    assert "lob\\x1b]0;owned\\x07by" in capsys.readouterr().err
+
+
+def passed_by(path: Path) -> list[str]:
+    """Where a module prints, draws, or takes the standard output or error for itself."""
+    tree = ast.parse(path.read_text())
+    imported = {
+        alias.asname or alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in LIBRARIES
+        for alias in node.names
+    }
+    found = []
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Name(id="print" | "input" as name)):
+                pass
+            case ast.Call(func=ast.Name(id=name)) if name in PRINTS & imported:
+                pass
+            case ast.Call(func=ast.Attribute(value=ast.Name(id=library), attr=name)) if (
+                library in LIBRARIES and name in PRINTS
+            ):
+                pass
+            case ast.Attribute(value=ast.Name(id="sys"), attr=name) if name in STREAMS:
+                pass
+            case ast.ImportFrom(module="sys", names=[*_, ast.alias(name=name)]) if name in STREAMS:
+                pass
+            case _:
+                continue
+        found.append(f"{path.name}, line {node.lineno}: {name}")
+    return found
+
+
+def test_one_module_alone_writes_to_the_terminal() -> None:
+    modules = [path for source in SOURCE for path in source.rglob("*.py")]
+    ours = [path for path in modules if path != WRITER and path.name not in CHILDREN]
+    assert len(ours) > 200
+    assert [place for path in ours for place in passed_by(path)] == []
+    assert passed_by(WRITER)

@@ -1,0 +1,319 @@
+import re
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from codebotler.core.badinput import BadInput, YamlFile
+from codebotler.core.world import HALLWAY, Person, Room, World, WorldFile, laid_out
+
+GOOD = "robot: hall\nrooms:\n  - hall\n  - lab\n"
+FULL = """\
+about: second floor, after lunch
+robot: start_loc
+rooms:
+  - start_loc
+  - alice's office
+  - {name: kitchen, footprint: [[6, 0], [9, 0], [9, 4], [6, 4]], stand_at: [7.5, 1]}
+objects: {kitchen: [mug, bottle of water]}
+people: {alice's office: [{name: alice, answers: ["yes", tea]}, {name: .*}]}
+may_wait_forever: true
+"""
+
+
+def read(text: str) -> World:
+    file = YamlFile(text, "w.yaml")
+    return file.validate(WorldFile).world(file)
+
+
+def test_world_file_holds_all_that_a_world_is(tmp_path: Path) -> None:
+    path = tmp_path / "w.yaml"
+    path.write_text(FULL, encoding="utf-8")
+    assert World.read(path) == World(
+        about="second floor, after lunch",
+        robot="start_loc",
+        rooms=(
+            Room("start_loc"),
+            Room("alice's office", people=(Person("alice", ("yes", "tea")), Person(".*"))),
+            Room(
+                "kitchen",
+                objects=("mug", "bottle of water"),
+                footprint=((6, 0), (9, 0), (9, 4), (6, 4)),
+                stand_at=(7.5, 1),
+            ),
+        ),
+        may_wait_forever=True,
+    )
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e5])
+def test_a_point_on_a_slanted_edge_is_within(shift: float) -> None:
+    room = "{{name: a, footprint: [[{0}, 0], [{1}, 0.3], [{0}, 3]], stand_at: [{2}, {3}]}}"
+    room = f"robot: a\nrooms: [{room}]\n"
+    ends = shift, shift + 0.7
+    assert read(room.format(*ends, shift + 0.7 / 3, 0.1)).rooms[0].stand_at
+    assert read(room.format(*ends, shift + 0.7, 0.3)).rooms[0].stand_at
+    with pytest.raises(BadInput, match="outside"):
+        read(room.format(*ends, shift + 0.7 / 3 + 0.001, 0.1))
+
+
+def test_only_the_rooms_and_the_start_are_needed() -> None:
+    assert read("robot: a\nrooms: [a]\n") == World((Room("a"),), "a", about="", may_wait_forever=False)
+
+
+def word(name: str, quoted: str) -> list[str]:
+    return [name, "truth value", f'("{quoted}")']
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "named"),
+    [
+        (GOOD + "robots: 3\n", 5, ['"robots"']),
+        ("rooms: [hall]\n", 1, ['"robot"', "missing"]),
+        ("about: x\nrobot: hall\n", 1, ['"rooms"', "missing"]),
+        ("robot: 3\nrooms: [hall]\n", 1, ['"robot"', "a number", "a text", "quotes"]),
+        ("robot:\nrooms: [hall]\n", 1, ['"robot"', "empty"]),
+        ("rooms: [hall]\nrobot: [hall]\n", 2, ['"robot"', "a list", "a text"]),
+        ("robot: ''\nrooms: [hall]\n", 1, ['"robot"', "empty", "a text"]),
+        (GOOD + "about: no\n", 5, word('"about"', "no")),
+        ("robot: yes\nrooms: [hall]\n", 1, word('"robot"', "yes")),
+        ("robot: hall\nrooms: hall\n", 2, ['"rooms"', "a text", "a list"]),
+        ("robot: hall\nrooms: {hall: 1}\n", 2, ['"rooms"', "a mapping", "a list"]),
+        ("robot: hall\nrooms: []\n", 2, ['"rooms"', "too few", "1"]),
+        (GOOD + "  - on\n", 5, word("this entry", "yes")),
+        (GOOD + "  - 12\n", 5, ["this entry", "a number", "a text", "quotes"]),
+        (GOOD + "  -\n", 5, ["this entry", "empty"]),
+        (GOOD + "  - ''\n", 5, ["this entry", "empty", "a text"]),
+        (GOOD + "  - [a, b]\n", 5, ["this entry", "a list", "a text"]),
+        (GOOD + "  - {name: a, colour: red}\n", 5, ['"colour"']),
+        (GOOD + "  - {stand_at: [1, 2]}\n", 5, ['"name"', "missing"]),
+        (GOOD + "  - {name: no}\n", 5, word('"name"', "no")),
+        (
+            GOOD + "  - name: a\n    footprint: [[0, 0], [1, 0]]\n",
+            6,
+            ['"footprint"', "too few", "3"],
+        ),
+        (
+            GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, 0, 2]\n      - [1, 1]\n",
+            8,
+            ["this entry", "too many", "2"],
+        ),
+        (
+            GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, 0]\n      - [1]\n",
+            9,
+            ["this entry", "too few", "2"],
+        ),
+        (
+            GOOD + "  - name: a\n    footprint:\n      - [0, 0]\n      - [1, b]\n      - [1, 1]\n",
+            8,
+            ["this entry", "a text", "a number"],
+        ),
+        (GOOD + "  - name: a\n    footprint: big\n", 6, ['"footprint"', "a text", "a list"]),
+        (GOOD + "  - {name: a, stand_at: [1, .nan]}\n", 5, ["this entry", "finite"]),
+        (GOOD + "  - {name: a, stand_at: [-.inf, 1]}\n", 5, ["this entry", "finite"]),
+        (GOOD + "  - {name: a, stand_at: [1.0e+300, 1]}\n", 5, ["this entry", "1e+300", "1000000"]),
+        (
+            GOOD + f"  - {{name: a, stand_at: [1, {'7' * 400}]}}\n",
+            5,
+            [f'"{"7" * 20} ... {"7" * 20}"', "too large"],
+        ),
+        (
+            GOOD + "  - name: a\n    footprint: [[0, 0], [4, 0], [4, 3], [0, 3]]\n    stand_at: [4.5, 1]\n",
+            7,
+            ["(4.5, 1)", '"a"'],
+        ),
+        ("robot: hall\nrooms: !!set {hall}\n", 2, ['tag "set"']),
+        (GOOD + "  - {name: a, stand_at: ['1', 1]}\n", 5, ["this entry", "a text", "a number"]),
+        (GOOD + "  - hall\n", 5, ['"hall"', "twice"]),
+        (GOOD + "  - {name: lab}\n", 5, ['"lab"', "twice"]),
+        ("rooms: [hall, lab]\nrobot: attic\n", 2, ["robot", '"attic"', "hall, lab"]),
+        (GOOD + "objects: [mug]\n", 5, ['"objects"', "a list", "a mapping"]),
+        (GOOD + "objects:\n", 5, ['"objects"', "empty"]),
+        (GOOD + "objects:\n  lab: mug\n", 6, ['"lab"', "a text", "a list"]),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - no\n", 8, word("this entry", "no")),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - ''\n", 8, ["this entry", "empty", "a text"]),
+        (GOOD + "objects:\n  lab: [mug]\n  attic: [mug]\n", 7, ["objects", '"attic"', "hall, lab"]),
+        (
+            GOOD + "people:\n  lab: [{name: a}]\n  attic: [{name: b}]\n",
+            7,
+            ["people", '"attic"', "hall, lab"],
+        ),
+        (GOOD + "people:\n  lab:\n    - alice\n", 7, ["this entry", "a text", "a mapping"]),
+        (GOOD + "people:\n  lab: {name: a}\n", 6, ['"lab"', "a mapping", "a list"]),
+        (GOOD + "people:\n  lab:\n    - answers: [tea]\n", 7, ['"name"', "missing"]),
+        (GOOD + "people:\n  lab:\n    - name: a\n      answer: b\n", 8, ['"answer"']),
+        (
+            GOOD + "people:\n  lab:\n    - name: a\n      answers:\n        - tea\n        - yes\n",
+            10,
+            word("this entry", "yes"),
+        ),
+        (
+            GOOD + "people:\n  lab:\n    - name: a\n      answers: tea\n",
+            8,
+            ['"answers"', "a text", "a list"],
+        ),
+        (GOOD + "may_wait_forever: 'yes'\n", 5, ['"may_wait_forever"', "a text", "true or false"]),
+        (GOOD + "may_wait_forever: 1\n", 5, ['"may_wait_forever"', "a number", "true or false"]),
+        (GOOD + "  - lab (3\n", 5, ['"lab (3"', "missing ), unterminated subpattern at position 4"]),
+        (GOOD + "objects:\n  lab:\n    - mug\n    - '*'\n", 8, ['"*"', "nothing to repeat"]),
+        (GOOD + "people:\n  lab:\n    - name: '*'\n", 7, ['"*"', "nothing to repeat"]),
+        (
+            GOOD + "people:\n  lab:\n    - name: a\n      answers:\n        - tea\n        - '[a'\n",
+            10,
+            ['"[a"', "unterminated character set"],
+        ),
+        (GOOD + "objects:\n  lab: ['a{9999999999999}']\n", 6, ['"a{9999999999999}"', "too large"]),
+        ("", None, ["the file", "empty"]),
+        ("- hall\n", 1, ["the file", "a list", "a mapping"]),
+        (GOOD + "objects:\n  lab: [a]\n  lab: [b]\n", 7, ['"lab"', "second time"]),
+    ],
+)
+def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(
+    text: str, line: int | None, named: list[str]
+) -> None:
+    with pytest.raises(BadInput) as caught:
+        read(text)
+    assert (caught.value.file, caught.value.line) == ("w.yaml", line)
+    assert all(name in caught.value.sentence for name in named), caught.value
+
+
+@pytest.mark.parametrize(
+    ("point", "is_within"),
+    [
+        ((1, 1), True),
+        ((5, 1), True),
+        ((1, 5), True),
+        ((5, 5), False),
+        ((2, 4), True),
+        ((0, 3), True),
+        ((6, 2), True),
+        ((6, 6), False),
+        ((-1, 2), False),
+        ((7, 0), False),
+        ((2, 6.1), False),
+    ],
+)
+def test_the_robot_stands_within_a_room_of_any_shape(point: tuple[float, float], *, is_within: bool) -> None:
+    corner = "[[0, 0], [6, 0], [6, 2], [2, 2], [2, 6], [0, 6]]"  # 2 m wide, around a corner
+    text = f"robot: a\nrooms: [{{name: a, footprint: {corner}, stand_at: [{point[0]}, {point[1]}]}}]\n"
+    if is_within:
+        assert read(text).rooms[0].stand_at == point
+    else:
+        with pytest.raises(BadInput, match="outside"):
+            read(text)
+
+
+def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
+    path = tmp_path / "w.yaml"
+    path.write_text("robot: attic\nrooms: [hall]\n", encoding="utf-8")
+    with pytest.raises(BadInput, match='"attic"') as error:
+        World.read(path)
+    assert (error.value.file, error.value.line) == (path, 1)
+
+
+def is_regex(text: str) -> bool:
+    try:
+        re.compile(text)
+    except (re.error, OverflowError):
+        return False
+    return True
+
+
+TEXTS = st.text(st.characters(codec="utf-8"), max_size=12) | st.sampled_from(
+    ["no", "yes", "3", "null", "~", "=", "<<", "a: b", "# a", "2001-01-01", "\ta\n b ", "\x85\u2028", "1e3"]
+)
+REGEXES = TEXTS.filter(is_regex)
+NAMES = REGEXES.filter(bool)
+METRES = st.floats(-1e6, 1e6)
+POINTS = st.tuples(METRES, METRES)
+ROOMS = st.builds(
+    Room,
+    name=NAMES,
+    objects=st.lists(NAMES, max_size=3).map(tuple),
+    people=st.lists(st.builds(Person, NAMES, st.lists(REGEXES, max_size=3).map(tuple)), max_size=2).map(
+        tuple
+    ),
+    stand_at=st.none() | POINTS,
+)
+MEASURED = st.builds(
+    lambda room, corners, stands: replace(
+        room, footprint=tuple(corners), stand_at=corners[0] if stands else None
+    ),
+    ROOMS,
+    st.lists(POINTS, min_size=3, max_size=5),
+    st.booleans(),
+)
+
+
+@st.composite
+def worlds(draw: st.DrawFn) -> World:
+    rooms = draw(st.lists(ROOMS | MEASURED, min_size=1, max_size=4, unique_by=lambda room: room.name))
+    start = draw(st.sampled_from(rooms)).name
+    return World(tuple(rooms), start, draw(TEXTS), may_wait_forever=draw(st.booleans()))
+
+
+@given(worlds())
+def test_world_written_as_a_file_reads_back_as_itself(world: World) -> None:
+    assert read(world.to_yaml()) == world
+
+
+def extent(room: Room) -> tuple[float, float, float, float]:
+    assert room.footprint is not None
+    xs, ys = zip(*room.footprint, strict=True)
+    return min(xs), max(xs), min(ys), max(ys)
+
+
+def overlap(one: Room, other: Room) -> bool:
+    (a, b, c, d), (e, f, g, h) = extent(one), extent(other)
+    return a < f and e < b and c < h and g < d
+
+
+CORNERS = st.integers(-50, 50).map(float)
+RECTANGLES = st.tuples(CORNERS, CORNERS).map(
+    lambda low: (low, (low[0] + 3, low[1]), (low[0] + 3, low[1] + 2), (low[0], low[1] + 2))
+)
+
+
+@given(st.lists(st.none() | RECTANGLES, min_size=1, max_size=9))
+def test_layout_gives_every_room_a_place_of_its_own_and_keeps_those_that_are_given(
+    footprints: list[tuple[tuple[float, float], ...] | None],
+) -> None:
+    world = World(tuple(Room(f"room {i}", footprint=given) for i, given in enumerate(footprints)), "room 0")
+    rooms = laid_out(world).rooms
+    new = [room for room, given in zip(rooms, footprints, strict=True) if given is None]
+    old = [room for room, given in zip(rooms, footprints, strict=True) if given is not None]
+    assert [room.footprint for room in old] == [given for given in footprints if given is not None]
+    assert not any(overlap(one, other) for one, other in combinations(new, 2))
+    assert not any(overlap(one, other) for one in new for other in old)
+    for room in rooms:
+        left, right, low, high = extent(room)
+        assert room.stand_at is not None
+        assert left < room.stand_at[0] < right
+        assert low < room.stand_at[1] < high
+
+
+def test_layout_is_a_hallway_with_rooms_on_both_sides_and_keeps_standing_points() -> None:
+    world = World((Room("a"), Room("b", stand_at=(9.0, 9.0)), Room("c")), "a", may_wait_forever=True)
+    a, b, c = laid_out(world).rooms
+    assert (extent(a)[:2], extent(c)[0]) == (extent(b)[:2], extent(a)[1])
+    assert extent(b)[2] - extent(a)[3] == HALLWAY
+    assert b.stand_at == (9.0, 9.0)
+    assert laid_out(world).may_wait_forever
+    assert laid_out(laid_out(world)) == laid_out(world)
+
+
+def test_rooms_without_a_place_stand_a_hallway_to_the_right_of_those_with_one() -> None:
+    given = ((-1.0, 0.0), (7.0, 0.0), (7.0, 5.0))
+    world = World((Room("new"), Room("given", footprint=given)), "new")
+    assert extent(laid_out(world).rooms[0])[0] == 7 + HALLWAY
+
+
+def test_world_file_is_written_for_people_to_read() -> None:
+    world = World((Room("café", ("Ölkanne",), (Person("Łucja", ("tak",)),)), Room("hall")), "café", "früh")
+    assert world.to_yaml() == (
+        "about: früh\nrobot: café\nrooms:\n- café\n- hall\nobjects:\n  café:\n  - Ölkanne\n"
+        "people:\n  café:\n  - name: Łucja\n    answers:\n    - tak\n"
+    )

@@ -1,0 +1,261 @@
+"""What a program meets that runs on a robot: answers and errors as in the simulator, until a stop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import pytest
+
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.trace import Event, Option
+from codebotler.core.world import Person, Room, World
+from codebotler.missions.live import LiveRobot, StoppedError, in_words
+from codebotler.models.recorded import recorded_model
+from codebotler.robots.base import CancelledError, Result, RobotLostError
+from codebotler.robots.simulated import Simulated
+from codebotler.simulator.engine import run
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import RobotError
+from codebotler.simulator.rules import PAPER
+from doubles import Answering, giving, raising
+from roboeval.suites.load import Suite
+
+FOUND = True
+OPTIONS = (Option("Yes"), Option(" no "))
+WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
+
+
+class Notes(list[tuple[str, dict[str, object]]]):
+    def __call__(self, event: str, /, **data: object) -> None:
+        self.append((event, data))
+
+    @property
+    def kinds(self) -> list[str]:
+        return [event for event, _ in self]
+
+
+def live(answer: Callable[[str, str], Result] = lambda *_: None) -> tuple[LiveRobot, Notes]:
+    notes = Notes()
+    return LiveRobot(Answering(answer), notes, place="hall"), notes
+
+
+@pytest.fixture(scope="module")
+def lane() -> Iterator[Lane]:
+    lane = Lane()
+    yield lane
+    lane.close()
+
+
+# --- the same as in the simulator
+
+
+def test_reference_programs_leave_the_simulators_traces(paper: Suite, lane: Lane) -> None:
+    as_written = replace(PAPER, literals="as-written")
+    model = recorded_model("recorded:careful")
+    pairs = [
+        (model.reply(task.prompts[0], 0).program, task.scenarios[0].world) for task in paper.tasks.values()
+    ]
+    assert len(pairs) == 16
+    expected = list(run(pairs, workers=1, rules=as_written))
+    for (program, world), outcome in zip(pairs, expected, strict=True):
+        robot = Simulated(world, speed=None, metres_per_second=math.inf)
+        robot.connect()
+        adapted = LiveRobot(robot, Notes(), place=world.robot, clock_starts=PAPER.clock_starts)
+        found = lane.run_live(program, adapted)
+        assert (found.status, found.error) == (outcome.status, outcome.error)
+        assert found.trace == outcome.trace
+
+
+@pytest.mark.parametrize(
+    ("call", "kind"),
+    [
+        ("go_to('cellar')", "GoToInvalidLocation"),
+        ("ask('ann', 'Tea?', ['Yes', 'No'])", "AskNoPerson"),
+        ("ask('ann', 'Tea?', [])", "AskEmptyOptions"),
+        ("ask('bob', 'Tea?', ['Never', 'Always'])", "AskInvalidOptions"),
+        ("pick('cup')", "PickInvalidObject"),
+        ("place('mug')", "PlaceNoObject"),
+        ("[pick('mug') for _ in 'ab']", "PickWhileHolding"),
+    ],
+)
+@pytest.mark.parametrize("caught", [False, True])
+def test_errors_reach_the_program_as_in_the_simulator(
+    lane: Lane, call: str, kind: str, *, caught: bool
+) -> None:
+    where = "kitchen" if kind in {"AskInvalidOptions", "PickWhileHolding"} else "hall"
+    body = f"    go_to('{where}')\n    {call}\n"
+    if caught:
+        body = f"    go_to('{where}')\n    try: {call}\n    except Exception as e: say(str(e))\n"
+    program = f"def task_program():\n{body}"
+    (expected,) = run([(program, WORLD)], workers=1, rules=replace(PAPER, literals="as-written"))
+    robot = Simulated(WORLD, speed=None)
+    robot.connect()
+    found = lane.run_live(program, LiveRobot(robot, Notes()))
+    assert (found.status, found.error, found.line) == (expected.status, expected.error, expected.line)
+    assert found.trace == expected.trace
+    assert (found.error is None) == caught
+    assert caught or (found.error and found.error.kind == kind)
+
+
+# --- events
+
+
+def test_events_tell_what_was_asked_and_what_came_of_it() -> None:
+    robot, _ = live(giving(None, FOUND, "Yes", None))
+    robot.perform("go_to", [" kitchen "])
+    robot.perform("is_in_room", ["mug"])
+    assert robot.perform("ask", ["ann", "Tea?", OPTIONS]) == 0
+    robot.perform("pick", ["mug"])
+    assert robot.trace == (
+        Event("goto", "kitchen"),
+        Event("check", "mug", found=True),
+        Event("ask", "Tea?", OPTIONS, "Yes"),
+        Event("pick", "mug"),
+    )
+    assert [event.place for event in robot.trace] == ["hall", "kitchen", "kitchen", "kitchen"]
+
+
+def test_everything_is_taken_down_in_order() -> None:
+    robot, notes = live(giving(None, "Yes"))
+    robot.perform("say", ["hello"])
+    robot.sleep_until(5)
+    robot.perform("ask", ["ann", "Tea?", OPTIONS])
+    one, two = {"number": 1, "skill": "say"}, {"number": 2, "skill": "ask"}
+    named = {"person": "ann", "question": "Tea?", "options": ("Yes", " no ")}
+    assert notes == [
+        ("skill", {**one, "arguments": {"message": "hello"}}),
+        ("feedback", {**one, "text": "doing say"}),
+        ("result", {**one, "result": None}),
+        ("sleep", {"seconds": 5}),
+        ("skill", {**two, "arguments": named}),
+        ("feedback", {**two, "text": "doing ask"}),
+        ("result", {**two, "result": "Yes"}),
+    ]
+    assert robot.now == 5
+
+
+def test_clock_begins_with_the_first_skill() -> None:
+    robot, _ = live()
+    robot.robot.clock.wait(100)
+    assert robot.now == 0
+    robot.sleep_until(7)
+    assert robot.now == 7
+
+
+@pytest.mark.parametrize(("said", "position"), [("Yes", 0), (" no ", 1), ("NO", 1), ("yes ", 0)])
+def test_answer_is_the_option_of_that_text(said: str, position: int) -> None:
+    robot, _ = live(giving(said))
+    assert robot.perform("ask", ["ann", "Tea?", OPTIONS]) == position
+
+
+def test_answer_that_was_not_offered_is_an_error() -> None:
+    robot, notes = live(giving("Perhaps"))
+    with pytest.raises(RobotError, match="Perhaps") as error:
+        robot.perform("ask", ["ann", "Tea?", OPTIONS])
+    assert error.value.kind == "AskInvalidOptions"
+    assert notes.kinds == ["skill", "feedback", "error"]
+    assert robot.trace == (Event("ask", "Tea?", OPTIONS),)
+
+
+def test_robots_own_words_are_kept() -> None:
+    robot, notes = live(raising(RobotError("GoToInvalidLocation", "the door is shut")))
+    with pytest.raises(RobotError, match="the door is shut"):
+        robot.perform("go_to", ["kitchen"])
+    assert notes.kinds == ["skill", "feedback", "error"]
+    assert robot.trace == (Event("goto", "kitchen"),)
+    with pytest.raises(RobotError):
+        robot.perform("pick", ["mug"])
+    assert robot.trace == (Event("goto", "kitchen"),), "what was not picked up is no event"
+
+
+@pytest.mark.parametrize(
+    ("skill", "arguments", "answer"),
+    [
+        ("is_in_room", ["mug"], "yes"),
+        ("get_current_location", [], None),
+        ("say", ["hello"], "hello"),
+        ("get_all_rooms", [], "hall"),
+        ("get_all_rooms", [], [1, None, {}]),
+        ("get_all_rooms", [], ["hall", ["lab"]]),
+    ],
+)
+def test_answer_that_the_skill_does_not_have_loses_the_robot(
+    skill: str, arguments: list[str], answer: Result
+) -> None:
+    robot, _ = live(giving(answer))
+    with pytest.raises(RobotLostError, match=f"answers {skill} with"):
+        robot.perform(skill, arguments)
+
+
+def test_ninth_skill_needs_nothing_here() -> None:
+    row = Skill("measure", (Parameter("what"),), "str", "Measure.", Recording("measure", "what"))
+    robot, notes = live(giving("20 degrees"))
+    robot.skills = SKILLS.with_skill(row)
+    assert robot.perform("measure", ["the air"]) == "20 degrees"
+    assert robot.trace == (Event("measure", "the air"),)
+    assert notes.kinds == ["skill", "feedback", "result"]
+
+
+def test_call_in_words() -> None:
+    assert in_words("ask", ["ann", "Tea?", ("Yes", "No")]) == 'ask("ann", "Tea?", ["Yes", "No"])'
+
+
+# --- the stop
+
+
+def test_nothing_starts_after_a_stop() -> None:
+    robot, notes = live()
+    robot.stop()
+    with pytest.raises(StoppedError):
+        robot.perform("say", ["hello"])
+    with pytest.raises(StoppedError):
+        robot.sleep_until(3600)
+    assert (notes, robot.trace) == ([], ())
+    assert isinstance(robot.robot, Answering)
+    assert robot.robot.cancels == 1
+    assert not robot.robot.clock.wait(1), "who sleeps wakes up"
+
+
+def test_robot_that_answers_after_a_stop_is_not_believed() -> None:
+    def answer(_skill: str, _first: str) -> Result:
+        robot.stop()
+        return True
+
+    robot, notes = live(answer)
+    with pytest.raises(StoppedError):
+        robot.perform("is_in_room", ["mug"])
+    assert notes.kinds == ["skill", "feedback", "late"]
+
+
+def test_error_after_a_stop_does_not_reach_the_program() -> None:
+    def answer(_skill: str, _first: str) -> Result:
+        robot.stop()
+        raise RobotError("GoToInvalidLocation", "the goal was cancelled")
+
+    robot, _ = live(answer)
+    with pytest.raises(StoppedError):
+        robot.perform("go_to", ["kitchen"])
+
+
+def test_somebody_else_who_stops_the_robot_ends_the_mission() -> None:
+    robot, notes = live(raising(CancelledError()))
+    with pytest.raises(RobotLostError, match="somebody else"):
+        robot.perform("go_to", ["kitchen"])
+    assert notes.kinds == ["skill", "feedback", "cancelled"]
+
+
+def test_feedback_that_cannot_be_taken_down_stops_the_robot() -> None:
+    class FullError(OSError):
+        pass
+
+    def note(event: str, /, **_: object) -> None:
+        if event == "feedback":
+            raise FullError
+
+    machine = Answering()
+    robot = LiveRobot(machine, note)
+    with pytest.raises(FullError):
+        robot.perform("say", ["hello"])
+    assert machine.cancels == 1

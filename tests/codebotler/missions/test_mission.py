@@ -1,0 +1,675 @@
+"""Missions: their states, what they write, and that a stop ends what the robot does, whatever goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.badinput import BadInput
+from codebotler.core.trace import Outcome
+from codebotler.core.world import Room, World
+from codebotler.missions import mission as module
+from codebotler.missions.log import EVENTS, SUMMARY, Line, Summary, events_of
+from codebotler.missions.mission import STEPS, UNCONFIRMED, Mission, MissionError, State
+from codebotler.missions.store import find, missions, recover
+from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
+from codebotler.robots.reservation import Reservation
+from codebotler.robots.simulated import Simulated
+from codebotler.simulator import conversation
+from codebotler.simulator.lane import Lane
+from codebotler.simulator.robot import RobotError
+from doubles import Answering, giving, raising
+from processes import are_gone, children_of
+
+HELLO = "def task_program():\n    say('hello')\n    say('bye')\n"
+WORLD = World((Room("hall"), Room("kitchen")), "hall")
+STUBBORN = """
+def task_program():
+    while True:
+        try:
+            say("a")
+        except BaseException:
+            pass
+        finally:
+            go_to("kitchen")
+"""
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    return tmp_path / "home"
+
+
+def ready(home: Path, program: str = HELLO, told: Callable[[Line], None] = lambda _: None) -> Mission:
+    """A mission that is approved."""
+    mission = Mission(home, "answering", told=told)
+    mission.draft(program)
+    mission.check([])
+    mission.approve()
+    return mission
+
+
+def done(home: Path, robot: Robot, program: str = HELLO) -> Mission:
+    """A mission that has ended."""
+    with Reservation(robot, home) as reserved, ready(home, program) as mission:
+        mission.run(reserved)
+    return mission
+
+
+def kinds(mission: Mission) -> list[str]:
+    """What its events tell, in order: a state by its name."""
+    return [
+        line["state"] if line["event"] == "state" else line["event"] for line in events_of(mission.folder)
+    ]
+
+
+# --- states
+
+
+def test_mission_goes_through_its_states_and_writes_all_that_happens(home: Path) -> None:
+    robot = Answering()
+    mission = done(home, robot)
+    before = ["drafting", "drafting", "checked", "approved", "running"]
+    said = ["skill", "feedback", "result"]
+    assert kinds(mission) == [*before, *said, *said, "done"]
+    assert (robot.done, robot.connections) == (["hello", "bye"], 0)
+    (summary,) = missions(home)
+    assert (summary.state, summary.program, summary.robot) == ("done", HELLO, "answering")
+    assert summary.ended is not None
+    assert summary.ended >= summary.created
+    assert [event.text for event in mission.trace] == ["hello", "bye"]
+
+
+def test_each_event_is_on_the_disk_before_it_is_told(home: Path) -> None:
+    told: list[int] = []
+
+    def count(line: Line) -> None:
+        assert events_of(home / "missions" / mission.id)[-1] == json.loads(json.dumps(line))
+        told.append(1)
+
+    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+        mission.told = count
+        mission.run(reserved)
+    assert len(told) == 8
+
+
+STEP: dict[str, Callable[[Mission, Reservation], object]] = {
+    "draft": lambda mission, _: mission.draft(HELLO),
+    "check": lambda mission, _: mission.check([]),
+    "approve": lambda mission, _: mission.approve(),
+    "fail": lambda mission, _: mission.fail("no"),
+    "run": lambda mission, reserved: mission.run(reserved),
+    "stop": lambda mission, _: mission.stop(),
+}
+
+
+@pytest.mark.parametrize(
+    ("before", "refused"),
+    [
+        ([], ["check", "approve", "run"]),
+        (["draft"], ["approve", "run"]),
+        (["draft", "check"], ["run"]),
+        (["draft", "check", "approve"], ["check", "approve"]),
+        (["draft", "check", "draft"], ["approve", "run"]),
+        (["draft", "check", "approve", "draft"], ["approve", "run"]),
+        (["draft", "check", "approve", "run"], list(STEP)),
+        (["fail"], list(STEP)),
+        (["stop"], list(STEP)),
+    ],
+)
+def test_illegal_steps_are_refused_with_a_sentence(home: Path, before: list[str], refused: list[str]) -> None:
+    with Reservation(Answering(), home) as reserved, Mission(home, "answering") as mission:
+        for step in before:
+            STEP[step](mission, reserved)
+        state, events = mission.state, events_of(mission.folder)
+        for step in refused:
+            with pytest.raises(MissionError) as error:
+                STEP[step](mission, reserved)
+            assert error.value.sentence.startswith(f"mission {mission.id} ")
+        assert (mission.state, events_of(mission.folder)) == (state, events)
+
+
+def test_running_mission_can_only_be_stopped(home: Path) -> None:
+    with (
+        Reservation(Simulated(WORLD), home) as reserved,
+        ready(home) as mission,
+        running(mission, reserved, until="skill"),
+    ):
+        for step in ("draft", "check", "approve", "fail", "run"):
+            with pytest.raises(MissionError, match="is running"):
+                STEP[step](mission, reserved)
+        mission.stop()
+    assert mission.state is State.STOPPED
+
+
+def test_program_with_problems_needs_a_word_about_them(home: Path) -> None:
+    with Mission(home, "answering") as mission:
+        mission.draft(HELLO)
+        mission.check(["line 2: there is nobody"])
+        with pytest.raises(MissionError, match="has problems"):
+            mission.approve()
+        mission.approve(despite_problems=True)
+        assert mission.state is State.APPROVED
+    assert Summary.read(mission.folder).problems == ("line 2: there is nobody",)
+
+
+@pytest.mark.parametrize(
+    ("error", "state", "reason"),
+    [
+        (None, "stopped", "stopped by .* before it ran"),
+        (KeyboardInterrupt(), "stopped", "stopped by .* before it ran"),
+        (ValueError("odd"), "failed", "odd"),
+    ],
+)
+def test_mission_that_is_left_has_ended(
+    home: Path, error: BaseException | None, state: str, reason: str
+) -> None:
+    mission = Mission(home, "answering")
+    with suppress(KeyboardInterrupt, ValueError), mission:
+        mission.draft(HELLO)
+        if error:
+            raise error
+    summary = Summary.read(mission.folder)
+    assert summary.state == state
+    assert re.fullmatch(reason, summary.reason)
+
+
+def test_every_state_but_the_ends_has_a_way_out() -> None:
+    ends = set(State) - set(STEPS)
+    assert ends == {State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED}
+    assert all(STEPS.values())
+
+
+# --- ends
+
+
+@pytest.mark.parametrize(
+    ("program", "answer", "reason", "line"),
+    [
+        ("def task_program(:\n", giving(), "SyntaxError", 1),
+        ("def task_program():\n    say(helo)\n", giving(), "NameError", 2),
+        (HELLO, raising(RobotError("SayMute", "it is mute")), "SayMute: it is mute", 2),
+        (HELLO, raising(RobotLostError("its server died")), "the robot was lost: its server died", None),
+        (HELLO, raising(ValueError("odd")), "ValueError: odd", None),
+        (HELLO, giving("Hi"), "the robot was lost: .* say .*'Hi'", None),
+        ("def task_program():\n    while True: pass\n", giving(), "TimeoutError", 2),
+    ],
+)
+def test_mission_that_fails_says_why(
+    home: Path, program: str, answer: Callable[[str, str], Result], reason: str, line: int | None
+) -> None:
+    robot = Answering(answer)
+    mission = done(home, robot, program)
+    summary = Summary.read(mission.folder)
+    assert (summary.state, summary.line) == ("failed", line)
+    assert re.match(reason, summary.reason)
+    assert len(robot.done) < 2
+    assert robot.connections == 0
+
+
+def test_robot_does_not_go_on_when_the_mission_fails_from_within(home: Path) -> None:
+    robot = Answering(raising(ValueError("odd")))
+    done(home, robot)
+    assert robot.cancels == 1
+
+
+def test_program_can_catch_what_the_robot_cannot_do(home: Path) -> None:
+    program = "def task_program():\n    try: go_to('moon')\n    except Exception as e: say(str(e))\n"
+    robot = Simulated(WORLD, speed=None)
+    mission = done(home, robot, program)
+    assert mission.state is State.DONE
+    said, error = (event.text for event in mission.trace)
+    assert said == "moon"
+    assert '"moon"' in error
+
+
+# --- the stop
+
+
+@contextmanager
+def running(mission: Mission, reserved: Reservation, until: str) -> Iterator[None]:
+    """Run a mission on another thread; go on when an event has happened, and wait for the end on leaving."""
+    happened = threading.Event()
+    thread = threading.Thread(target=mission.run, args=(reserved,))
+
+    def told(line: Line) -> None:
+        if line["event"] == until:
+            happened.set()
+
+    mission.told = told
+    thread.start()
+    assert happened.wait(30)
+    yield
+    thread.join(30)
+    assert not thread.is_alive()
+
+
+@pytest.mark.parametrize(
+    ("program", "until"),
+    [
+        ("def task_program():\n    go_to('kitchen')\n    say('there')\n", "feedback"),
+        ("def task_program():\n    say('hello')\n    time.sleep(3600)\n    say('there')\n", "sleep"),
+        (STUBBORN, "feedback"),
+        ("def task_program():\n    say('a')\n    sum(range(10**11))\n", "result"),
+    ],
+)
+def test_stop_ends_whatever_goes_on(home: Path, program: str, until: str) -> None:
+    before = children_of(os.getpid())
+    with Reservation(Simulated(WORLD), home) as reserved, ready(home, program) as mission:
+        with running(mission, reserved, until):
+            began = time.monotonic()
+            mission.stop("the test")
+        assert time.monotonic() - began < 5
+    happened = kinds(mission)
+    assert happened[-1] == "stopped"
+    assert "skill" not in happened[happened.index("stop") :]
+    assert "by the test" in Summary.read(mission.folder).reason
+    assert are_gone(children_of(os.getpid()) - before)
+
+
+def test_order_of_a_stop_is_that_the_robot_is_told_first(home: Path) -> None:
+    """Nothing slow, such as a terminal that takes no more, may come between."""
+    order: list[str] = []
+    may_go_on, blocked = threading.Event(), threading.Event()
+
+    class Telling(Answering):
+        def cancel(self) -> None:
+            super().cancel()
+            order.append("robot")
+
+    def told(line: Line) -> None:
+        if line["event"] == "skill":
+            blocked.set()
+            assert may_go_on.wait(30)
+        if line["event"] == "stop":
+            order.append("written")
+
+    robot = Telling()
+    with Reservation(robot, home) as reserved, ready(home) as mission, ThreadPoolExecutor(2) as threads:
+        mission.told = told
+        running = threads.submit(mission.run, reserved)
+        assert blocked.wait(30)
+        stopping = threads.submit(mission.stop)
+        while not order:
+            time.sleep(0.001)
+        assert not stopping.done()
+        may_go_on.set()
+        stopping.result(30)
+        assert running.result(30) is State.STOPPED
+    assert order[0] == "robot"
+    assert "written" in order
+    assert robot.done == []
+
+
+def test_stop_is_written_even_if_the_robot_has_ended_before_it_is_back(home: Path) -> None:
+    asked, told, has_ended = threading.Event(), threading.Event(), threading.Event()
+
+    class Slow(Answering):
+        def cancel(self) -> None:
+            super().cancel()
+            if not told.is_set():
+                told.set()
+                assert has_ended.wait(30)
+
+    def answer(_skill: str, _first: str) -> Result:
+        asked.set()
+        assert told.wait(30)
+        return None
+
+    def hear(line: Line) -> None:
+        if line.get("state") == "stopped":
+            has_ended.set()
+
+    with (
+        Reservation(Slow(answer), home) as reserved,
+        ready(home) as mission,
+        ThreadPoolExecutor(1) as threads,
+    ):
+        mission.told = hear
+        running = threads.submit(mission.run, reserved)
+        assert asked.wait(30)
+        mission.stop("the test")
+        assert running.result(30) is State.STOPPED
+    assert kinds(mission)[-4:] == ["late", "stop", "stopping", "stopped"]
+    (stop,) = [line for line in events_of(mission.folder) if line["event"] == "stop"]
+    assert stop["by"] == "the test"
+    assert 0 <= stop["seconds_to_cancel"] < 60
+
+
+@pytest.mark.parametrize("result", [None, RobotError("SayMute", "cancelled"), RobotLostError("gone")])
+def test_robot_that_answers_after_a_stop_starts_nothing_more(home: Path, result: Exception | None) -> None:
+    asked, may_answer = threading.Event(), threading.Event()
+
+    def answer(_skill: str, _first: str) -> Result:
+        asked.set()
+        assert may_answer.wait(30)
+        if result:
+            raise result
+        return None
+
+    robot = Answering(answer)
+    with (
+        Reservation(robot, home) as reserved,
+        ready(home) as mission,
+        running(mission, reserved, "skill"),
+    ):
+        assert asked.wait(30)
+        mission.stop()
+        assert kinds(mission)[-1] == "stopping"
+        may_answer.set()
+    assert kinds(mission)[-1] == "stopped"
+    assert kinds(mission).count("skill") == 1
+
+
+def test_robot_that_does_not_confirm_a_stop_is_told_of(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "GRACE", 0.3)
+    asked, may_answer = threading.Event(), threading.Event()
+
+    def never(_skill: str, _first: str) -> Result:
+        asked.set()
+        may_answer.wait(60)
+        return None
+
+    robot = Answering(never)
+    with Reservation(robot, home) as reserved, ready(home) as mission:
+        with running(mission, reserved, "skill"):
+            assert asked.wait(30)
+            mission.stop()
+        summary = Summary.read(mission.folder)
+        assert (summary.state, summary.reason) == ("failed", UNCONFIRMED)
+    before = events_of(mission.folder)
+    told: list[Line] = []
+    mission.told = told.append
+    may_answer.set()
+    threads = [thread for thread in threading.enumerate() if thread.name == mission.id]
+    for thread in threads:
+        thread.join(30)
+    assert threads
+    assert events_of(mission.folder) == before, "what comes after the end is not written"
+    assert told == [], "nor told"
+    assert robot.done == ["hello"]
+
+
+def test_robot_that_cannot_even_be_told_to_stop_is_told_of(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "GRACE", 0.3)
+    may_go_on = threading.Event()
+
+    class Blocked(Answering):
+        def cancel(self) -> None:
+            may_go_on.wait(60)
+
+    def answer(_skill: str, _first: str) -> Result:
+        may_go_on.wait(60)
+        return None
+
+    with (
+        Reservation(Blocked(answer), home) as reserved,
+        ready(home) as mission,
+        ThreadPoolExecutor(1) as threads,
+    ):
+        with running(mission, reserved, "skill"):
+            stopping = threads.submit(mission.stop)
+        assert (mission.summary.state, mission.summary.reason) == ("failed", UNCONFIRMED)
+        may_go_on.set()
+        assert isinstance(stopping.exception(30), MissionError)
+
+
+def test_skill_without_an_end_goes_on_until_the_stop(home: Path) -> None:
+    program = "def task_program(): go_to('kitchen')"
+    with (
+        Reservation(Simulated(WORLD, speed=1e-6), home) as reserved,
+        ready(home, program) as mission,
+        running(mission, reserved, until="skill"),
+    ):
+        mission.stop()
+    assert kinds(mission)[-1] == "stopped"
+    assert "cancelled" in kinds(mission)
+
+
+def test_stop_may_come_again(home: Path) -> None:
+    asked = threading.Event()
+
+    class Slow(Answering):
+        def cancel(self) -> None:
+            super().cancel()
+            if self.cancels > 1:
+                asked.set()
+
+    def answer(_skill: str, _first: str) -> Result:
+        assert asked.wait(30)
+        return None
+
+    robot = Slow(answer)
+    with Reservation(robot, home) as reserved, ready(home) as mission:
+        with running(mission, reserved, "skill"):
+            mission.stop("one")
+            mission.stop("two")
+        assert mission.summary.reason == "stopped by one"
+    assert robot.cancels >= 2
+
+
+def test_stop_is_written_even_where_its_end_comes_first(home: Path) -> None:
+    class Quick(Simulated):
+        def cancel(self) -> None:
+            super().cancel()
+            if threading.current_thread() is threading.main_thread():
+                assert mission._over.wait(30)
+
+    with Reservation(Quick(WORLD), home) as reserved, ready(home, STUBBORN) as mission:
+        with running(mission, reserved, "feedback"):
+            mission.stop("the test")
+        assert kinds(mission)[-5:] == ["feedback", "cancelled", "stop", "stopping", "stopped"]
+
+
+@pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnhandledThreadExceptionWarning"
+)  # the robot's, on its thread
+def test_robot_that_breaks_at_a_stop_is_told_of(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Breaks(Answering):
+        def cancel(self) -> None:
+            raise TypeError("no such motor")
+
+        def disconnect(self) -> None:
+            may_answer.set()
+
+    def never(_skill: str, _first: str) -> Result:
+        may_answer.wait(60)
+        return None
+
+    monkeypatch.setattr(module, "GRACE", 0.3)
+    may_answer = threading.Event()
+    with Reservation(Breaks(never), home) as reserved, ready(home) as mission:
+        with running(mission, reserved, "skill"), pytest.raises(TypeError, match="no such motor"):
+            mission.stop()
+        assert mission.summary.reason == UNCONFIRMED
+
+
+def test_stop_before_it_runs_ends_it(home: Path) -> None:
+    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+        mission.stop("the test")
+        with pytest.raises(MissionError, match="is stopped"):
+            mission.run(reserved)
+    assert "by the test before it ran" in mission.summary.reason
+
+
+def test_stop_just_before_the_program_begins_lets_it_not_begin(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[str] = []
+
+    class Slow(Lane):
+        def __init__(self) -> None:
+            mission.stop("the test")
+            super().__init__()
+
+        def run_live(self, source: str, robot: conversation.Robot) -> Outcome:
+            begun.append(source)
+            return super().run_live(source, robot)
+
+    monkeypatch.setattr(module, "Lane", Slow)
+    with Reservation(Answering(), home) as reserved, ready(home) as mission:
+        assert mission.run(reserved) is State.STOPPED
+    assert begun == []
+    assert "by the test" in mission.summary.reason
+
+
+@pytest.mark.slow
+def test_stop_at_any_moment_ends_as_stopped(home: Path) -> None:
+    for number in range(8):
+        with Reservation(Answering(), home) as reserved, ready(home, STUBBORN) as mission:
+            threading.Timer(0.25 * number, mission.stop).start()
+            state = State.STOPPED
+            while mission.state is State.APPROVED:
+                try:
+                    state = mission.run(reserved)
+                except MissionError:
+                    break
+            assert state is State.STOPPED
+        assert kinds(mission)[-1] == "stopped"
+
+
+def test_interrupted_run_stops_the_robot(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = Simulated(WORLD)
+
+    class Interrupted(threading.Event):
+        def wait(self, _timeout: float | None = None) -> bool:
+            assert driving.wait(30)
+            raise KeyboardInterrupt
+
+    driving = threading.Event()
+    with Reservation(robot, home) as reserved, ready(home, STUBBORN) as mission:
+        mission.told = lambda line: driving.set() if line["event"] == "feedback" else None
+        monkeypatch.setattr(mission, "_wake", Interrupted())
+        with pytest.raises(KeyboardInterrupt):
+            mission.run(reserved)
+        assert mission.state is State.STOPPED
+
+
+# --- the disk
+
+
+def test_events_that_cannot_be_written_stop_the_robot(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = Answering()
+    with Reservation(robot, home) as reserved, ready(home) as mission:
+        real = os.write
+
+        def full(file: int, data: bytes) -> int:
+            if b'"result"' in data or b'"failed"' in data:
+                raise OSError(28, "No space left on device")
+            return real(file, data)
+
+        monkeypatch.setattr("codebotler.missions.log.os.write", full)
+        with pytest.raises(OSError, match="No space left") as error:
+            mission.run(reserved)
+        assert error.value.filename == str(mission.folder / EVENTS)
+        assert robot.done == ["hello"]
+        assert robot.cancels
+        monkeypatch.undo()
+    (left,) = recover(home)
+    assert left.state == "interrupted"
+
+
+def test_what_watches_may_break_and_the_robot_stops(home: Path) -> None:
+    def told(line: Line) -> None:
+        if line["event"] == "result":
+            raise BrokenPipeError
+
+    robot = Answering()
+    with Reservation(robot, home) as reserved, ready(home) as mission:
+        mission.told = told
+        mission.run(reserved)
+    assert mission.state is State.FAILED
+    assert robot.done == ["hello"]
+
+
+def test_missions_of_one_second_have_names_of_their_own(home: Path) -> None:
+    with Mission(home, "a") as one, Mission(home, "b") as two, Mission(home, "c") as three:
+        ids = [one.id, two.id, three.id]
+    assert len(set(ids)) == 3
+    assert [summary.id for summary in missions(home)] == ids
+    assert find(home, ids[1]) == two.folder
+    assert find(home, "last") == three.folder
+
+
+@pytest.mark.parametrize("name", ["", "..", "../..", "20260101-000000", "/", "last"])
+def test_mission_that_is_not_there_is_said_so(home: Path, name: str) -> None:
+    with pytest.raises(BadInput, match=f'"{name}"' if name else "no mission"):
+        find(home, name)
+
+
+def test_summary_is_written_whole_or_not(home: Path) -> None:
+    with Mission(home, "a") as mission:
+        before = (mission.folder / SUMMARY).read_text()
+        (mission.folder / f"{SUMMARY}.new").mkdir()
+        with pytest.raises(IsADirectoryError):
+            mission.draft(HELLO)
+        assert (mission.folder / SUMMARY).read_text() == before
+        (mission.folder / f"{SUMMARY}.new").rmdir()
+
+
+# --- two at a time
+
+
+def test_robot_is_on_one_mission_at_a_time(home: Path) -> None:
+    with (
+        Reservation(Simulated(WORLD), home) as reserved,
+        ready(home) as one,
+        ready(home) as two,
+        running(one, reserved, until="skill"),
+    ):
+        with pytest.raises(NotReadyError, match="another mission"):
+            two.run(reserved)
+        assert two.state is State.APPROVED
+        with pytest.raises(NotReadyError, match=f"process {os.getpid()}, since") as error:
+            Reservation(Simulated(WORLD), home).__enter__()
+        assert "another tool" in error.value.sentence
+        one.stop()
+    with Reservation(Simulated(WORLD), home):
+        pass
+
+
+def test_robots_at_other_addresses_do_not_exclude_each_other(home: Path) -> None:
+    one, two = Answering(), Answering()
+    one.address, two.address = "http://here:11311/", "http://there:11311/"
+    with Reservation(one, home), Reservation(two, home):
+        assert not (home / "robots").exists()
+
+
+def test_robot_that_cannot_be_connected_is_not_reserved(home: Path) -> None:
+    class Missing(Answering):
+        def connect(self) -> None:
+            raise NotReadyError("no master")
+
+    class Half(Answering):
+        def connect(self) -> None:
+            super().connect()
+            raise NotReadyError("no master")
+
+    with pytest.raises(NotReadyError, match="no master"):
+        Reservation(Missing(), home).__enter__()
+    half = Half()
+    with pytest.raises(NotReadyError, match="no master"):
+        Reservation(half, home).__enter__()
+    assert half.connections == 0, "what it has opened is closed"
+    with Reservation(Answering(), home):
+        pass
+
+
+@pytest.fixture(autouse=True)
+def no_threads_are_left() -> Iterator[None]:
+    yield
+    for thread in threading.enumerate():
+        if thread is not threading.main_thread() and not thread.name.startswith(("pytest", "starter")):
+            thread.join(10)
+            assert not thread.is_alive(), thread

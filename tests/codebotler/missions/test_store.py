@@ -1,0 +1,153 @@
+"""Missions on the disk: what a tool that died left behind is closed by the next; torn lines are dropped."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.badinput import BadInput
+from codebotler.missions.log import EVENTS, SUMMARY, Log, Summary, events_of
+from codebotler.missions.mission import Mission, State
+from codebotler.missions.store import missions, recover
+
+IF_TOOL_DIES = "its worker cancelled the goal"
+
+
+def left(home: Path, state: State, *events: dict[str, object], torn: str = "") -> Path:
+    """The folder of a mission that nobody has open."""
+    folder = home / "missions" / "20260102-030405"
+    folder.mkdir(parents=True)
+    summary = Summary(folder.name, state, "ros1", 1_000.0, if_tool_dies=IF_TOOL_DIES)
+    summary.write(folder)
+    lines = [json.dumps({"time": 1_000.0 + n, "clock": n / 2, **event}) for n, event in enumerate(events)]
+    (folder / EVENTS).write_text("".join(f"{line}\n" for line in lines) + torn)
+    return folder
+
+
+RUNNING: dict[str, object] = {"event": "state", "state": "running"}
+DRIVE: dict[str, object] = {
+    "event": "skill",
+    "number": 1,
+    "skill": "go_to",
+    "arguments": {"location": "kitchen"},
+}
+AT: dict[str, object] = {"event": "feedback", "number": 1, "skill": "go_to", "text": "at (1.0, 2.0)"}
+THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "result": None}
+
+
+@pytest.mark.parametrize(
+    ("state", "events", "named"),
+    [
+        (State.DRAFTING, [], ["drafting", "nothing"]),
+        (State.APPROVED, [], ["approved", "nothing"]),
+        (State.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen")', "(at (1.0, 2.0))", IF_TOOL_DIES]),
+        (State.STOPPING, [RUNNING, DRIVE], ['go_to("kitchen"); ', IF_TOOL_DIES]),
+        (State.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot did nothing"]),
+    ],
+)
+def test_mission_of_a_tool_that_died_was_interrupted(
+    tmp_path: Path, state: State, events: list[dict[str, object]], named: list[str]
+) -> None:
+    folder = left(tmp_path, state, *events, torn='{"time": 17')
+    (summary,) = recover(tmp_path)
+    assert summary.state == "interrupted"
+    assert all(name in summary.reason for name in named), summary.reason
+    assert Summary.read(folder) == summary
+    *before, last = events_of(folder)
+    assert [line["event"] for line in before] == [event["event"] for event in events]
+    assert (last["state"], last["reason"]) == ("interrupted", summary.reason)
+    assert last["clock"] == (before[-1]["clock"] if before else 0)
+    assert recover(tmp_path) == []
+
+
+def test_mission_that_ended_before_its_summary_was_written_is_not_interrupted(tmp_path: Path) -> None:
+    end: dict[str, object] = {"event": "state", "state": "failed", "reason": "odd"}
+    folder = left(tmp_path, State.RUNNING, RUNNING, end)
+    assert recover(tmp_path) == []
+    summary = Summary.read(folder)
+    assert (summary.state, summary.reason, summary.ended) == ("failed", "odd", 1001.0)
+
+
+def test_mission_of_a_living_tool_is_left_alone(tmp_path: Path) -> None:
+    with Mission(tmp_path, "simulated") as mission:
+        assert recover(tmp_path) == []
+        assert mission.state is State.DRAFTING
+        with pytest.raises(BlockingIOError):
+            Log(mission.folder)
+    assert recover(tmp_path) == []
+
+
+@pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOSPC])
+def test_mission_that_cannot_be_closed_is_told_and_others_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    for name in ("20260101-000001", "20260101-000002"):
+        left(tmp_path, State.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
+
+    def open_log(folder: Path) -> Log:
+        if folder.name.endswith("1"):
+            raise OSError(number, os.strerror(number), str(folder / EVENTS))
+        return Log(folder)
+
+    monkeypatch.setattr("codebotler.missions.store.Log", open_log)
+    told: list[tuple[str, int | None]] = []
+    (summary,) = recover(tmp_path, lambda mission, error: told.append((mission, error.errno)))
+    assert summary.state == "interrupted"
+    assert told == [("20260101-000001", number)]
+    assert [summary.state for summary in missions(tmp_path)] == ["running", "interrupted"]
+
+
+def test_missions_come_in_their_order(tmp_path: Path) -> None:
+    assert missions(tmp_path) == []
+    for name in ("b", "a"):
+        with Mission(tmp_path, name):
+            time.sleep(0.01)
+    assert [summary.robot for summary in missions(tmp_path)] == ["b", "a"]
+
+
+WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "[]", "{}", '{"id": 3}', "nonsense", '{"id": "x", "state": "odd"', "[" * 100_000),
+        *(json.dumps({**WHOLE, **odd}) for odd in ({"state": "odd"}, {"created": "now"}, {"created": 1e300})),
+        *(json.dumps({**WHOLE, **odd}) for odd in ({"program": 5}, {"problems": [1]}, {"reason": None})),
+    ],
+)
+def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
+    folder = left(tmp_path, State.DONE)
+    (folder / SUMMARY).write_text(text)
+    with pytest.raises(BadInput, match="no summary") as error:
+        missions(tmp_path)
+    assert error.value.file == folder / SUMMARY
+    assert recover(tmp_path) == [], "a robot can work nevertheless"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "[]", "{}", '{"event": "skill"}', "nonsense", '{"event": 1, "time": 0}', "[" * 100_000),
+        *('{"event": "skill", "time": 1, "clock": 1}', '{"event": "log", "time": NaN, "clock": 1}'),
+    ],
+)
+def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
+    folder = left(tmp_path, State.DONE, RUNNING)
+    with (folder / EVENTS).open("a") as file:
+        file.write(f"{text}\n")
+    with pytest.raises(BadInput, match="no event") as error:
+        events_of(folder)
+    assert (error.value.file, error.value.line) == (folder / EVENTS, 2)
+
+
+def test_summary_of_a_later_version_is_read(tmp_path: Path) -> None:
+    folder = left(tmp_path, State.DONE)
+    data = json.loads((folder / SUMMARY).read_text())
+    (folder / SUMMARY).write_text(json.dumps({**data, "colour": "red"}))
+    assert missions(tmp_path)[0].state == "done"
