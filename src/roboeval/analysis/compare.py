@@ -11,13 +11,12 @@ from typing import Any
 from codebotler.badinput import BadInput
 from codebotler.english import counted
 from codebotler.terminal import visible
-from roboeval.analysis.metrics import Estimate
+from roboeval.analysis.metrics import Estimate, by_formula
 from roboeval.analysis.statistics import (
     DIFFERENCE,
     ROUNDING,
     Needed,
     by_bootstrap,
-    by_formula,
     needed,
     p_by_signs,
 )
