@@ -320,6 +320,19 @@ def test_the_architecture_names_every_room() -> None:
         assert {name for name in folders if f"{name}/" not in named} == set()
 
 
+def test_what_the_architecture_names_is_where_it_says() -> None:
+    _, steps = (ROOT / "docs" / "architecture.md").read_text().split("## From a reply to a verdict")
+    rows = [re.findall("`([^`]+)`", line) for line in steps.splitlines() if line.startswith("|")]
+    files = {str(path.relative_to(ROOT / "src")): path.read_text() for path in (ROOT / "src").rglob("*.py")}
+    for named in filter(None, rows):
+        places = [place for place in named if place.endswith(".py")]
+        found = [text for place in places for path, text in files.items() if f"/{path}".endswith(f"/{place}")]
+        assert len(found) == len(places), named
+        for name in named:
+            if places and name.isidentifier():
+                assert re.search(rf"^(def |class |async def )?{name}\b", "\n".join(found), re.MULTILINE), name
+
+
 @pytest.mark.parametrize("page", ["robots.md"])
 def test_every_command_about_robots_does_what_it_should(followed: Callable[[str], Reader], page: str) -> None:
     reader = followed(page)

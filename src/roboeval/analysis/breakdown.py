@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 import polars as pl
 
 from codebotler.simulator.robot import resolve_room
-from roboeval.analysis.metrics import Estimate, completions_of, prompt_scores, task_scores
-from roboeval.analysis.statistics import by_formula
+from roboeval.analysis.metrics import Estimate, by_formula, completions_of, prompt_scores, task_scores
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import RowData

@@ -11,13 +11,12 @@ from typing import Any
 from codebotler.core.badinput import BadInput
 from codebotler.core.english import counted
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import Estimate
+from roboeval.analysis.metrics import Estimate, by_formula
 from roboeval.analysis.statistics import (
     DIFFERENCE,
     ROUNDING,
     Needed,
     by_bootstrap,
-    by_formula,
     needed,
     p_by_signs,
 )

@@ -6,9 +6,15 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TypeAlias
 
 import polars as pl
 
+# Values, those that resemble each other together: a prompt's, or those of all prompts of a task.
+Clusters: TypeAlias = Sequence[Sequence[float]]
+
+SHARE = (0.0, 1.0)
+LEVEL = 0.95  # how often intervals hold the true mean
 ROUNDING = 1e-9  # what sums of shares may lack of a threshold
 
 
@@ -144,7 +150,7 @@ def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
     Raises:
         ValueError: a prompt, which is named, has fewer than k completions; or there is no prompt.
     """
-    return clustered_interval([prompt.pass_at(k) for task in tasks for prompt in task.prompts])
+    return by_formula([[prompt.pass_at(k)] for task in tasks for prompt in task.prompts])
 
 
 def share_at_least(values: Sequence[float], threshold: float) -> float:
@@ -158,33 +164,28 @@ def threshold_curve(values: Sequence[float]) -> list[tuple[float, float]]:
     return [(threshold, share_at_least(values, threshold)) for threshold in thresholds]
 
 
-def clustered_interval(values: Sequence[float], *, level: float = 0.95) -> Estimate:
-    """The mean of one value per prompt, with an interval that takes prompts as drawn at random.
+def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Estimate:
+    """The mean of all values, with an interval that takes clusters as drawn at random, clipped to `within`.
 
-    Completions of one prompt resemble each other, so that only prompts count as independent: the interval is
-    Student's t with one degree of freedom less than there are prompts, clipped to [0, 1]. One prompt says
-    nothing about others: its interval is [0, 1].
-
-    Args:
-        values: one value in [0, 1] for each prompt.
-        level: how often such intervals shall hold the true mean, between 0 and 1.
-
-    Raises:
-        ValueError: there are no values, one lies outside [0, 1], or the level is not between 0 and 1.
+    The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
+    clusters with N values, and the interval is Student's t with G - 1 degrees of freedom. Where every cluster
+    has one value it is the ordinary interval of a mean. One cluster says nothing about others.
     """
-    m = len(values)
-    if m == 0:
-        raise ValueError("there is no mean of no prompts")
-    if not all(0 <= value <= 1 for value in values):
-        raise ValueError("a value lies outside [0, 1]")
-    if not 0 < level < 1:
-        raise ValueError(f"a level lies between 0 and 1, which {level} does not")
-    mean = math.fsum(values) / m
-    if m == 1:
-        return Estimate(mean, 0.0, 1.0)
-    variance = math.fsum((value - mean) ** 2 for value in values) / (m - 1)
-    margin = t_quantile((1 + level) / 2, m - 1) * math.sqrt(variance / m)
-    return Estimate(mean, max(0.0, mean - margin), min(1.0, mean + margin))
+    mean, count = mean_of(clusters), len(clusters)
+    if count == 1:
+        return Estimate(mean, *within)
+    residuals = [math.fsum(value - mean for value in values) for values in clusters]
+    size = sum(map(len, clusters))
+    variance = count / (count - 1) * math.fsum(r * r for r in residuals) / size**2
+    margin = t_quantile((1 + LEVEL) / 2, count - 1) * math.sqrt(variance)
+    return Estimate(mean, max(within[0], mean - margin), min(within[1], mean + margin))
+
+
+def mean_of(clusters: Clusters) -> float:
+    """The mean of all values; raises ValueError where there is none."""
+    if not clusters or not all(clusters):
+        raise ValueError("there is no mean where there is no value")
+    return math.fsum(value for values in clusters for value in values) / sum(map(len, clusters))
 
 
 @lru_cache(maxsize=1024)

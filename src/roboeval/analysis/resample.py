@@ -14,7 +14,7 @@ from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.metrics import Estimate, clustered_interval, share_at_least
+from roboeval.analysis.metrics import Estimate, by_formula, share_at_least
 
 LIMITS = (0, 2, 4, 8, 100)
 THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
@@ -94,7 +94,7 @@ def resampled(prompts: Sequence[CheckedPrompt], retries: int) -> Limit:
     each = tuple(chances(prompt.trials, retries) for prompt in prompts)
     return Limit(
         retries=retries,
-        passed=clustered_interval([min(one.passed, 1.0) for one in each]),
+        passed=by_formula([[min(one.passed, 1.0)] for one in each]),
         accepted=_mean([one.accepted for one in each]),
         ran=_mean([one.ran for one in each]),
         prompts={t: share_at_least([one.passed for one in each], t) for t in THRESHOLDS},

@@ -6,41 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import TypeAlias
 
 import numpy as np
 
-from roboeval.analysis.metrics import Estimate, t_quantile
+from roboeval.analysis.metrics import LEVEL, SHARE, Clusters, Estimate, mean_of, t_quantile
 
-# Values, those that resemble each other together: a prompt's, or those of all prompts of a task.
-Clusters: TypeAlias = Sequence[Sequence[float]]
-
-SHARE = (0.0, 1.0)
 DIFFERENCE = (-1.0, 1.0)
 SEED = 0
-LEVEL = 0.95
 POWER = 0.8
 FEW = 8  # clusters below which the bootstrap knows too few means, so that its interval is too narrow
 EXACT = 20  # so many clusters have 2 to the power of 20 signs, all of which are tried
 ROUNDING = 1e-12
 CHUNK = 1_000  # draws that are held at one time
-
-
-def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Estimate:
-    """The mean of all values, with an interval that takes clusters as drawn at random, clipped to `within`.
-
-    The variance of the mean is G / (G - 1) * sum over clusters of (sum of (value - mean))**2 / N**2, for G
-    clusters with N values, and the interval is Student's t with G - 1 degrees of freedom. Where every cluster
-    has one value it is the ordinary interval of a mean. One cluster says nothing about others.
-    """
-    mean, count = _mean(clusters), len(clusters)
-    if count == 1:
-        return Estimate(mean, *within)
-    residuals = [math.fsum(value - mean for value in values) for values in clusters]
-    size = sum(map(len, clusters))
-    variance = count / (count - 1) * math.fsum(r * r for r in residuals) / size**2
-    margin = t_quantile((1 + LEVEL) / 2, count - 1) * math.sqrt(variance)
-    return Estimate(mean, max(within[0], mean - margin), min(within[1], mean + margin))
 
 
 def by_bootstrap(
@@ -57,7 +34,7 @@ def by_bootstrap(
     moved outwards, as far as Student's t is wider than the normal distribution (Hesterberg's expanded
     percentiles).
     """
-    mean, count = _mean(clusters), len(clusters)
+    mean, count = mean_of(clusters), len(clusters)
     if count == 1:
         return Estimate(mean, *within)
     dice = np.random.default_rng(seed)
@@ -73,12 +50,6 @@ def by_bootstrap(
     return Estimate(mean, max(within[0], float(low)), min(within[1], float(high)))
 
 
-def _mean(clusters: Clusters) -> float:
-    if not clusters or not all(clusters):
-        raise ValueError("there is no mean where there is no value")
-    return math.fsum(value for values in clusters for value in values) / sum(map(len, clusters))
-
-
 def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) -> float:
     """How often chance alone gives a mean difference as far from 0 as this one.
 
@@ -86,7 +57,7 @@ def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) ->
     of them together. Up to 20 clusters, all signs are tried, and the answer is exact; else signs are drawn.
     It is at least 2 / 2**G for G clusters, so that few clusters cannot tell.
     """
-    _mean(clusters)
+    mean_of(clusters)
     sums = np.array([math.fsum(values) for values in clusters])
     seen = abs(float(sums.sum())) - ROUNDING
     if len(sums) <= EXACT:

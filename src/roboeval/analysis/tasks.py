@@ -11,7 +11,7 @@ import polars as pl
 
 from codebotler.core.badinput import BadInput
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import completions_of
+from roboeval.analysis.metrics import completions_of, pass_at_k
 from roboeval.evaluation.explanation import reason
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.results import Results
@@ -70,7 +70,7 @@ def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
         "completions": of_prompt.height,
         "gone": of_prompt.height - len(written),
         "passed": int(of_prompt["passed"].sum()),
-        "pass@1": int(of_prompt["passed"].sum()) / of_prompt.height,
+        "pass@1": pass_at_k(of_prompt.height, int(of_prompt["passed"].sum()), 1),
     }
 
 

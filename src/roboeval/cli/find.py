@@ -12,7 +12,6 @@ from roboeval.cli.options import (
     JsonOption,
     RunArgument,
     SuiteOption,
-    as_judged,
     cores,
     load,
     open_current,
@@ -53,10 +52,11 @@ def find(
     from roboeval.analysis.search import Question, Search
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
+    from roboeval.evaluation.runs.folder import Run, as_judged
 
     if negated and formula is None:
         fail("--not is about a formula; name one, or leave --not out")
-    known = as_judged(run, load(suite), ablated=ablation)
+    known = as_judged(Run(run), load(suite), ablated=ablation)
     question = Question(formula, negated, None if task is None else known.task(task).name, world)
     expect_question(question, known, ablated=ablation)
     searching = Search(question, workers=workers or cores())

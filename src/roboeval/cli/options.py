@@ -114,19 +114,6 @@ def load(suite: str) -> Suite:
     return load_suite(suite)
 
 
-def as_judged(run: Path, suite: Suite, *, ablated: bool) -> Suite:
-    """The suite with the worlds in which a run was judged, if other ones were drawn then."""
-    from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
-
-    path = Run(run).head(evaluation_key(suite, ablated=ablated))
-    if suite.worlds is None or not path.is_file():
-        return suite
-    match load_head(path):
-        case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0:
-            return suite.with_worlds(worlds, seed)
-    return suite
-
-
 def command(
     verb: str, *arguments: object, suite: str, ablated: bool = False, program: str | None = None
 ) -> str:
@@ -152,11 +139,12 @@ def open_run(
 ) -> Opened:
     """Read a judged run; `see` is called with each line of its verdicts."""
     from codebotler.core.badinput import BadInput
-    from roboeval.evaluation.runs.folder import Run, evaluation_key
+    from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key
     from roboeval.evaluation.runs.results import read_results
 
-    suite = as_judged(run, load(suite_name), ablated=ablated)
-    folder, key = Run(run), evaluation_key(suite, ablated=ablated)
+    folder = Run(run)
+    suite = as_judged(folder, load(suite_name), ablated=ablated)
+    key = evaluation_key(suite, ablated=ablated)
     if not folder.completions.is_file():
         raise BadInput("is no run: it holds no completions.jsonl", file=run)
     if not folder.rows(key).is_file():

@@ -9,13 +9,13 @@ from typing import Any, TypeAlias
 
 from codebotler import __version__
 from codebotler.checking.check import Check, Settings, check_on
-from codebotler.core.badinput import BadInput
-from codebotler.core.files import Appender, read_rows, to_line, to_text, write_whole
+from codebotler.core.files import Appender, to_line, to_text, write_whole
 from codebotler.simulator.imagined import Plan
 from codebotler.simulator.lane import Lane
 from roboeval.evaluation.engines import PYTHON, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run, load_head
+from roboeval.evaluation.runs.rows import read_checks
 from roboeval.suites.load import Suite
 
 ProgramKey: TypeAlias = tuple[str, str]  # a task and the hash of a program
@@ -37,7 +37,7 @@ def check_programs(
         "python": PYTHON,
     }
     with run.writing(), contextlib.closing(_open(run, metadata)) as file:
-        known = dict(_read(file))
+        known = dict(read_checks(file.path))
         programs = {(c.task, c.program_sha256): c.program for c in completions}
         yield from ((key, known[key]) for key in programs if key in known)
         new = {key: program for key, program in programs.items() if key not in known}
@@ -59,15 +59,6 @@ def _open(run: Run, metadata: dict[str, Any]) -> Appender:
         rows.unlink(missing_ok=True)
         write_whole(about, to_text(metadata))
     return Appender(rows)
-
-
-def _read(file: Appender) -> Iterator[tuple[ProgramKey, list[str]]]:
-    for number, row in read_rows(file.path):
-        match row:
-            case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
-                yield (task, program), problems
-            case _:
-                raise BadInput("this line is no check; delete the file", file=file.path, line=number)
 
 
 def _check(plans: Mapping[str, Plan], settings: Settings, lane: Lane, work: Work) -> Check:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import chain, cycle
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -291,9 +292,9 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
     axes.set_title("(a) how completions end", loc="left")
     left = np.zeros(len(found))
     places = range(len(found))
-    colours = (FAINT, *(COLOURS[at] for at in (1, 0, 3)))
-    hatches = ("", "", "////", "\\\\\\\\")
-    for name, colour, hatch in zip((PASSED, *CLASSES), colours, hatches, strict=True):
+    colours = chain([FAINT], cycle(COLOURS[at] for at in (1, 0, 3)))
+    hatches = cycle(("", "", "////", "\\\\\\\\", "...."))
+    for name, colour, hatch in zip((PASSED, *CLASSES), colours, hatches, strict=False):
         shares = np.array([one.classes.get(name, 0.0) for _, one in found])
         style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.4}
         axes.barh(places, shares, 0.72, left=left, label=label_of(name), **style)

@@ -7,8 +7,8 @@ from itertools import chain, combinations
 
 from codebotler.core.badinput import BadInput
 from roboeval.analysis.compare import compared, told_of, unlike, verdict
-from roboeval.analysis.metrics import share_at_least, threshold_curve
-from roboeval.analysis.statistics import FEW, by_bootstrap, by_formula
+from roboeval.analysis.metrics import by_formula, share_at_least, threshold_curve
+from roboeval.analysis.statistics import FEW, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun, tasks_of
 from roboeval.report.sheets import Cell, Picture, Prose, Section, Sheet, note, section, sheet

@@ -1,6 +1,7 @@
 import itertools
 import math
 import random
+from collections.abc import Sequence
 from fractions import Fraction
 
 import pytest
@@ -12,7 +13,7 @@ from roboeval.analysis.metrics import (
     Estimate,
     PromptScore,
     TaskScore,
-    clustered_interval,
+    by_formula,
     overall,
     pass_at_k,
     share_at_least,
@@ -117,35 +118,34 @@ def test_t_quantile_out_of_range(p: float, df: int) -> None:
         t_quantile(p, df)
 
 
+def over_prompts(values: Sequence[float]) -> Estimate:
+    return by_formula([[value] for value in values])
+
+
 def test_interval_by_hand() -> None:
-    assert clustered_interval([0.4, 0.6]) == Estimate(0.5, 0, 1)
-    found = clustered_interval([0.4, 0.5, 0.6])
+    assert over_prompts([0.4, 0.6]) == Estimate(0.5, 0, 1)
+    found = over_prompts([0.4, 0.5, 0.6])
     margin = 4.302652730 * math.sqrt(0.01 / 3)
     assert [found.mean, found.low, found.high] == pytest.approx([0.5, 0.5 - margin, 0.5 + margin])
-    narrow = clustered_interval([0.4, 0.5, 0.6], level=0.5)
-    assert found.low < narrow.low < narrow.high < found.high
 
 
 def test_interval_of_one_prompt_is_everything() -> None:
-    assert clustered_interval([0.3]) == Estimate(0.3, 0, 1)
+    assert over_prompts([0.3]) == Estimate(0.3, 0, 1)
 
 
 def test_interval_of_equal_prompts_is_a_point() -> None:
-    assert clustered_interval([1, 1, 1]) == Estimate(1, 1, 1)
+    assert over_prompts([1, 1, 1]) == Estimate(1, 1, 1)
 
 
 @given(VALUES)
 def test_interval_holds_the_mean(values: list[float]) -> None:
-    found = clustered_interval(values)
+    found = over_prompts(values)
     assert 0 <= found.low <= found.mean <= found.high <= 1
 
 
-@pytest.mark.parametrize(
-    ("values", "level"), [([], 0.95), ([1.1], 0.95), ([math.nan], 0.95), ([1], 0), ([1], 1)]
-)
-def test_interval_out_of_range(values: list[float], level: float) -> None:
-    with pytest.raises(ValueError, match=" "):
-        clustered_interval(values, level=level)
+def test_no_mean_of_nothing() -> None:
+    with pytest.raises(ValueError, match="no value"):
+        over_prompts([])
 
 
 @pytest.mark.parametrize(("alpha", "beta"), [(2, 3), (0.5, 0.5), (6, 2)])
@@ -155,7 +155,7 @@ def test_interval_covers_as_often_as_it_says(alpha: float, beta: float) -> None:
     covered = 0
     for _ in range(times):
         rates = (chance.betavariate(alpha, beta) for _ in range(prompts))
-        found = clustered_interval(
+        found = over_prompts(
             [sum(chance.random() < rate for _ in range(completions)) / completions for rate in rates]
         )
         covered += found.low <= true <= found.high
@@ -194,10 +194,10 @@ def test_scores_by_prompt() -> None:
 
 def test_prompts_count_the_same_however_many_completions_they_have() -> None:
     b, a = task_scores(TABLE)
-    assert b.pass_at(1) == clustered_interval([1, 1 / 3])
+    assert b.pass_at(1) == over_prompts([1, 1 / 3])
     assert b.pass_at(2).mean == pytest.approx((1 + 2 / 3) / 2)
     assert (b.lowest(1), b.highest(1)) == (1 / 3, 1)
-    assert overall([b, a], 1) == clustered_interval([1, 1 / 3, 1 / 2])
+    assert overall([b, a], 1) == over_prompts([1, 1 / 3, 1 / 2])
 
 
 def test_a_prompt_with_too_few_completions_is_named() -> None:
@@ -208,7 +208,7 @@ def test_a_prompt_with_too_few_completions_is_named() -> None:
             score(3)
     with pytest.raises(ValueError, match=r"^A, prompt 0: "):
         overall([a, b], 3)
-    with pytest.raises(ValueError, match="no prompts"):
+    with pytest.raises(ValueError, match="no value"):
         overall([], 1)
 
 

@@ -8,13 +8,11 @@ from statistics import NormalDist
 
 import pytest
 
-from roboeval.analysis.metrics import Estimate, clustered_interval
+from roboeval.analysis.metrics import Clusters, Estimate, by_formula
 from roboeval.analysis.statistics import (
     DIFFERENCE,
-    Clusters,
     Needed,
     by_bootstrap,
-    by_formula,
     needed,
     p_by_signs,
 )
@@ -27,13 +25,6 @@ def test_the_formula_by_hand() -> None:
     assert found.mean == 0.5
     assert found.high - 0.5 == pytest.approx(12.7062 / 4, abs=1e-4)
     assert by_formula([[0.0, 0.5], [0.5, 1.0]]) == Estimate(0.5, 0.0, 1.0)
-
-
-def test_clusters_of_one_give_the_interval_over_prompts() -> None:
-    values = [0.1, 0.5, 0.9, 0.3, 0.42]
-    plain = clustered_interval(values)
-    found = by_formula([[value] for value in values])
-    assert (found.mean, found.low, found.high) == pytest.approx((plain.mean, plain.low, plain.high))
 
 
 def test_clusters_of_different_size() -> None:

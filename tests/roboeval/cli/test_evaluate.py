@@ -11,10 +11,12 @@ import sys
 import zipfile
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
+from roboeval import load_results
 from seals import unseal
 
 GREETS = 'def task_program():\n    say("good day")\n'
@@ -306,6 +308,9 @@ def test_worlds_of_another_seed_are_judged_shown_and_gone_on_with(tmp_path: Path
     assert shown.status == 0
     assert "the suite has changed" not in shown.err
     assert "9:" in shown.out or "world" in shown.out
+    failed = load_results(tmp_path / "run", suite="plus").filter(pl.col("failed_checks") != "")
+    assert failed.height
+    assert failed["category"].null_count() == 0
     assert "--redo" in refused("evaluate", "run", "--suite", "plus", cwd=tmp_path).sentence
     assert roboeval("evaluate", "run", *drawn, cwd=tmp_path).status == 0
 

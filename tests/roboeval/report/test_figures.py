@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import matplotlib as mpl
 import numpy as np
@@ -18,6 +18,7 @@ from PIL import Image
 
 from made_up_runs import cases, made_up
 from roboeval.analysis.resample import LIMITS, accepted_after
+from roboeval.evaluation.failures import CLASSES, FailureClass
 from roboeval.report.cost import curves
 from roboeval.report.drawing import (
     COLOURS,
@@ -97,6 +98,16 @@ def test_other_numbers_look_different() -> None:
     other = picture("no failures", "causes")
     one, two = (np.asarray(drawn.resize((400, 300)), dtype=float) for drawn in (kept, other))
     assert np.abs(one - two).mean() / 255 > TOLERANCE
+
+
+def test_a_further_class_of_failures_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = FailureClass("RuleError", "broken rule", "broken rules", ())
+    monkeypatch.setitem(cast("dict[str, FailureClass]", CLASSES), one.name, one)
+    with styled():
+        figure = DRAWINGS["causes"](cases()["usual"])
+    assert [axes.get_title(loc="left") for axes in figure.axes][-1] == "(e) broken rules"
+    _, labels = figure.axes[0].get_legend_handles_labels()
+    assert labels[-1] == "broken rule"
 
 
 def test_the_line_through_a_bar_reaches_from_the_worst_prompt_to_the_best() -> None:

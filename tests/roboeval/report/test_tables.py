@@ -156,7 +156,7 @@ def test_published_means_are_those_of_the_table_of_pass_at_1(paper_suite: Suite)
 
 
 def test_published_causes_are_of_known_classes_and_kinds() -> None:
-    assert paper.published()["classes"].keys() == {"passed", *CLASSES}
+    assert paper.published()["classes"].keys() <= {"passed", *CLASSES}
     for name, kinds in paper.published()["kinds"].items():
         assert kinds.keys() - {"ZeroDivisionError"} <= set(CLASSES[name].kinds)
 

@@ -228,3 +228,14 @@ def tasks_to_judge(
     if not kept:
         raise BadInput(f"none of {', '.join(wanted)} has an ablation")
     return kept, left
+
+
+def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
+    """The suite with the worlds in which a run was judged, if other ones were drawn then."""
+    path = run.head(evaluation_key(suite, ablated=ablated))
+    if suite.worlds is None or not path.is_file():
+        return suite
+    match load_head(path):
+        case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0:
+            return suite.with_worlds(worlds, seed)
+    return suite

@@ -15,10 +15,17 @@ import msgspec
 import polars as pl
 
 from codebotler.core.badinput import BadInput
-from codebotler.core.files import read_rows
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
-from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
-from roboeval.evaluation.runs.rows import JudgedRow, Line, Row, RowData, add_or_raise, read_lines_of
+from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key, load_head
+from roboeval.evaluation.runs.rows import (
+    JudgedRow,
+    Line,
+    Row,
+    RowData,
+    add_or_raise,
+    read_checks,
+    read_lines_of,
+)
 from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
@@ -54,6 +61,7 @@ def load_results(
     known, folder = load_suite(suite), Run(Path(run))
     key = evaluation_key(known, ablated=ablation)
     expect_judged(folder, key)
+    known = as_judged(folder, known, ablated=ablation)
     results = read_results(folder, key, known, keep_failed=False)
     if price is None:
         return results.table
@@ -273,8 +281,7 @@ def _accepted(run: Run, key: str | None, faults: list[BadInput] | None) -> Mappi
     if not path.is_file():
         return accepted
     try:
-        for _, row in read_rows(path, growing=True):
-            accepted[row["task"], row["program_sha256"]] = not row["problems"]
+        accepted |= {program: not problems for program, problems in read_checks(path)}
     except BadInput as error:
         add_or_raise(error, faults)
     return accepted

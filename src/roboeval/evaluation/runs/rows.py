@@ -12,7 +12,7 @@ from typing import Any, TypeAlias, TypedDict
 import msgspec
 
 from codebotler.core.badinput import BadInput
-from codebotler.core.files import read_lines, to_line
+from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Status
 
@@ -199,7 +199,7 @@ def read_lines_of(
 ) -> Iterator[Line]:
     """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
     seal = seal or Seal()
-    at = 0
+    at, is_told = 0, False
     for number, line in read_lines(path, limit=LONGEST_LINE):
         seal.add(line)
         try:
@@ -212,9 +212,20 @@ def read_lines_of(
             if not line.endswith(b"\n"):
                 break
             add_or_raise(BadInput(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
+            is_told = True
         at += len(line)
-    if seal.is_broken(head) and not faults:
+    if seal.is_broken(head) and not is_told:
         add_or_raise(BadInput(f"{BROKEN}; --redo starts over", file=path), faults)
+
+
+def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
+    """The task and the hash of each program that was checked, and its problems."""
+    for number, row in read_rows(path, growing=True):
+        match row:
+            case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
+                yield (task, program), problems
+            case _:
+                raise BadInput("this line is no check; delete the file", file=path, line=number)
 
 
 # --- the seal of a finished file

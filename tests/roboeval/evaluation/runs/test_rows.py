@@ -89,6 +89,27 @@ def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
         assert read(run, faults=[]).faults, number
 
 
+def test_a_fault_of_another_file_hides_no_broken_seal(run: Run) -> None:
+    path = run.rows("paper")
+    path.write_bytes(path.read_bytes().replace(b"office 1", b"office 7", 1))
+    run.completions.write_bytes(run.completions.read_bytes().replace(b'"prompt"', b'"promt"', 1))
+    assert {fault.file for fault in read(run, faults=[]).faults} == {path, run.completions}
+
+
+@pytest.mark.parametrize(
+    "damaged", ['{"tosk": "LunchTime"}', '{"task": "LunchTime", "program_sha256": 1}', "{"]
+)
+def test_a_damaged_check_is_said_with_its_line(run: Run, damaged: str) -> None:
+    checks = run.checks("paper")
+    checks.parent.mkdir()
+    row = {"task": "LunchTime", "program_sha256": "0", "problems": []}
+    checks.write_bytes(to_line(row) + damaged.encode() + b"\n")
+    with pytest.raises(BadInput) as caught:
+        read(run)
+    assert (caught.value.file, caught.value.line) == (checks, 2)
+    assert [fault.line for fault in read(run, faults=[]).faults] == [2]
+
+
 def test_rows_that_are_missing_or_too_many_are_noticed(run: Run) -> None:
     lines = run.rows("paper").read_bytes().splitlines(keepends=True)
     for damaged in (lines[:2], [*lines, lines[0]], [*lines, b'{"torn'], [lines[1], lines[0], lines[2]]):
