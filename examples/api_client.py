@@ -71,7 +71,7 @@ def main() -> None:
         return
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "world.yaml").write_text(WORLD)
-        command = [sys.executable, "-m", "codebotler.cli.app", "serve"]
+        command = [sys.executable, "-m", "codebotler", "serve"]
         command += ["--port", "0", "--speed", "0", "--world", "world.yaml", "--face"]
         home = {**os.environ, "CODEBOTLER_HOME": folder}
         with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, env=home) as page:

@@ -1,18 +1,14 @@
-"""The command line of CodeBotler, and what all command lines of this package share."""
+"""The commands of CodeBotler, each with its options; what is long about one has a module beside this one."""
 
 from __future__ import annotations
 
-import errno
-import os
-import sys
-from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import Annotated
 
 import typer
-from typer.main import get_command
 
 from codebotler import __version__
+from codebotler.cli.ending import obey
 from codebotler.cli.options import (
     ROS_PYTHON,
     AddressOption,
@@ -32,21 +28,7 @@ from codebotler.cli.options import (
     TopPOption,
     WorldOption,
 )
-from codebotler.core.terminal import (
-    FULL,
-    drop_output,
-    flush_output,
-    note,
-    noting_all,
-    open_streams,
-    print_text,
-    system_sentence,
-)
-
-ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
-STOPPED = 130  # the status after Ctrl-C, as shells have it
-USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
-ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
+from codebotler.core.terminal import note, noting_all, print_text
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 
@@ -354,74 +336,6 @@ def virtual_robot(
         robot.wait()
     finally:
         robot.stop()
-
-
-_command = cache(get_command)
-
-
-def obey(app: typer.Typer, name: str) -> NoReturn:
-    """Run a command line and end the process; what a user can cause ends in one sentence.
-
-    The status is 2 for what was asked wrongly, 1 for what the machine could not do.
-
-    Args:
-        app: its commands.
-        name: how a user calls it.
-    """
-    if sys.platform == "win32":
-        note(f"{name}: {ON_WINDOWS}")
-        raise SystemExit(1)
-    open_streams()
-    if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
-        del os.environ["COLUMNS"]
-    try:
-        status = _command(app)(standalone_mode=False, prog_name=name)
-        flush_output()
-    except KeyboardInterrupt:
-        status = STOPPED
-    except BrokenPipeError:  # whoever read the results has read enough
-        drop_output()
-        status = 1
-    except Exception as error:
-        ending = _ending(error)
-        if ending is None:
-            raise
-        status, sentence = ending
-        note(f"{name}: {sentence}")
-        if isinstance(error, OSError) and error.filename is None:  # what is left of the output
-            drop_output()
-    if status == STOPPED:
-        note(f"{name}: stopped")
-    raise SystemExit(status if isinstance(status, int) else 0)
-
-
-def _ending(error: Exception) -> tuple[int, str] | None:
-    """The status and the sentence for an error; None for one that a user cannot cause."""
-    from codebotler.core.badinput import BadInput
-    from codebotler.models.base import BudgetSpentError, ModelError
-    from codebotler.robots.base import NotReadyError, RobotLostError
-    from codebotler.simulator.engine import EngineError
-
-    if isinstance(error, USAGE):
-        return 2, _usage_sentence(error)
-    if isinstance(error, BadInput):
-        return 2, str(error)
-    if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
-        return 1, str(error)
-    if isinstance(error, ModelError):
-        return (1 if error.may_pass else 2), error.sentence
-    if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
-        return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
-    return None
-
-
-def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' own
-    message = " ".join(error.format_message().split()).rstrip(".")
-    message = message[:1].lower() + message[1:]
-    if error.ctx is None:
-        return message
-    after = " " if message.endswith("?") else "; "
-    return f"{message}{after}`{error.ctx.command_path} --help` lists what there is"
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from codebotler import __version__
-from codebotler.cli.app import obey
+from codebotler.cli.ending import obey
 from codebotler.core.terminal import noting_all, print_text
 from roboeval.cli.compare import compare, resample
 from roboeval.cli.evaluate import evaluate, import_

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.cli.app import STOPPED
+from codebotler.cli.ending import STOPPED
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
@@ -26,7 +26,10 @@ from roboeval.cli.output import fail, note, watched
 from roboeval.cli.show import print_summary
 
 if TYPE_CHECKING:
+    from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.runs.folder import Run, Source
     from roboeval.evaluation.runs.rows import JudgedRow
+    from roboeval.suites.load import Suite
 
 
 def evaluate(
@@ -53,14 +56,10 @@ def evaluate(
     json: JsonOption = False,
 ) -> None:
     """Say of every completion whether it does what is asked."""
-    from codebotler.core.files import to_line
     from roboeval.analysis.summary import summary
-    from roboeval.evaluation.evaluate import evaluate_run
-    from roboeval.evaluation.judge import evaluate as judge_all
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, open_source, tasks_to_judge
     from roboeval.evaluation.runs.results import Scope
-    from roboeval.evaluation.runs.rows import judged_row
     from roboeval.evaluation.runs.table import TableBuilder
 
     running = engine_named(engine, workers, require_isolation=require_isolation)
@@ -82,22 +81,7 @@ def evaluate(
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
             run.keep(opened.completions)
-        rows = (
-            (
-                judged_row(to_line(row))
-                for row in judge_all(opened.of(wanted), judged_by, ablated=ablation, engine=running)
-            )
-            if run is None
-            else evaluate_run(
-                run,
-                judged_by,
-                ablated=ablation,
-                tasks=wanted,
-                redo=redo,
-                engine=running,
-                completions=opened.completions,
-            )
-        )
+        rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
         builder = TableBuilder()
         for row in watched(tally.of(rows), "judging", scope.total):
             builder.add(row)
@@ -112,6 +96,31 @@ def evaluate(
         again = "the same command tries again" if run is not None else "the others are judged as always"
         note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
         raise SystemExit(1)
+
+
+def _judged(
+    source: Source,
+    run: Run | None,
+    suite: Suite,
+    tasks: frozenset[str] | None,
+    *,
+    ablated: bool,
+    redo: bool,
+    engine: OpenEngine,
+) -> Iterator[JudgedRow]:
+    """Judge completions, in a run if there is one to keep the rows."""
+    from codebotler.core.files import to_line
+    from roboeval.evaluation.evaluate import evaluate_run
+    from roboeval.evaluation.judge import evaluate as judge_all
+    from roboeval.evaluation.runs.rows import judged_row
+
+    if run is not None:
+        completions = source.completions
+        return evaluate_run(
+            run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
+        )
+    rows = judge_all(source.of(tasks), suite, ablated=ablated, engine=engine)
+    return (judged_row(to_line(row)) for row in rows)
 
 
 def import_(

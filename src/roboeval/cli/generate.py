@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler.cli.app import STOPPED
+from codebotler.cli.ending import STOPPED
 from codebotler.cli.options import (
     BaseUrlOption,
     MaxTokensOption,

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 import command_line
-from codebotler.cli.app import app, obey
+from codebotler.cli.app import app
+from codebotler.cli.ending import obey
 from codebotler.core.terminal import busy
 from command_line import Ended, Refusal, command
 

@@ -18,7 +18,8 @@ from rich.text import Text
 
 import codebotler
 import roboeval
-from codebotler.cli.app import app, obey
+from codebotler.cli.app import app
+from codebotler.cli.ending import obey
 from codebotler.core import terminal
 from codebotler.core.badinput import BadInput
 from codebotler.models.base import ModelError
