@@ -22,6 +22,7 @@ from pydantic import (
 
 from codebotler.core.badinput import Place, YamlFile
 from codebotler.core.english import counted
+from codebotler.core.unwarned import unwarned
 
 Point: TypeAlias = tuple[float, float]
 
@@ -324,7 +325,8 @@ def expect_regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
     if isinstance(text, OptionFile):
         return
     try:
-        re.compile(text)
+        with unwarned():
+            re.compile(text)
     except (re.error, RecursionError, OverflowError) as error:
         raise file.wrong(f'"{text}" is no valid regular expression: {error}', *place) from None
 
