@@ -18,9 +18,9 @@ from pathlib import Path
 
 from codebotler.checking.check import SAMPLES, Sample, Settings, check_on
 from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.imagined import ImaginedRobot, Plan
-from codebotler.simulator.lane import Lane
-from codebotler.simulator.lots import Lot
+from codebotler.simulator.fact_sampler import Lot
+from codebotler.simulator.sampled_robot import ImaginedRobot, Plan
+from codebotler.simulator.worker import Lane
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion, recorded_completions
 from roboeval.suites.load import Suite, load_suite

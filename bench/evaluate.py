@@ -23,8 +23,8 @@ from pathlib import Path
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
 from codebotler.simulator.engine import Lanes
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.worker import Lane
 from in_process import Reused, compiled
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import load_suite

@@ -28,7 +28,7 @@ from pydantic_ai.settings import ModelSettings
 from codebotler.models.base import Settings
 from codebotler.models.chat import messages_of
 from codebotler.models.open import open_model
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import prompt_for
 
 SERVER = Path(__file__).parents[1] / "tests/codebotler/models/server.py"

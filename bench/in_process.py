@@ -17,14 +17,14 @@ from typing import IO, Any, Protocol, Self, TypeAlias
 
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
-from codebotler.simulator.conversation import described
-from codebotler.simulator.play import LESSONS, PLAY, STAGE
 from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.sandbox import REFUSED, execution
 from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, BudgetSpentError, Run
+from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.sandbox.preparing import answer
-from codebotler.simulator.sandbox.ticks import prepared
+from codebotler.simulator.skill_protocol import described
+from codebotler.simulator.warm_up import LESSONS, PLAY, STAGE
 
 CPU_SECONDS = 30
 MEMORY = 2 * 1024**3

@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from codebotler.simulator.lane import Lane
+from codebotler.simulator.worker import Lane
 from roboeval.evaluation.engines import Engine, Local, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import RayCluster

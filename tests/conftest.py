@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, settings
 
 import lanes
 import messages
-from codebotler.simulator.lane import Lane
+from codebotler.simulator.worker import Lane
 from roboeval.suites.load import Suite, load_suite
 
 # A busy machine is no fault of what is tested; and CI tries the same examples each time.

@@ -15,7 +15,7 @@ ROOTS = {"Exception", "ValueError", "RuntimeError", "BadInput"}
 WITHIN = {"codebotler.robots.ros1_worker", "codebotler.simulator.sandbox.execution"}  # of another Python
 A_SENTENCE = ("a sentence",)
 MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
-    "codebotler.core.badinput.BadInput": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),
+    "codebotler.core.errors.BadInput": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),
     "codebotler.models.base.BudgetSpentError": ((1_000, 1_012), {}),
     "codebotler.models.base.ModelError": (A_SENTENCE, {"may_pass": True, "retry_after": 2.5}),
     "codebotler.rtl.semantics.CannotJudge": ((4, 1, Option("3", is_text=False)), {}),
@@ -44,7 +44,7 @@ def exceptions() -> list[str]:
 def test_the_exceptions_are_found() -> None:
     assert {
         *MADE_OF,
-        "codebotler.simulator.lane.EngineError",
+        "codebotler.simulator.worker.EngineError",
         "codebotler.missions.mission.MissionError",
     } <= {*exceptions()}
 

@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from codebotler.core.badinput import BadInput, YamlFile
+from codebotler.core.errors import BadInput, YamlFile
 from codebotler.core.tracefile import OutcomeFile
 from codebotler.core.world import WorldFile
 from roboeval.suites.load import SUITES, read_task

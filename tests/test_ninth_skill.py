@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.program import Problem, Program
 from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status
@@ -16,8 +16,8 @@ from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
-from codebotler.simulator.imagined import IMAGINED
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
+from codebotler.simulator.sampled_robot import IMAGINED
 from roboeval.suites.load import SUITES, load_suite
 
 TABLE = SKILLS.with_skill(

@@ -21,22 +21,22 @@ __all__ = [
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from codebotler.checking.check import Check, Problem, check
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from codebotler.generation.generate import Generation
     from codebotler.generation.onecall import generate
     from codebotler.models.base import ModelError
     from codebotler.prompts import prompt_for
     from codebotler.prompts.extract import program_of
-    from codebotler.simulator.lane import EngineError
+    from codebotler.simulator.worker import EngineError
 else:  # each name is imported when it is first used
     from codebotler.core.facade import facade
 
     __getattr__, __dir__ = facade(
         __name__,
         {
-            "BadInput": "core.badinput",
+            "BadInput": "core.errors",
             "Check": "checking.check",
-            "EngineError": "simulator.lane",
+            "EngineError": "simulator.worker",
             "Generation": "generation.generate",
             "ModelError": "models.base",
             "Problem": "checking.check",

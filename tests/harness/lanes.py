@@ -14,9 +14,9 @@ from typing import TypeVar
 import pytest
 
 from codebotler.core.trace import Outcome
-from codebotler.simulator.conversation import Robot
-from codebotler.simulator.lane import EngineError, Lane
-from codebotler.simulator.zygote import Zygote
+from codebotler.simulator.fork_server import Zygote
+from codebotler.simulator.skill_protocol import Robot
+from codebotler.simulator.worker import EngineError, Lane
 
 Started = TypeVar("Started")
 IDLE: list[SharedLane] = []

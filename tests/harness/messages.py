@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 ERRORS = {
-    "BadInput": "codebotler.core.badinput",
-    "EngineError": "codebotler.simulator.lane",
+    "BadInput": "codebotler.core.errors",
+    "EngineError": "codebotler.simulator.worker",
     "MissionError": "codebotler.missions.mission",
     "ModelError": "codebotler.models.base",
     "NotReadyError": "codebotler.robots.base",

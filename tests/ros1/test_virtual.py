@@ -23,8 +23,8 @@ from codebotler.robots.ros1 import Ros1
 from codebotler.robots.scripted import AS_WRITTEN
 from codebotler.robots.virtual import VirtualRobot
 from codebotler.simulator.engine import run
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
+from codebotler.simulator.worker import Lane
 from roboeval.suites.load import Suite
 from ros_graph import Graph, free_port, started
 

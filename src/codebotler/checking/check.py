@@ -12,17 +12,17 @@ from codebotler.checking.problems import Check, Problem, Sample, failures, no_ro
 from codebotler.checking.reachability import reach
 from codebotler.checking.room_names import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.core.arguments import expect_skills, expect_text, expect_texts, expect_whole
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.program import Problem as Flaw
 from codebotler.core.program import Program, parsed
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.imagined import AS_WRITTEN, ImaginedRobot, Plan
-from codebotler.simulator.lane import Lane
-from codebotler.simulator.lots import Lot
+from codebotler.simulator.fact_sampler import Lot
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rules import Rules
+from codebotler.simulator.sampled_robot import AS_WRITTEN, ImaginedRobot, Plan
+from codebotler.simulator.worker import Lane
 
 __all__ = [
     "MORE",

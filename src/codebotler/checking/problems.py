@@ -7,13 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from codebotler.core.english import counted, listed
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.tracefile import outcome_data
+from codebotler.core.words import counted, listed
 from codebotler.simulator.child import PROCESSOR_TIME
-from codebotler.simulator.imagined import Fact, Plan, brief
-from codebotler.simulator.lots import Draw, Lot
+from codebotler.simulator.fact_sampler import Draw, Lot
+from codebotler.simulator.sampled_robot import Fact, Plan, brief
 
 MOST_FACTS = 4
 

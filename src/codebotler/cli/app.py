@@ -90,7 +90,7 @@ def generate(
     The status is 1 if a check finds problems in it.
     """
     from codebotler.cli.generate import show, write
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from codebotler.core.world import World
     from codebotler.models.base import Settings
     from codebotler.prompts import prompt_for
@@ -200,7 +200,7 @@ def missions(
 ) -> None:
     """List past missions, or show what happened in one."""
     from codebotler.cli.missions import show_mission, show_missions, write_mission
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from codebotler.core.home import home
 
     if mcap is not None and mission is None:
@@ -276,7 +276,7 @@ def serve(
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_faced, open_robot
-    from codebotler.web.desk import Desk
+    from codebotler.web.console import Desk
     from codebotler.web.place import entrance
 
     place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.storyboard import steps_of, storyboard
-from codebotler.core.badinput import MAX_BYTES, BadInput, read_text, text_of
+from codebotler.core.errors import MAX_BYTES, BadInput, read_text, text_of
 from codebotler.core.program import TASK, bound_names
 from codebotler.core.terminal import shortened, visible
 from codebotler.prompts.extract import program_of

@@ -59,7 +59,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 
 def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for one that a user cannot cause."""
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.robots.base import NotReadyError, RobotLostError
     from codebotler.simulator.engine import EngineError

@@ -16,10 +16,10 @@ from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, Generation, generate, untold
 from codebotler.models.base import Model, Settings
 from codebotler.models.open import kind_of, open_model
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import Prompt
 from codebotler.simulator.engine import Lanes
-from codebotler.simulator.imagined import Plan
+from codebotler.simulator.sampled_robot import Plan
 
 
 def write(

@@ -13,7 +13,7 @@ from codebotler.checking.check import check
 from codebotler.cli.check import check_view, read_program
 from codebotler.cli.generate import generated
 from codebotler.cli.missions import tell_interrupted
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.missions.mission import GRACE, Mission, MissionError, State
 from codebotler.missions.preflight import beyond, preflight, unknown_rooms
@@ -22,7 +22,7 @@ from codebotler.models.base import Model
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import Robot
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.imagined import Plan
+from codebotler.simulator.sampled_robot import Plan
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",

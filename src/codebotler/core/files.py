@@ -12,7 +12,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 MAX_ROW = 5_000_000
 CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no folder to the disk

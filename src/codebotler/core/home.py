@@ -6,7 +6,7 @@ import errno
 import os
 from pathlib import Path
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 
 def home() -> Path:

@@ -8,9 +8,9 @@ import symtable
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from codebotler.core.english import counted, listed
 from codebotler.core.skills import SKILLS, Parameter, Skill, SkillTable
 from codebotler.core.syntaxtree import parse, reading
+from codebotler.core.words import counted, listed
 
 TASK = "task_program"
 GIVEN = ("time", "sys")  # modules that every program finds imported

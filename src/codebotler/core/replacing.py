@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 
 def expect_replaceable(path: Path, *beginnings: bytes) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, StrictStr, model_validator
 
-from codebotler.core.badinput import BadInput, YamlFile
+from codebotler.core.errors import BadInput, YamlFile
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 

@@ -20,9 +20,9 @@ from pydantic import (
     model_validator,
 )
 
-from codebotler.core.badinput import Place, YamlFile
-from codebotler.core.english import counted
+from codebotler.core.errors import Place, YamlFile
 from codebotler.core.unwarned import unwarned
+from codebotler.core.words import counted
 
 Point: TypeAlias = tuple[float, float]
 

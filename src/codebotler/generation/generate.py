@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
-from codebotler.core.english import counted
+from codebotler.core.words import counted
 from codebotler.models.base import Heard, Model, Reply, unheard
 from codebotler.prompts import Prompt
 

@@ -8,12 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 from codebotler.checking.check import check
 from codebotler.core.arguments import expect_text, expect_texts, expect_whole
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.generation.generate import Generation
 from codebotler.generation.generate import generate as ask
 from codebotler.models.base import Model, Settings
 from codebotler.models.open import open_model
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import prompt_for
 from codebotler.simulator.engine import Lanes
 

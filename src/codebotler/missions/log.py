@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 EVENTS, SUMMARY = "events.jsonl", "mission.json"
 TEXTS = ("id", "state", "robot", "instruction", "model", "program", "reason", "if_tool_dies")

@@ -21,7 +21,7 @@ from codebotler.missions.log import Line, Log, Summary
 from codebotler.missions.pictures import Pictures
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.lane import EngineError, Lane
+from codebotler.simulator.worker import EngineError, Lane
 
 GRACE = 10.0
 """Real seconds in which a robot has to end what it does once it was told to stop."""

@@ -8,8 +8,8 @@ from codebotler.core.program import called_skills
 from codebotler.core.terminal import note, shortened, visible
 from codebotler.missions.live import answered
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
-from codebotler.simulator.imagined import Plan
 from codebotler.simulator.robot import RobotError
+from codebotler.simulator.sampled_robot import Plan
 
 MOST_ROOMS = 1_000
 """Of a robot, for a check: each drive is compared with all of them."""

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.pasted import mission_command
 from codebotler.missions.live import in_words
 from codebotler.missions.log import SUMMARY, Line, Log, Summary, doing, events_of

@@ -11,7 +11,7 @@ from typing import Protocol, TypeAlias
 from urllib.parse import urlsplit
 
 from codebotler.core.arguments import expect_number, expect_whole
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.prompts import Prompt
 from codebotler.prompts.extract import program_of
 

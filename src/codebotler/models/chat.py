@@ -29,10 +29,12 @@ from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
-from codebotler.models.bounded import bound, limit_of
-from codebotler.models.faults import (
+from codebotler.models.keys import blank_is_unset, key_in
+from codebotler.models.redaction import guard_logs, without_keys
+from codebotler.models.reply_limit import bound, limit_of
+from codebotler.models.server_errors import (
     brief,
     broken_off,
     fault,
@@ -42,8 +44,6 @@ from codebotler.models.faults import (
     told_before,
     unreachable,
 )
-from codebotler.models.keys import blank_is_unset, key_in
-from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.prompts import Message, Prompt, Shown
 
 OWN_SERVER = "openai-chat"  # what servers of one's own speak

@@ -9,12 +9,20 @@ import time
 import openai
 from openai.types import Completion
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
-from codebotler.models.bounded import bound, limit_of
-from codebotler.models.faults import broken_off, fault, late, refused, retry_after, told_before, unreachable
 from codebotler.models.keys import key_in
 from codebotler.models.redaction import guard_logs, without_keys
+from codebotler.models.reply_limit import bound, limit_of
+from codebotler.models.server_errors import (
+    broken_off,
+    fault,
+    late,
+    refused,
+    retry_after,
+    told_before,
+    unreachable,
+)
 from codebotler.prompts import Prompt
 
 KEY = "OPENAI_API_KEY"

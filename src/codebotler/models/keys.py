@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 
 def key_in(variable: str) -> str | None:

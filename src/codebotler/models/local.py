@@ -14,10 +14,10 @@ import jinja2
 import torch
 import transformers
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
-from codebotler.models.faults import brief, fault
 from codebotler.models.redaction import guard_logs
+from codebotler.models.server_errors import brief, fault
 from codebotler.prompts import Message, Prompt
 from codebotler.prompts.rendering import task_end
 

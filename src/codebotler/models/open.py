@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from codebotler.core.arguments import expect_text
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import Model, Settings
 from codebotler.models.recorded import Recital, recorded_model
 

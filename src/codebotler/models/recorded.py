@@ -14,8 +14,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.badinput import BadInput, YamlFile
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.errors import BadInput, YamlFile
 from codebotler.models import base
 from codebotler.models.base import Heard, ModelError, Usage, unheard
 from codebotler.prompts import Prompt

@@ -7,7 +7,7 @@ from typing import Protocol, TypeAlias
 
 from PIL.Image import Image
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import visible
 
 Box: TypeAlias = tuple[float, float, float, float]

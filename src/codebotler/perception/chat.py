@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from PIL.Image import Image
 
 from codebotler.models.base import Model, ModelError
-from codebotler.models.faults import brief
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
+from codebotler.models.server_errors import brief
 from codebotler.perception.base import Box, PerceptionError, Sighting, named
 from codebotler.perception.image import jpeg_of
 from codebotler.prompts import Message, Prompt, Shown

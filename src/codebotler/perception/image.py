@@ -10,9 +10,9 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.unwarned import unwarned
-from codebotler.models.faults import brief
+from codebotler.models.server_errors import brief
 from codebotler.perception.base import Sighting
 
 FORMATS = ("JPEG", "PNG", "WEBP")

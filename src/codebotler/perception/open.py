@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import Settings
 from codebotler.models.open import EXTRA, kind_of
 from codebotler.perception.base import Detector

@@ -10,9 +10,9 @@ import torch
 import transformers
 from PIL.Image import Image
 
-from codebotler.core.badinput import BadInput
-from codebotler.models.faults import brief
+from codebotler.core.errors import BadInput
 from codebotler.models.redaction import guard_logs
+from codebotler.models.server_errors import brief
 from codebotler.perception.base import PerceptionError, Sighting, named
 
 TASK = "zero-shot-object-detection"

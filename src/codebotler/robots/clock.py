@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 FASTEST, SLOWEST = 1e6, 1e-6
 """Speeds beyond which numbers of seconds stop being exact, and nobody would watch."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, cast
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.robots.base import Options, Readiness, Robot
 from codebotler.robots.face import Face
 from codebotler.robots.faced import Faced, unspoken

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.robots.address import endpoint
 from codebotler.robots.base import Options, Readiness

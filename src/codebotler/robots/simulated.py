@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.world import World, laid_out
 from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Readiness, Result, untold

@@ -1,6 +1,5 @@
 """The Robot Temporal Logic of the paper: parse a formula, test it on a trace, and say why it fails."""
 
-from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.explain import Explanation, explain
 from codebotler.rtl.formula import (
     ActAtFirst,
@@ -22,6 +21,7 @@ from codebotler.rtl.formula import (
 )
 from codebotler.rtl.semantics import CannotJudge, holds
 from codebotler.rtl.syntax import RtlSyntaxError, parse
+from codebotler.rtl.text.claims import Claim, Number, Time
 
 __all__ = [
     "ActAtFirst",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, assert_never
 
-from codebotler.core.english import listed, times
+from codebotler.core.words import listed, times
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, AtLeast, Count, Exists, Stay
 from codebotler.rtl.phrases import is_any, missing, room, room_name
 from codebotler.rtl.semantics import CannotJudge, at_place, first, first_stay, matches

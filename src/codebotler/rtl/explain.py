@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TYPE_CHECKING, assert_never
 
-from codebotler.core.english import listed, times
+from codebotler.core.words import listed, times
 from codebotler.rtl.absence import Absence, Reason, seen, steps_of
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or
 from codebotler.rtl.phrases import is_any, shortened

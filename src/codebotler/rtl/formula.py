@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
+from codebotler.rtl.text.claims import Claim, Number, Time
 
 CutName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
 

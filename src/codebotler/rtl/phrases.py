@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from codebotler.core.english import listed
+from codebotler.core.words import listed
 from codebotler.rtl.choice import PLAIN, choices
-from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.formula import Regex, Text, Without, Words
 from codebotler.rtl.pattern import compile_regex
+from codebotler.rtl.text.claims import Claim, Number, Time
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

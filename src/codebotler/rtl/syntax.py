@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, get_args
 
 from codebotler.core.skills import SKILLS
 from codebotler.core.syntaxtree import parse_expression
-from codebotler.rtl.claims import Claim, Number, Time, minutes
 from codebotler.rtl.formula import (
     ActAtFirst,
     ActAtSome,
@@ -29,6 +28,7 @@ from codebotler.rtl.formula import (
     Without,
     Words,
 )
+from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
-from codebotler.core.english import listed
+from codebotler.core.words import listed
 from codebotler.rtl.formula import Element, Regex, Text, Without
 from codebotler.rtl.phrases import either, is_any, lacks, literals, quoted, room, room_name, with_texts
 

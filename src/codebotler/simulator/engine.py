@@ -17,9 +17,9 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world import World
 from codebotler.simulator.distinct import Distinct
-from codebotler.simulator.lane import EngineError, Lane
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
+from codebotler.simulator.worker import EngineError, Lane
 
 __all__ = ["EngineError", "Lanes", "digest", "run"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from typing import TypeAlias
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.core.world import Answer, Person, World

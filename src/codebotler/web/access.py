@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 TRIES, WINDOW = 10, 60.0
 """So many wrong tokens may come from an address in so many seconds."""

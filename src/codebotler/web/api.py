@@ -15,13 +15,13 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS, Line, Summary, events_of
 from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import MissionError
 from codebotler.missions.store import find, missions, summary_of
-from codebotler.web.desk import MOST_PROGRAM, Desk
+from codebotler.web.console import MOST_PROGRAM, Desk
 from codebotler.web.turn import Turn
 from codebotler.web.view import Order, View
 

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from codebotler.core.terminal import visible_lines
 from codebotler.missions.mission import UNCONFIRMED
 from codebotler.robots.face import AnswerError, Ended, Face, Question
-from codebotler.web.desk import Desk
+from codebotler.web.console import Desk
 
 PAGE = Path(__file__).with_name("static") / "face.html"
 POLICY = (

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from codebotler.web.desk import Desk
+from codebotler.web.console import Desk
+from codebotler.web.elements import Words
 from codebotler.web.frame import PATIENCE, Frame
-from codebotler.web.instruct import Instruct
-from codebotler.web.past import add as add_past
-from codebotler.web.programpane import ProgramPane
-from codebotler.web.status import Status
+from codebotler.web.panes.instruction import Instruct
+from codebotler.web.panes.past import add as add_past
+from codebotler.web.panes.program import ProgramPane
+from codebotler.web.panes.robot import Status
 from codebotler.web.view import View
-from codebotler.web.words import Words
 
 PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h-status"))
 EVERY = 0.1

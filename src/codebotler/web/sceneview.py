@@ -6,8 +6,8 @@ from collections.abc import Container
 
 from nicegui import ui
 
+from codebotler.web.elements import Words
 from codebotler.web.strip import Scene
-from codebotler.web.words import Words
 
 SPOKEN = frozenset({"say", "ask", "answer"})
 

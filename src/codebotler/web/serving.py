@@ -24,11 +24,11 @@ from starlette.routing import BaseRoute, Match, Mount
 from starlette.types import ASGIApp
 
 from codebotler import __version__
-from codebotler.core.english import listed
 from codebotler.core.terminal import note
+from codebotler.core.words import listed
 from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
-from codebotler.web.desk import Desk
+from codebotler.web.console import Desk
 from codebotler.web.frame import FACE, ROBOT, Frame
 from codebotler.web.further import Further, Site
 from codebotler.web.guard import MOST_BYTES, REFUSAL, Guard

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from codebotler.core.english import listed
-from codebotler.simulator.imagined import SOMEBODY, Fact, Reply, Whereabouts, brief
+from codebotler.core.words import listed
+from codebotler.simulator.sampled_robot import SOMEBODY, Fact, Reply, Whereabouts, brief
 
 PLAIN = re.compile(r"[\w' -]+")
 """Names of rooms that need no quotes; others could be read as part of the sentence."""

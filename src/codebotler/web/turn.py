@@ -11,19 +11,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.checking.problems import Check
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import generate
 from codebotler.missions.log import Line
 from codebotler.missions.mission import STEPS, Mission, MissionError, State
 from codebotler.missions.preflight import beyond, preflight, unknown_rooms
 from codebotler.models.base import Model, ModelError
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.engine import EngineError
-from codebotler.simulator.imagined import Plan
+from codebotler.simulator.sampled_robot import Plan
 from codebotler.web.view import Order, View, digest
 
 LOG = logging.getLogger("codebotler.web")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from codebotler.checking.problems import Check
 from codebotler.missions.mission import State
-from codebotler.simulator.imagined import Plan
+from codebotler.simulator.sampled_robot import Plan
 from codebotler.web.progress import Progress
 
 

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from math import fsum
 from typing import Any
 
-from codebotler.core.badinput import BadInput
-from codebotler.core.english import counted
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import visible
+from codebotler.core.words import counted
 from roboeval.analysis.metrics import Estimate, by_formula
 from roboeval.analysis.statistics import (
     DIFFERENCE,

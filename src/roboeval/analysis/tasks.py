@@ -9,7 +9,7 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import completions_of, pass_at_k
 from roboeval.evaluation.explanation import reason

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from roboeval.analysis.cluster import Cluster, cluster_data, clusters, groups
 from roboeval.analysis.compare import Comparison, PromptScores, compared, comparison_data
 from roboeval.analysis.metrics import pass_at_1

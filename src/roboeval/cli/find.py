@@ -87,7 +87,7 @@ def find(
 
 def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
     """Refuse a wrong formula, and a world that no task has."""
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from codebotler.rtl import RtlSyntaxError, parse
 
     if question.formula is not None:

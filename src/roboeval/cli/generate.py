@@ -19,7 +19,7 @@ from codebotler.cli.options import (
     TimeoutOption,
     TopPOption,
 )
-from codebotler.core.english import counted
+from codebotler.core.words import counted
 from roboeval.cli.evaluate import evaluate
 from roboeval.cli.options import (
     BudgetOption,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from codebotler.core.english import counted
+from codebotler.core.words import counted
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def suite_names(incomplete: str) -> list[str]:
 
 def task_names(context: typer.Context, incomplete: str) -> list[str]:
     """The tasks of the suite that the line names, or of the paper's."""
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from roboeval.suites.load import suite_folder, task_files
 
     try:
@@ -138,7 +138,7 @@ def open_run(
     run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
 ) -> Opened:
     """Read a judged run; `see` is called with each line of its verdicts."""
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key
     from roboeval.evaluation.runs.results import read_results
 
@@ -170,7 +170,7 @@ def open_current(
 
     Raises BadInput if there is none, or if the programs were changed since.
     """
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
 
     opened = open_run(run, suite_name, ablated=ablated, see=see)
     if (complaint := complaint_of(opened.results)) is not None:

@@ -137,7 +137,7 @@ def serve(
 
     They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
     """
-    from codebotler.core.badinput import BadInput
+    from codebotler.core.errors import BadInput
     from codebotler.web.place import entrance
     from codebotler.web.serving import serve as serve_page
     from roboeval.web.pages import pages

@@ -10,8 +10,8 @@ from typing import Any, TypeAlias
 from codebotler import __version__
 from codebotler.checking.check import Check, Settings, check_on
 from codebotler.core.files import Appender, to_line, to_text, write_whole
-from codebotler.simulator.imagined import Plan
-from codebotler.simulator.lane import Lane
+from codebotler.simulator.sampled_robot import Plan
+from codebotler.simulator.worker import Lane
 from roboeval.evaluation.engines import PYTHON, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run, load_head

@@ -9,7 +9,7 @@ from typing import Protocol, Self, TypeAlias, TypeVar
 
 from codebotler.core.arguments import expect_whole
 from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.lane import Lane
+from codebotler.simulator.worker import Lane
 
 PYTHON = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program

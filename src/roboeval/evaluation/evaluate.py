@@ -9,7 +9,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.files import Appender, to_line, to_text, write_whole
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import evaluation, head, judgements

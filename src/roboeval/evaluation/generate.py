@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, field
 
 from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_whole
 from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Settings, unheard
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import Prompt, prompt_for
 from roboeval.evaluation.requests import (
     GenerationPlan,

@@ -15,7 +15,7 @@ from inspect_ai.solver import Generate, Solver, TaskState, solver
 from codebotler.models.base import Settings
 from codebotler.prompts import prompt_for
 from codebotler.prompts.extract import program_of
-from codebotler.simulator.warm import warm
+from codebotler.simulator.pool import warm
 from roboeval.evaluation.engines import Local
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.judge import evaluate

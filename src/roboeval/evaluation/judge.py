@@ -16,13 +16,13 @@ from typing import Any
 from msgspec import to_builtins
 
 from codebotler import __version__
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Outcome, Status, Trace
 from codebotler.core.tracefile import outcome_data
 from codebotler.rtl import CannotJudge, holds
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
+from codebotler.simulator.worker import Lane
 from roboeval.evaluation.engines import PYTHON, Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown

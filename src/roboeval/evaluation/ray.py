@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.simulator.distinct import MOST_AHEAD, Done
 from codebotler.simulator.engine import NO_SECCOMP, digest
-from codebotler.simulator.lane import EngineError, Lane
+from codebotler.simulator.worker import EngineError, Lane
 from roboeval.evaluation.engines import PYTHON, Ran, Value, Work
 
 LOG = logging.getLogger("roboeval.ray")

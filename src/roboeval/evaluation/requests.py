@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
 from codebotler.models.base import Settings
 from codebotler.prompts import template_hash

@@ -13,11 +13,11 @@ from os import PathLike
 from statistics import fmean
 
 from codebotler.core.arguments import expect_texts
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
+from codebotler.simulator.pool import warm
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.warm import warm
 from roboeval.evaluation.judge import is_met, may_satisfy
 from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite

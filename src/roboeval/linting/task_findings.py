@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import NamedTuple
 
-from codebotler.core.badinput import YamlFile
+from codebotler.core.errors import YamlFile
 from codebotler.core.world import World
 from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements

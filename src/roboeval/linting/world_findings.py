@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from codebotler.core.badinput import YamlFile
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.english import listed
+from codebotler.core.errors import YamlFile
+from codebotler.core.words import listed
 from codebotler.rtl import Formula, Regex, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements

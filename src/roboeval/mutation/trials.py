@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import World
 from codebotler.simulator.engine import Lanes, digest

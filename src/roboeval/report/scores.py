@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, combinations
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from roboeval.analysis.compare import compared, told_of, unlike, verdict
 from roboeval.analysis.metrics import by_formula, share_at_least, threshold_curve
 from roboeval.analysis.statistics import FEW, by_bootstrap

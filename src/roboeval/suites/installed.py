@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 
 
 class InstalledSuite(NamedTuple):

@@ -12,9 +12,9 @@ from os import PathLike
 from pathlib import Path
 
 from codebotler.core.arguments import expect_whole
-from codebotler.core.badinput import BadInput, YamlFile
-from codebotler.core.english import counted
+from codebotler.core.errors import BadInput, YamlFile
 from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.words import counted
 from codebotler.simulator.rules import Rules
 from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MOST_WORLDS, Accepted, Fact, SuiteFile

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from codebotler.core.badinput import YamlFile
+from codebotler.core.errors import YamlFile
 from codebotler.core.world import Name, Text
 from codebotler.models.recorded import NAMES, Recording, Solution
 from roboeval.suites.load import Task

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.core.english import counted
+from codebotler.core.words import counted
 from codebotler.core.world import Answer, Person, World
 from codebotler.rtl import Formula
 from roboeval.suites.schema import Ability, Accepted, Category, Fact

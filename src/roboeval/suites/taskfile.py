@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.core.badinput import BadInput, Place, YamlFile
+from codebotler.core.errors import BadInput, Place, YamlFile
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.syntaxtree import parse_expression
 from codebotler.core.world import expect_regex

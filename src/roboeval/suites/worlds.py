@@ -12,8 +12,8 @@ from random import Random
 from types import SimpleNamespace
 from typing import Any, TypeAlias
 
-from codebotler.core.badinput import YamlFile
 from codebotler.core.cachedproperty import cached_property
+from codebotler.core.errors import YamlFile
 from codebotler.core.world import OptionFile, Person, Room, World
 from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
 from roboeval.suites.pairwise import Row, spread

@@ -10,7 +10,7 @@ from typing import Annotated, TypeAlias
 from fastapi import APIRouter, Depends, HTTPException, Query
 from fastapi.responses import Response
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.web.run_store import RunGoneError, RunStore
 from roboeval.web.serializers import RunList, completion_details, entry_data, run_details

@@ -8,9 +8,9 @@ from typing import Any
 
 from nicegui import html, ui
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import shortened
-from codebotler.web.words import Words
+from codebotler.web.elements import Words
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data

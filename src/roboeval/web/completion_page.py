@@ -10,13 +10,13 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.checking.storyboard import step_text
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import shortened
 from codebotler.core.world import World
+from codebotler.web.elements import Words
 from codebotler.web.floorplan import floorplan
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import scenes
-from codebotler.web.words import Words
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED, cut_told
 from roboeval.evaluation.failures import label_of

@@ -10,7 +10,7 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.core.terminal import shortened
-from codebotler.web.words import Press, Words
+from codebotler.web.elements import Press, Words
 from roboeval.evaluation.failures import plural_of
 from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models_of, percent
 from roboeval.web.run_store import RunGoneError, RunStore

@@ -9,10 +9,10 @@ from typing import Any, TypeAlias
 
 from nicegui import html, ui
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.pasted import runnable
 from codebotler.core.terminal import shortened
-from codebotler.web.words import Press, Words
+from codebotler.web.elements import Press, Words
 from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import EVERY, count_text, show_state

@@ -10,7 +10,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import shortened
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import GONE, completion_data

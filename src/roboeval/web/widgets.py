@@ -11,11 +11,11 @@ from typing import Any
 from nicegui import html, ui
 from nicegui.element import Element
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
+from codebotler.web.elements import Words
 from codebotler.web.frame import Frame
-from codebotler.web.words import Words
 from roboeval.web.heat_map import NONE
 from roboeval.web.serializers import State
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import pytest
 
 from codebotler.checking.check import MORE, Check, Sample, Settings, check, check_on
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Status
 from codebotler.simulator.engine import Lanes
-from codebotler.simulator.imagined import Plan
-from codebotler.simulator.lane import Lane
-from codebotler.simulator.lots import Lot
+from codebotler.simulator.fact_sampler import Lot
+from codebotler.simulator.sampled_robot import Plan
+from codebotler.simulator.worker import Lane
 
 ROOMS = ("start_loc", "kitchen", "alice's office", "bob's office")
 START = "def task_program():\n    "

@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.home import home
 from codebotler.models.recorded import recorded_model
 from command_line import Ended, command

@@ -21,7 +21,7 @@ import roboeval
 from codebotler.cli.app import app
 from codebotler.cli.ending import obey
 from codebotler.core import terminal
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import ModelError
 
 EVIL = "a\x1b]0;owned\x07\x1b[2J\x9b31m\u202eb\tc\x7f"

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.core.tracefile import outcome_data, outcome_yaml, read_outcome, trace_data, trace_from
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.badinput import BadInput, YamlFile
+from codebotler.core.errors import BadInput, YamlFile
 from codebotler.core.unwarned import unwarned
 from codebotler.core.world import HALLWAY, Person, Room, World, WorldFile, laid_out
 

@@ -16,9 +16,9 @@ from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, Result, RobotLostError
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
 from codebotler.simulator.rules import PAPER
+from codebotler.simulator.worker import Lane
 from doubles import Answering, giving, raising
 from roboeval.suites.load import Suite
 

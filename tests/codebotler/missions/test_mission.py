@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Room, World
 from codebotler.missions import mission as module
@@ -24,9 +24,9 @@ from codebotler.missions.store import find, missions, recover
 from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator import conversation
-from codebotler.simulator.lane import Lane
+from codebotler.simulator import skill_protocol
 from codebotler.simulator.robot import RobotError
+from codebotler.simulator.worker import Lane
 from doubles import Answering, giving, raising
 from processes import are_gone, children_of
 
@@ -513,7 +513,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
             mission.stop("the test")
             super().__init__()
 
-        def run_live(self, source: str, robot: conversation.Robot) -> Outcome:
+        def run_live(self, source: str, robot: skill_protocol.Robot) -> Outcome:
             begun.append(source)
             return super().run_live(source, robot)
 

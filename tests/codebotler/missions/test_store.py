@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.missions.log import EVENTS, SUMMARY, Log, Summary, events_of
 from codebotler.missions.mission import Mission, State
 from codebotler.missions.store import missions, recover

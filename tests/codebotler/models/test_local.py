@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import ModelError, Reply, Settings
 from codebotler.models.open import open_model
 from codebotler.prompts import prompt_for

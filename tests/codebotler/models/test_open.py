@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import Settings
 from codebotler.models.open import open_model
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
 from codebotler.models import base

@@ -26,7 +26,7 @@ logging.getLogger().addHandler(logging.FileHandler("log.txt"))
 
 from codebotler.models.base import ModelError, Settings
 from codebotler.models.open import open_model
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import prompt_for
 
 async def main(url):

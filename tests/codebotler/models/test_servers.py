@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import openai
 import pytest
 
-from codebotler.models import bounded
+from codebotler.models import reply_limit
 from codebotler.models.base import Model, ModelError, Reply, Settings, Usage
 from codebotler.models.open import open_model
 from codebotler.prompts import Message, Prompt, prompt_for
@@ -271,7 +271,7 @@ def test_more_than_a_reply_can_be_is_not_read(
 ) -> None:
     for key in ("ANTHROPIC_API_KEY", "GOOGLE_API_KEY", "OPENAI_API_KEY"):
         monkeypatch.setenv(key, "a key of nobody")
-    monkeypatch.setattr(bounded, "FLOOR", 200_000)
+    monkeypatch.setattr(reply_limit, "FLOOR", 200_000)
     unpacked: list[int] = []
     real = zlib.decompressobj
 
@@ -294,7 +294,7 @@ def test_more_than_a_reply_can_be_is_not_read(
     assert caught.value.may_pass is may_pass
     assert caught.value.sentence.startswith(name.partition(":")[0])
     assert len(server.requests) == 1
-    assert sum(unpacked) <= 200_000 + bounded.PIECE
+    assert sum(unpacked) <= 200_000 + reply_limit.PIECE
     assert any(unpacked) == (fault in {Fault.UNPACKS, Fault.UNPACKS_AS_ERROR})
 
 
@@ -308,8 +308,8 @@ def test_a_packed_reply_is_a_reply(name: str, server: Server) -> None:
 
 
 def test_a_limit_follows_the_tokens() -> None:
-    assert bounded.limit_of(1) == bounded.FLOOR
-    assert bounded.limit_of(100_000) == 100_000 * bounded.PER_TOKEN > bounded.FLOOR
+    assert reply_limit.limit_of(1) == reply_limit.FLOOR
+    assert reply_limit.limit_of(100_000) == 100_000 * reply_limit.PER_TOKEN > reply_limit.FLOOR
 
 
 @both

@@ -12,8 +12,8 @@ from functools import partial
 import pytest
 from PIL import Image
 
-from codebotler.core.badinput import BadInput
-from codebotler.models import paced
+from codebotler.core.errors import BadInput
+from codebotler.models import rate_limit
 from codebotler.perception import Detector, PerceptionError, Sighting, image_of, jpeg_of, open_detector
 from codebotler.perception.chat import LONGEST_REPLY, SYSTEM, TRIES, sighting_in
 from codebotler.perception.open import LOOKING
@@ -44,7 +44,7 @@ def detector(server: Server) -> Iterator[Detector]:
 
 @pytest.fixture
 def _hurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(paced, "LONGEST_WAIT", 0.01)
+    monkeypatch.setattr(rate_limit, "LONGEST_WAIT", 0.01)
 
 
 def shown(request: Request) -> tuple[str, bytes]:

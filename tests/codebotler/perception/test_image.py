@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.perception import Sighting, boxed, image_from_ros, image_of, jpeg_of, read_image
 from codebotler.perception.image import MAX_BYTES
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.perception import Detector, PerceptionError, open_detector
 
 REASON = "torch and transformers are not installed; `make test-transformers` has them"

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.robots.clock import Clock
 
 

@@ -27,8 +27,8 @@ from codebotler.robots.pyrobosim import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY
 from codebotler.simulator.engine import run
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import RobotError
+from codebotler.simulator.worker import Lane
 from roboeval.suites.load import Suite
 
 REASON = "pyrobosim is not installed; `make test-pyrobosim` has it"

@@ -8,7 +8,7 @@ from importlib import metadata
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.world import Room, World
 from codebotler.robots.base import NotReadyError, Options, Robot
 from codebotler.robots.open import all_readiness, open_robot

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.world import Person, Room, World
 from codebotler.robots import ros1
 from codebotler.robots.base import CancelledError, Options, Picture, Robot

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.world import Room, World
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, SimulatedRobot
-from codebotler.simulator.sandbox.walls import NOBODY
+from codebotler.simulator.sandbox.isolation import NOBODY
+from codebotler.simulator.worker import Lane
 from processes import children_of, lives
 
 WORLD = World((Room("start_loc"),), "start_loc")
@@ -125,7 +125,8 @@ def test_nothing_of_the_engines_environment_is_handed_on(enclosed: dict[str, Enc
 
 ASKED = """
 import ctypes, os, sys
-from codebotler.simulator.sandbox import forking, walls
+from codebotler.simulator.sandbox import forking
+from codebotler.simulator.sandbox import isolation
 {deed}
 signal = ctypes.c_int()
 ctypes.CDLL(None).prctl(2, ctypes.byref(signal))  # PR_GET_PDEATHSIG
@@ -133,7 +134,7 @@ os._exit(100 + signal.value + 50 * ctypes.CDLL(None).prctl(3))  # PR_GET_DUMPABL
 """
 DEEDS = {
     "pass": 150,
-    "os.geteuid = lambda: 1000; walls.give_up_rights()": 109,  # whoever was root is not dumpable anyhow
+    "os.geteuid = lambda: 1000; isolation.give_up_rights()": 109,  # whoever was root is not dumpable anyhow
     "forking.go_behind_walls(1, None, 5, os.getppid().to_bytes(8, 'big'))": 159,
     "forking.go_behind_walls(1, None, 5, (os.getppid() + 1).to_bytes(8, 'big'))": 1,  # orphaned before that
 }

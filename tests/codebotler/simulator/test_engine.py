@@ -21,13 +21,13 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
 from codebotler.simulator import isolated
 from codebotler.simulator.child import Child
-from codebotler.simulator.conversation import OVERRUN, Answer, Conversation
 from codebotler.simulator.engine import EngineError, Lanes, digest, run
+from codebotler.simulator.fork_server import Zygote
 from codebotler.simulator.isolated import codes
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.simulator.zygote import Zygote
+from codebotler.simulator.skill_protocol import OVERRUN, Answer, Conversation
+from codebotler.simulator.worker import Lane
 from processes import are_gone, children_of, zygotes
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")

@@ -35,9 +35,9 @@ from codebotler.core.tracefile import outcome_data
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
 from codebotler.simulator.child import PROCESSOR_TIME
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
+from codebotler.simulator.worker import Lane
 from roboeval.evaluation.judge import judge
 from roboeval.suites.load import Requirement, Scenario
 

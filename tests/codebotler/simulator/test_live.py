@@ -14,9 +14,9 @@ import pytest
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.engine import EngineError
-from codebotler.simulator.lane import Lane
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, PAPER
+from codebotler.simulator.worker import Lane
 from processes import are_gone, children_of, zygotes
 
 LIVE = replace(PAPER, literals="as-written", limits=ENDLESS)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.simulator.sandbox import walls
+from codebotler.simulator.sandbox import isolation
 
 SCRIPT = """
 import ctypes, errno, os, platform, resource, select, signal, socket, tempfile, time
-from codebotler.simulator.sandbox import walls
+from codebotler.simulator.sandbox import isolation
 os.dup2(1, 3)
 libc = ctypes.CDLL(None, use_errno=True)
 libc.mmap.restype = ctypes.c_ssize_t
@@ -34,11 +34,11 @@ def succeed(result):
     return result
 
 def only_seccomp():
-    walls.refuse_new_rights()  # an ordinary user may install no list without it
-    walls.install(walls.seccomp_filter(platform.machine()))
+    isolation.refuse_new_rights()  # an ordinary user may install no list without it
+    isolation.install(isolation.seccomp_filter(platform.machine()))
 
 def limit(name):
-    walls.set_limit(name, dict(AS=512 * 1024**2, NOFILE=4).get(name, 0))
+    isolation.set_limit(name, dict(AS=512 * 1024**2, NOFILE=4).get(name, 0))
 
 {before}
 try:
@@ -93,7 +93,7 @@ class Deed:
 A_PAGE = "page = succeed(libc.mmap(None, 4096, READABLE | WRITABLE, PRIVATE, -1, 0))"
 A_PIPE = "reader, writer = os.pipe(); os.write(writer, b'x')"
 A_FILE = "file = tempfile.TemporaryFile()"
-NOBODY = "walls.become_nobody()"
+NOBODY = "isolation.become_nobody()"
 AN_ORPHAN = """
 reader, writer = os.pipe()
 parent = os.getpid()
@@ -102,7 +102,7 @@ if os.fork():
 """
 OUTLIVE = "os.write(writer, b'x')\ntime.sleep(0.7)"
 SEEN_BY_OTHERS = (
-    "walls.become_nobody(); walls.prctl(walls.PR_SET_DUMPABLE, 1)"  # a new user is hidden already
+    "isolation.become_nobody(); isolation.prctl(isolation.PR_SET_DUMPABLE, 1)"  # a new user is hidden already
 )
 LOOK = """
 target = os.getpid()
@@ -154,7 +154,7 @@ DEEDS = {
     "seccomp: timer": denied("signal.setitimer(signal.ITIMER_REAL, 100)"),
     "seccomp: wait": denied("select.select([], [], [], 0)"),
     "seccomp: user": denied("os.setuid(os.getuid())"),
-    "seccomp: prctl": denied("walls.hide_memory()"),
+    "seccomp: prctl": denied("isolation.hide_memory()"),
     "seccomp: limit": denied("succeed(libc.setrlimit(4, bytes(16)))"),
     "seccomp: true chance": denied("os.getrandom(1)"),
     "seccomp: descriptor": denied("os.dup(3)"),
@@ -182,9 +182,9 @@ DEEDS = {
     ),
     "MSGQUEUE": Deed("limit('MSGQUEUE')", A_QUEUE, "EMFILE", NOBODY),
     "AS": Deed("limit('AS')", "succeed(libc.mmap(None, 10**9, READABLE, PRIVATE, -1, 0))", "ENOMEM"),
-    "CPU": Deed("walls.limit_time(1)", "while time.process_time() < 1.5: pass", "SIGXCPU"),
-    "death with the parent": Deed("walls.die_with_parent()", OUTLIVE, "", AN_ORPHAN),
-    "hidden memory": Deed("walls.hide_memory()", LOOK, "EACCES", SEEN_BY_OTHERS),
+    "CPU": Deed("isolation.limit_time(1)", "while time.process_time() < 1.5: pass", "SIGXCPU"),
+    "death with the parent": Deed("isolation.die_with_parent()", OUTLIVE, "", AN_ORPHAN),
+    "hidden memory": Deed("isolation.hide_memory()", LOOK, "EACCES", SEEN_BY_OTHERS),
 }
 
 
@@ -224,7 +224,11 @@ ROOTS_DEEDS = {
     "another user joins a group": Deed(NOBODY, "os.setgroups([0])", "EPERM"),
     "another group comes back": Deed(NOBODY, "os.setresgid(0, 0, 0)", "EPERM"),
     "no new rights": Deed(
-        "walls.refuse_new_rights()", "os.execv('./id', ['id', '-u'])", str(walls.NOBODY), NOBODY, bare="0"
+        "isolation.refuse_new_rights()",
+        "os.execv('./id', ['id', '-u'])",
+        str(isolation.NOBODY),
+        NOBODY,
+        bare="0",
     ),
     "dumps of memory": Deed(
         "limit('CORE')", DUMP, "EPERM", "resource.setrlimit(resource.RLIMIT_CORE, (-1, -1))"
@@ -268,7 +272,7 @@ def test_call_by_an_x32_number_ends_the_process() -> None:
 
 
 MACHINE = platform.machine()
-ON_THE_LIST = set(walls.SYSCALLS[MACHINE][1].values()) if MACHINE in walls.SYSCALLS else set()
+ON_THE_LIST = set(isolation.SYSCALLS[MACHINE][1].values()) if MACHINE in isolation.SYSCALLS else set()
 PAST_LISTS = {335: "SIGILL", 336: "ENXIO"} if MACHINE == "x86_64" else {}  # what newer kernels say to them
 HIGHEST = 700  # of system calls; no kernel has as many
 CALL = "libc.syscall(ctypes.c_long(number), 0, 0, 0, 0, 0, 0)"
@@ -286,18 +290,18 @@ for number in {{}}:
     if os.WTERMSIG(os.wait()[1]) != signal.SIGSYS:
         tell(f"{{{{number}}}} ")
 """
-one_list = pytest.mark.skipif(MACHINE not in walls.SYSCALLS, reason="this kind of machine has no list")
+one_list = pytest.mark.skipif(MACHINE not in isolation.SYSCALLS, reason="this kind of machine has no list")
 
 
 @one_list
 def test_every_system_call_that_is_not_on_the_list_is_refused() -> None:
-    numbers = {*range(HIGHEST), walls.X32 - 1, 2**32 + 2} - ON_THE_LIST - PAST_LISTS.keys()
+    numbers = {*range(HIGHEST), isolation.X32 - 1, 2**32 + 2} - ON_THE_LIST - PAST_LISTS.keys()
     assert result("only_seccomp()", EACH_REFUSED.format(sorted(numbers)), NOBODY) == "done"
 
 
 @one_list
 def test_every_number_of_another_interface_ends_the_process() -> None:
-    numbers = [*range(walls.X32, walls.X32 + HIGHEST), 2**31 - 1, 2**31]
+    numbers = [*range(isolation.X32, isolation.X32 + HIGHEST), 2**31 - 1, 2**31]
     assert result("pass", EACH_ENDS_ITS_PROCESS.format(numbers), f"{NOBODY}; limit('CORE')") == "done"
 
 
@@ -307,7 +311,9 @@ def test_calls_that_newer_kernels_let_past_any_list_do_nothing(number: int) -> N
 
 
 def test_list_of_system_calls_is_known_for_two_kinds_of_machines_only() -> None:
-    assert [walls.seccomp_filter(machine) is not None for machine in ("x86_64", "aarch64", "riscv64")] == [
+    assert [
+        isolation.seccomp_filter(machine) is not None for machine in ("x86_64", "aarch64", "riscv64")
+    ] == [
         True,
         True,
         False,

@@ -296,6 +296,6 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
 
 def test_nothing_of_the_page_is_loaded_for_other_commands() -> None:
     loaded = "print('nicegui' in sys.modules, 'fastapi' in sys.modules)"
-    code = f"import sys, codebotler.cli.app, codebotler.cli.run, codebotler.web.desk; {loaded}"
+    code = f"import sys, codebotler.cli.app, codebotler.cli.run, codebotler.web.console; {loaded}"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout.split() == ["False", "False"]

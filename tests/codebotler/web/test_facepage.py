@@ -22,7 +22,7 @@ from codebotler.missions.store import missions
 from codebotler.robots.face import Face, Question
 from codebotler.robots.simulated import Simulated
 from codebotler.web.access import SHORTEST_TOKEN
-from codebotler.web.desk import Desk
+from codebotler.web.console import Desk
 from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
 from codebotler.web.guard import MOST_BYTES
 from codebotler.web.view import View

@@ -13,7 +13,7 @@ import pytest
 from pageserver import PageServer
 
 GOOD = """from codebotler.web.further import Pages
-from codebotler.web.words import Words
+from codebotler.web.elements import Words
 from nicegui import ui
 
 def add(site):

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from made_results import table_of
 from roboeval.analysis.summary import ALL, Summary, kinds_in_order, summary_data
 from roboeval.analysis.summary import causes as causes_of

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import visible
 from made_results import results_of, table_of
 from roboeval.analysis.summary import summary

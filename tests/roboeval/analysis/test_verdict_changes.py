@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from command_line import Ended, refused, roboeval
 from made_results import results_of
 from roboeval.analysis.verdict_changes import (

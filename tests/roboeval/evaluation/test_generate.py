@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.files import Appender, read_rows, to_line
 from codebotler.models.base import ModelError, Settings
 from roboeval.evaluation.generate import Pace, Progress, generate_run

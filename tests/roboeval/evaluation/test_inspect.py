@@ -27,7 +27,7 @@ from inspect_ai.model import ModelOutput, ModelUsage, get_model
 from inspect_ai.scorer import CORRECT, Target
 from playwright.sync_api import expect, sync_playwright
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.prompts import prompt_for
 from roboeval.evaluation import inspect as inspecting
 from roboeval.evaluation.judge import evaluate

@@ -20,7 +20,7 @@ import pytest
 
 from codebotler.simulator.distinct import MOST_AHEAD
 from codebotler.simulator.engine import NO_SECCOMP
-from codebotler.simulator.lane import EngineError
+from codebotler.simulator.worker import EngineError
 from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine
 from roboeval.evaluation.engines import Local, Work

@@ -17,11 +17,11 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.trace import Event, Outcome, RunError, Status
 from codebotler.simulator.isolated import ONE_AT_A_TIME
-from codebotler.simulator.lane import EVENTS, Lane
-from codebotler.simulator.warm import warm
+from codebotler.simulator.pool import warm
+from codebotler.simulator.worker import EVENTS, Lane
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.rewards import Share, reward, total

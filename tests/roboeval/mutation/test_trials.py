@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.simulator.engine import Lanes
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.mutation.mutants import Mutant, Original

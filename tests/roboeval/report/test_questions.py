@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from made_up_runs import SUITE, made_up, usual
 from roboeval.analysis.cost import Price
 from roboeval.report.breakdown import (

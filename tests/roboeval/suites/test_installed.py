@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from command_line import ENVIRONMENT, roboeval
 from roboeval.cli.tasks import other_suites
 from roboeval.suites.installed import installed_suites

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.rtl import parse
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.recorded import recorded_model
 from roboeval.suites.load import Suite, Task
 from roboeval.suites.solutions import equivalent_mutants, solutions

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from roboeval.suites.expression import ExpressionError, each_of, parsed, value
 from roboeval.suites.load import _suite_of, load_suite
 from roboeval.suites.pairwise import covering, met, pairs, spread

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import load_suite
 from roboeval.web import run_store

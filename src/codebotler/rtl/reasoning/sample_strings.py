@@ -11,9 +11,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from itertools import chain, combinations, islice, permutations, product
 
-from codebotler.rtl.claims import Claim, Number, Time
 from codebotler.rtl.formula import Regex, Text, Without, Words
 from codebotler.rtl.reasoning.regex_samples import counter_samples, samples
+from codebotler.rtl.text.claims import Claim, Number, Time
 
 _MOST_SUBSETS = 400
 _MOST_ALIKE = 2

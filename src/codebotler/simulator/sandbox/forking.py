@@ -12,14 +12,14 @@ from posix import getpid, getppid
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_ZYGOTE, ZYGOTE
 from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.execution import Run
+from codebotler.simulator.sandbox.isolation import die_with_parent, enclose, give_up_rights, usable_filter
 from codebotler.simulator.sandbox.surroundings import simulate_surroundings
-from codebotler.simulator.sandbox.walls import die_with_parent, enclose, give_up_rights, usable_filter
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import NoReturn
 
-    from codebotler.simulator.sandbox.walls import Filter
+    from codebotler.simulator.sandbox.isolation import Filter
 
 DOOR, REPORT = 5, 6
 PID = 8  # bytes of a process id: as an int, a small one would take no memory and a large one some

@@ -21,8 +21,8 @@ from codebotler.simulator.sandbox import (
     WITHOUT_REFERENCES,
 )
 from codebotler.simulator.sandbox.channel import receive, send_bytes
-from codebotler.simulator.sandbox.ticks import TOO_LARGE, prepared
-from codebotler.simulator.sandbox.walls import enclose, give_up_rights, usable_filter
+from codebotler.simulator.sandbox.fuel import TOO_LARGE, prepared
+from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 
 DOOR = 5
 ALWAYS_THERE = frozenset({"sys", "time", "__future__"})

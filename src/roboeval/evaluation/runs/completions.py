@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, SupportsIndex, TypeAlias
 
 from codebotler.core.arguments import expect_text, expect_whole
-from codebotler.core.badinput import BadInput
-from codebotler.core.english import counted
+from codebotler.core.errors import BadInput
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
+from codebotler.core.words import counted
 from codebotler.models.recorded import recorded_model
 from roboeval.evaluation.runs.rows import add_or_raise
 from roboeval.suites.load import Suite

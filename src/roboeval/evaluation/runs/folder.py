@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from codebotler import __version__
-from codebotler.core.badinput import BadInput, read_text
+from codebotler.core.errors import BadInput, read_text
 from codebotler.core.files import sync_folder, to_line, to_text, write_whole, written_whole
 from roboeval.evaluation.runs.completions import (
     COMPLETIONS,

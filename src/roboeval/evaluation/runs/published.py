@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
-from codebotler.core.badinput import BadInput, read_text, text_of
+from codebotler.core.errors import BadInput, read_text, text_of
 from codebotler.core.files import MAX_ROW
 from codebotler.core.syntaxtree import parse
 from roboeval.evaluation.runs.completions import Completion, Key, check_length, name_of, unknown

@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 import polars as pl
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import (

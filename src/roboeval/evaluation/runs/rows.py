@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, TypedDict
 
 import msgspec
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Status

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.files import write_whole
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.rows import JudgedRow

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.files import MAX_ROW, Appender, sync_folder, to_line, write_whole
 from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.folder import Run, open_source

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from roboeval.evaluation.runs import published
 from roboeval.evaluation.runs.published import published_completions
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.files import to_line
 from roboeval.analysis.search import Question, Search
 from roboeval.evaluation.evaluate import evaluate_run

@@ -11,7 +11,7 @@ from typing import Any
 import polars as pl
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from made_results import results_of
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import RowData

@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 from codebotler.core.trace import Outcome
 from codebotler.simulator.child import LostChildError
-from codebotler.simulator.conversation import Conversation, ImportsMoreError, Robot
+from codebotler.simulator.fork_server import Zygote
 from codebotler.simulator.preparer import Prepared, Preparer
 from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, LIVE_ZYGOTE, ZYGOTE
-from codebotler.simulator.zygote import Zygote
+from codebotler.simulator.skill_protocol import Conversation, ImportsMoreError, Robot
 
 EVENTS = logging.getLogger("codebotler.engine.events")
 """What happens to each run: started, how it ended and why; at level DEBUG, so that it is off by default."""

@@ -8,11 +8,11 @@ import socket
 import sys
 
 from codebotler.simulator.child import Child, LostChildError
-from codebotler.simulator.conversation import Conversation, described
 from codebotler.simulator.isolated import start
-from codebotler.simulator.play import LESSONS, PLAY, STAGE
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import WITHOUT_REFERENCES
+from codebotler.simulator.skill_protocol import Conversation, described
+from codebotler.simulator.warm_up import LESSONS, PLAY, STAGE
 
 NUMBER = 8  # bytes of a number that it reports
 REHEARSALS = 8

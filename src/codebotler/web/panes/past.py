@@ -8,15 +8,15 @@ from datetime import datetime
 
 from nicegui import html, ui
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.log import Line, Summary, events_of
 from codebotler.missions.mission import State
 from codebotler.missions.store import find, missions, summary_of
 from codebotler.missions.view import told
-from codebotler.web.desk import Desk
+from codebotler.web.console import Desk
+from codebotler.web.elements import Words
 from codebotler.web.frame import Frame
-from codebotler.web.words import Words
 
 MOST, MOST_EVENTS = 200, 1_000
 STEPS: Mapping[str, str] = {

@@ -19,8 +19,8 @@ from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
 from codebotler.simulator.engine import Lanes
-from codebotler.simulator.imagined import Plan
-from codebotler.web.board import Board
+from codebotler.simulator.sampled_robot import Plan
+from codebotler.web.notifier import Board
 from codebotler.web.turn import Means, Turn
 from codebotler.web.view import Order, View
 

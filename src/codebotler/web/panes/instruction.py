@@ -7,7 +7,7 @@ import asyncio
 from nicegui import html, ui
 
 from codebotler.checking.room_names import named_rooms
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.core.program import called_skills
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.log import Summary
@@ -15,10 +15,10 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import unknown_rooms
 from codebotler.missions.store import missions
 from codebotler.models.recorded import recorded_model
-from codebotler.simulator.imagined import Plan
-from codebotler.web.desk import Desk
+from codebotler.simulator.sampled_robot import Plan
+from codebotler.web.console import Desk
+from codebotler.web.elements import Press, Words, scroll_up, warn
 from codebotler.web.view import Order, View
-from codebotler.web.words import Press, Words, scroll_up, warn
 
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 RECORDED = "recorded"

@@ -12,9 +12,9 @@ import pytest
 
 from codebotler.core.trace import Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.imagined import Fact, ImaginedRobot, Plan, Whereabouts, meant
-from codebotler.simulator.lots import Lot
+from codebotler.simulator.fact_sampler import Lot
 from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.simulator.sampled_robot import Fact, ImaginedRobot, Plan, Whereabouts, meant
 
 PLAN = Plan(("start_loc", "kitchen", "lab"), "start_loc")
 YES_NO = (Option("Yes"), Option("No"))
@@ -389,7 +389,8 @@ def test_lots_depend_on_seed_sample_and_fact_alone() -> None:
 
 def test_lots_are_the_same_whatever_hashing_does() -> None:
     told = (
-        "from codebotler.simulator.lots import Lot\nprint([Lot(5).draw(99, 'x', str(n)) for n in range(9)])\n"
+        "from codebotler.simulator.fact_sampler import Lot\n"
+        "print([Lot(5).draw(99, 'x', str(n)) for n in range(9)])\n"
     )
     printed = {
         subprocess.run(

@@ -16,11 +16,11 @@ from codebotler.checking.problems import Check
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError, State
-from codebotler.web.desk import MOST_PROGRAM, Desk
+from codebotler.web.console import MOST_PROGRAM, Desk
+from codebotler.web.elements import Press, Words, scroll_up, warn
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import Strip, strips
 from codebotler.web.view import View
-from codebotler.web.words import Press, Words, scroll_up, warn
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
 MOST_MARKS, MOST_ESCAPES = 400, 2_000

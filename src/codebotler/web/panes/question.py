@@ -6,7 +6,7 @@ from nicegui import ui
 
 from codebotler.core.terminal import shortened
 from codebotler.robots.face import AnswerError, Face, Question
-from codebotler.web.words import Press, Words, warn
+from codebotler.web.elements import Press, Words, warn
 
 MOST_OPTIONS, MOST_TEXT = 50, 200
 

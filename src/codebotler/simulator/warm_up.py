@@ -10,7 +10,7 @@ import marshal
 
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.sandbox import WITHOUT_REFERENCES
-from codebotler.simulator.sandbox.ticks import prepared
+from codebotler.simulator.sandbox.fuel import prepared
 
 STAGE = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.rtl.clauses import clauses, sentences
-from codebotler.rtl.clock import TimeOfDay, times_in
-from codebotler.rtl.numerals import numerals
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
-from codebotler.rtl.polarity import Polarity, polarity, without_harmless
+from codebotler.rtl.text.clauses import clauses, sentences
+from codebotler.rtl.text.numbers import numerals
+from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
+from codebotler.rtl.text.times import TimeOfDay, times_in
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from tenacity import (
     wait_exponential_jitter,
 )
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
 

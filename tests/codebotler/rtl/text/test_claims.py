@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from codebotler.core.trace import Event, Option
 from codebotler.rtl import Claim, Element, Number, RtlSyntaxError, Time, explain, holds, parse
-from codebotler.rtl.clock import times_in
+from codebotler.rtl.text.times import times_in
 
 SAVORY = [
     ("2 people chose savory snacks", {2}),

@@ -6,7 +6,7 @@ import re
 from functools import lru_cache
 from typing import TypeAlias
 
-from codebotler.rtl.clauses import sentences
+from codebotler.rtl.text.clauses import sentences
 
 TimeOfDay: TypeAlias = int
 """Minutes since midnight."""

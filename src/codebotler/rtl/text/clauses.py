@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from codebotler.rtl.polarity import denies_something
+from codebotler.rtl.text.polarity import denies_something
 
 _HALF_DAY = re.compile(r"\b([ap])\.\s?m\.?", re.IGNORECASE)
 _END = re.compile(r"(?<=\?)(?!\?)|[!;\n]+|\.(?!\d)")

@@ -13,10 +13,10 @@ from typing import Any, TypeVar
 
 import pytest
 
-from codebotler.core.badinput import BadInput
+from codebotler.core.errors import BadInput
 from codebotler.models.base import BudgetSpentError, Heard, ModelError, Reply, Settings, Usage, unheard
 from codebotler.models.open import open_model
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import Prompt, prompt_for
 from server import Fault, Request, Server
 
@@ -318,7 +318,7 @@ INTERRUPTED = """
 import asyncio, sys
 from codebotler.models.base import Settings
 from codebotler.models.open import open_model
-from codebotler.models.paced import Paced
+from codebotler.models.rate_limit import Paced
 from codebotler.prompts import prompt_for
 
 async def main(name, url):

@@ -18,8 +18,8 @@ from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unhea
 from codebotler.prompts import Prompt
 from codebotler.robots.base import Result, Robot
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.imagined import Plan
-from codebotler.web.desk import MOST_PROGRAM, Desk
+from codebotler.simulator.sampled_robot import Plan
+from codebotler.web.console import MOST_PROGRAM, Desk
 from codebotler.web.view import Order, View, digest
 from doubles import Answering
 

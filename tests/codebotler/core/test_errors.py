@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.badinput import MAX_BYTES, BadInput, YamlFile, read_text, text_of
+from codebotler.core.errors import MAX_BYTES, BadInput, YamlFile, read_text, text_of
 
 
 class Inner(BaseModel):
@@ -149,7 +149,7 @@ def test_a_sentence_is_short_and_one_line() -> None:
 
 def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpreter() -> None:
     code = (
-        "from codebotler.core.badinput import YamlFile, BadInput\n"
+        "from codebotler.core.errors import YamlFile, BadInput\n"
         "try:\n"
         "    YamlFile('[' * 1_000_000, 'w.yaml')\n"
         "except BadInput as error:\n"

@@ -6,12 +6,12 @@ from nicegui import ui
 
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.mission import State
-from codebotler.web.asking import Asking
-from codebotler.web.desk import Desk
+from codebotler.web.console import Desk
+from codebotler.web.elements import Press, Words
 from codebotler.web.floorplan import floorplan
+from codebotler.web.panes.question import Asking
 from codebotler.web.progress import Moment
 from codebotler.web.view import View
-from codebotler.web.words import Press, Words
 
 HEADLINES = {
     None: "Nothing is asked for",

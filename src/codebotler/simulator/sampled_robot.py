@@ -12,7 +12,7 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Option
 from codebotler.core.world import Room, World
 from codebotler.simulator import robot as real
-from codebotler.simulator.lots import Answer, Draw, Lot, Presence
+from codebotler.simulator.fact_sampler import Answer, Draw, Lot, Presence
 from codebotler.simulator.robot import (
     Behaviour,
     RobotError,
