@@ -16,11 +16,11 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from codebotler.checking.check import SAMPLES, Sample, Settings, check_on
-from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.fact_sampler import Lot
-from codebotler.simulator.sampled_robot import ImaginedRobot, Plan
-from codebotler.simulator.worker import Lane
+from codebotler.checking.check import SAMPLES, CheckSettings, Sample, check_on
+from codebotler.simulator.engine import WorkerPool, digest
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import Completion, recorded_completions
 from roboeval.suites.load import Suite, load_suite
@@ -90,19 +90,24 @@ def truths(sources: Sequence[Source], suite: Suite, workers: int = WORKERS) -> l
 
 
 def rejections(
-    sources: Sequence[Source], suite: Suite, seeds: Sequence[int], lanes: Lanes, *, with_rooms: bool = True
+    sources: Sequence[Source],
+    suite: Suite,
+    seeds: Sequence[int],
+    pool: WorkerPool,
+    *,
+    with_rooms: bool = True,
 ) -> list[list[bool]]:
     """For each program and each seed, whether the check rejects it; the seeds of a program share its code."""
-    plans = {name: Plan.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
+    plans = {name: RoomMap.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
 
     def one(source: Source) -> list[bool]:
         task, program = source
         plan = plans[task] if with_rooms else None
-        known: dict[Plan, list[Sample]] = {}
-        checks = (check_on(lanes.here(), program, plan, Settings(seed=seed), known) for seed in seeds)
+        known: dict[RoomMap, list[Sample]] = {}
+        checks = (check_on(pool.here(), program, plan, CheckSettings(seed=seed), known) for seed in seeds)
         return [bool(check.problems) for check in checks]
 
-    return list(lanes.map_distinct(one, sources, name=lambda source: digest(*source)))
+    return list(pool.map_distinct(one, sources, name=lambda source: digest(*source)))
 
 
 @dataclass
@@ -180,11 +185,11 @@ def rates(sources: Iterable[Source], true: Iterable[Truth], said: Iterable[Seque
 # --- printing
 
 
-def report(name: str, sources: Sequence[Source], suite: Suite, lanes: Lanes) -> bool:
+def report(name: str, sources: Sequence[Source], suite: Suite, pool: WorkerPool) -> bool:
     """Print what is rejected of a collection; whether it is as aimed at."""
     start = time.perf_counter()
     true = truths(sources, suite)
-    said = rejections(sources, suite, range(SEEDS), lanes)
+    said = rejections(sources, suite, range(SEEDS), pool)
     found = rates(sources, true, said)
     spent = time.perf_counter() - start
     print(f"\n{name}: {len(sources)} programs, {SEEDS} seeds, {SAMPLES} samples a check, {spent:.0f} s")
@@ -205,10 +210,10 @@ def report(name: str, sources: Sequence[Source], suite: Suite, lanes: Lanes) -> 
     return found.hold
 
 
-def report_guessing(sources: Sequence[Source], suite: Suite, lanes: Lanes) -> None:
+def report_guessing(sources: Sequence[Source], suite: Suite, pool: WorkerPool) -> None:
     """Print what is rejected where the rooms are taken from the programs themselves."""
     true = truths(sources, suite)
-    found = rates(sources, true, rejections(sources, suite, [0], lanes, with_rooms=False))
+    found = rates(sources, true, rejections(sources, suite, [0], pool, with_rooms=False))
     print("\nthe same without rooms, one seed:")
     print(f"    right, rejected      {found.right}, worst task {found.worst[0]} {found.worst[1]}")
     print(f"    certain, rejected    {found.certain}")
@@ -216,19 +221,19 @@ def report_guessing(sources: Sequence[Source], suite: Suite, lanes: Lanes) -> No
 
 def report_cost(sources: Sequence[Source], suite: Suite) -> None:
     """Print what a check costs, in runs of the same programs in one imagined world."""
-    lane = Lane()
-    plans = {name: Plan.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
+    worker = Worker()
+    plans = {name: RoomMap.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
     once = checked = 0.0
     for task, program in sources:
-        new_robot = partial(ImaginedRobot, plans[task], Lot())
-        lane.run(program, new_robot)  # compiles it, for both
+        new_robot = partial(SampledRobot, plans[task], FactSampler())
+        worker.run(program, new_robot)  # compiles it, for both
         start = time.perf_counter()
-        lane.run(program, new_robot)
+        worker.run(program, new_robot)
         middle = time.perf_counter()
-        check_on(lane, program, plans[task])
+        check_on(worker, program, plans[task])
         checked += time.perf_counter() - middle
         once += middle - start
-    lane.close()
+    worker.close()
     print(
         f"\na check of {SAMPLES} samples: {1000 * checked / len(sources):.2f} ms, a single run: "
         f"{1000 * once / len(sources):.2f} ms; so it costs {checked / once:.1f} single runs "
@@ -241,11 +246,11 @@ def main() -> int:
     suite = load_suite()
     written = list(dict.fromkeys(real(suite)))[::PART]
     shown = [source for source in dict.fromkeys(by_hand()) if source not in set(written)][::PART]
-    with Lanes(WORKERS) as lanes:
-        hold = report("written by models, and recorded:careful", written, suite, lanes)
+    with WorkerPool(WORKERS) as pool:
+        hold = report("written by models, and recorded:careful", written, suite, pool)
         if shown:
-            report("written by hand to show one thing each", shown, suite, lanes)
-        report_guessing(written, suite, lanes)
+            report("written by hand to show one thing each", shown, suite, pool)
+        report_guessing(written, suite, pool)
     report_cost(written[:: max(1, len(written) // 200)], suite)
     print("\nas aimed at" if hold else "\nNOT as aimed at")
     return 0 if hold else 1

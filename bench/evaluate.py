@@ -22,9 +22,9 @@ from pathlib import Path
 
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.engine import Lanes
+from codebotler.simulator.engine import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import load_suite
@@ -57,18 +57,18 @@ def pairs() -> list[Pair]:
 # --- the three ways
 
 
-def isolated(lanes: Lanes, part: Sequence[Pair]) -> list[Status]:
+def isolated(pool: WorkerPool, part: Sequence[Pair]) -> list[Status]:
     """Ours: a closed child for each pair."""
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
     def run_all(number: int) -> list[Status]:
         return [
-            lanes.here().run(source, partial(SimulatedRobot, world)).status
+            pool.here().run(source, partial(SimulatedRobot, world)).status
             for source, world in programs[number]
         ]
 
     name = partial(int.to_bytes, length=8, byteorder="big")
-    statuses = lanes.map_distinct(run_all, range(len(programs)), name=name)
+    statuses = pool.map_distinct(run_all, range(len(programs)), name=name)
     return [status for of_program in statuses for status in of_program]
 
 
@@ -94,11 +94,11 @@ def run_bare(part: Sequence[Pair], time: int = 0) -> None:
 NOWHERE = World((Room("nowhere"),), "nowhere")
 
 
-def in_process(pool: ProcessPoolExecutor, times: Iterator[int], part: Sequence[Pair]) -> None:
+def in_process(processes: ProcessPoolExecutor, times: Iterator[int], part: Sequence[Pair]) -> None:
     """No isolation: the same programs in as many processes."""
     share = -(-len(part) // (8 * WORKERS))
     shares = [part[at : at + share] for at in range(0, len(part), share)]
-    list(pool.map(run_bare, shares, repeat(next(times))))
+    list(processes.map(run_bare, shares, repeat(next(times))))
 
 
 def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
@@ -127,16 +127,16 @@ def parts(whole: Sequence[Pair]) -> Iterator[list[Pair]]:
 def main() -> None:
     """Print runs per second of the three ways, the two ratios, and what is apart."""
     whole = pairs()
-    pool = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork"))
-    list(pool.map(run_bare, [whole[:1]] * 4 * WORKERS))
-    with pool, Lanes(WORKERS) as lanes, ThreadPoolExecutor(WORKERS) as threads:
-        ours = partial(isolated, lanes)
+    processes = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork"))
+    list(processes.map(run_bare, [whole[:1]] * 4 * WORKERS))
+    with processes, WorkerPool(WORKERS) as pool, ThreadPoolExecutor(WORKERS) as threads:
+        ours = partial(isolated, pool)
         statuses = ours(whole)
         honest = [pair for pair, status in zip(whole, statuses, strict=True) if status is not Status.TIMEOUT]
         limited = [pair for pair, status in zip(whole, statuses, strict=True) if status is Status.TIMEOUT]
         ways: dict[str, Callable[[Sequence[Pair]], object]] = {
             "isolated, one child a run (ours)": ours,
-            "in-process, no isolation": partial(in_process, pool, count(1)),
+            "in-process, no isolation": partial(in_process, processes, count(1)),
             "one `python -c pass` a run": partial(fresh_interpreters, threads),
         }
         times: dict[str, list[float]] = {}
@@ -194,14 +194,14 @@ def report_hanging(ours: Callable[[Sequence[Pair]], object], part: Sequence[Pair
 
 def report_loops(honest: Sequence[Pair]) -> None:
     """Print what loops cost, as multiples of the median honest run and of the same loop in-process."""
-    lane = Lane()
+    worker = Worker()
 
     def one_by_one(part: Sequence[Pair]) -> None:
         for source, world in part:
-            lane.run(source, partial(SimulatedRobot, world))
+            worker.run(source, partial(SimulatedRobot, world))
 
     median = statistics.median(seconds(one_by_one, [pair]) for pair in honest[:: max(1, len(honest) // 200)])
-    print(f"median honest run, one lane: {1000 * median:.2f} ms")
+    print(f"median honest run, one worker: {1000 * median:.2f} ms")
     for name, source in LOOPS.items():
         pair = (source, NOWHERE)
         ours = statistics.median(seconds(one_by_one, [pair]) for _ in range(7))
@@ -210,7 +210,7 @@ def report_loops(honest: Sequence[Pair]) -> None:
             f"{name:26}{1000 * ours:8.1f} ms: {ours / median:5.1f} median runs, "
             f"{ours / bare:5.2f} times in-process, {(ours - median) / bare:5.2f} less a median run"
         )
-    lane.close()
+    worker.close()
 
 
 if __name__ == "__main__":

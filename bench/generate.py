@@ -25,10 +25,10 @@ from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers.openai import OpenAIProvider
 from pydantic_ai.settings import ModelSettings
 
-from codebotler.models.base import Settings
+from codebotler.models.base import SamplingSettings
 from codebotler.models.chat import messages_of
 from codebotler.models.open import open_model
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import prompt_for
 
 SERVER = Path(__file__).parents[1] / "tests/codebotler/models/server.py"
@@ -75,7 +75,7 @@ def bare_completions(url: str) -> Callable[[], Awaitable[object]]:
 
 def ours(name: str, url: str) -> Callable[[], Awaitable[object]]:
     """What we do, from the instruction to the program."""
-    model = Paced(open_model(name, Settings(base_url=url)), token_budget=10**9)
+    model = RateLimited(open_model(name, SamplingSettings(base_url=url)), token_budget=10**9)
     return lambda: model.reply(prompt_for(INSTRUCTION), number=0, heard=lambda _piece: None)
 
 

@@ -83,7 +83,7 @@ def compiled(source: str) -> types.CodeType | BaseException:
 
 
 class Reused(Bare):
-    """Runs one program after the other, with all made before the first that can be, as the zygote does.
+    """Runs one program after the other, with all made before the first that can be, as the fork server does.
 
     Args:
         world: any.
@@ -257,13 +257,15 @@ class StandIn(Protocol):
     run: Run
 
 
-# The functions below call one another as those of the zygote do: how deep a program may call itself depends
-# on how deep it stands.
+# The functions below call one another as those of the fork server do: how deep a program may call itself
+# depends on how deep it stands.
 
 
 def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
     """Run one program after the other, until there is none any more."""
-    for _ in range(LESSONS):  # as the zygote does: what Python 3.11 has learnt counts less towards its limit
+    for _ in range(
+        LESSONS
+    ):  # as the fork server does: what Python 3.11 has learnt counts less towards its limit
         run = stand_in.run = Unwalled(SimulatedRobot(STAGE))
         run.execute(*run.execution(PLAY))
     while one_run(stand_in, input_, output):

@@ -1,7 +1,7 @@
 """The ordinary process of `in_process`: forks for each program, closes no walls, asks the robot directly.
 
-Clocks, chance and locks are replaced first, as in the zygote, before the modules that take them for their own
-are imported.
+Clocks, chance and locks are replaced first, as in the fork server, before the modules that take them for
+their own are imported.
 """
 
 import sys

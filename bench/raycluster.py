@@ -14,7 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import Engine, Local, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import RayCluster
@@ -42,7 +42,7 @@ def seconds(engine: Engine, completions: list[Completion], suite: Suite) -> tupl
 def fed(cluster: Engine, row: str) -> float:
     """How many calls a second one process hands out and takes back."""
 
-    def give(_lane: Lane, work: Work) -> str:
+    def give(_worker: Worker, work: Work) -> str:
         return row[: -1 - int(work[1]) % 2]
 
     start = time.perf_counter()

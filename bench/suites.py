@@ -10,7 +10,7 @@ import sys
 import time
 from functools import partial
 
-from codebotler.simulator.engine import Lanes
+from codebotler.simulator.engine import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.completions import recorded_completions
@@ -25,12 +25,12 @@ def programs(suite: Suite) -> list[tuple[str, str]]:
     return sorted({(c.task, c.program) for model in models for c in recorded_completions(model, suite)})[::3]
 
 
-def seconds(lanes: Lanes, suite: Suite, task: str, program: str) -> tuple[float, int]:
+def seconds(pool: WorkerPool, suite: Suite, task: str, program: str) -> tuple[float, int]:
     """How long it takes to judge a program, and in how many worlds that is."""
     scenarios = suite.tasks[task].scenarios
     start = time.perf_counter()
     for scenario in scenarios:
-        judge(lanes.here().run(program, partial(SimulatedRobot, scenario.world, suite.rules)), scenario)
+        judge(pool.here().run(program, partial(SimulatedRobot, scenario.world, suite.rules)), scenario)
     return time.perf_counter() - start, len(scenarios)
 
 
@@ -40,12 +40,12 @@ def main() -> int:
     chosen = programs(suites[0])
     means: list[list[float]] = [[], []]
     spent, pairs = [0.0, 0.0], [0, 0]
-    with Lanes(1) as lanes:
+    with WorkerPool(1) as pool:
         for _ in range(ROUNDS):
             spent, pairs = [0.0, 0.0], [0, 0]
             for task, program in chosen:
                 for at, suite in enumerate(suites):
-                    took, worlds = seconds(lanes, suite, task, program)
+                    took, worlds = seconds(pool, suite, task, program)
                     spent[at] += took
                     pairs[at] += worlds
             for at in range(2):

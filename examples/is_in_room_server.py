@@ -17,9 +17,9 @@ from typing import Any
 
 from PIL.Image import Image
 
-from codebotler import BadInput
+from codebotler import UserError
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.models.base import Settings
+from codebotler.models.base import SamplingSettings
 from codebotler.perception import (
     Detector,
     PerceptionError,
@@ -33,7 +33,7 @@ from codebotler.robots.base import NotReadyError
 from codebotler.robots.ros import actions_of
 from codebotler.robots.ros1 import master_uri
 from codebotler.robots.virtual import SCRIPT
-from codebotler.robots.worker import Worker
+from codebotler.robots.worker import RosWorker
 
 SKILL = "is_in_room"
 HEARS = 3600.0  # seconds of one turn of listening
@@ -58,7 +58,7 @@ class Server:
         address = master_uri()
         actions = actions_of(SkillTable((SKILLS[SKILL],)))
         start = {"node": f"{SKILL}_server", "actions": actions, "port": None, "camera": topic, "show": True}
-        self.worker = Worker(python, SCRIPT, start, {"ROS_MASTER_URI": address})
+        self.worker = RosWorker(python, SCRIPT, start, {"ROS_MASTER_URI": address})
         print(f"at {address}; ready, Ctrl-C ends it", flush=True)
         self.goals: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
         self.images: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
@@ -91,7 +91,7 @@ class Server:
                 image = self.picture()
                 sighting = self.detector.look(image, label)
             except Exception as error:  # noqa: BLE001 - whatever it is, the robot waits for an answer
-                expected = isinstance(error, BadInput | PerceptionError)
+                expected = isinstance(error, UserError | PerceptionError)
                 why = str(error) if expected else f"{type(error).__name__}: {error}"
                 print(f"{label!r}: {why!r}", flush=True)
                 self.end(goal, do="abort", text=why)
@@ -138,14 +138,14 @@ def main() -> None:
     if not 0 < said.oldest < math.inf:
         parser.error(f"--oldest is {said.oldest:g}, but must be a number of seconds above 0")
     try:
-        settings = Settings(
+        settings = SamplingSettings(
             temperature=0.0, top_p=None, max_tokens=2000, timeout=30.0, base_url=said.base_url
         )
         detector = open_detector(said.model, settings, least_score=said.least_score)
         server = Server(
             detector, file=said.file, topic=said.topic, oldest=said.oldest, python=said.ros_python
         )
-    except (BadInput, NotReadyError) as error:
+    except (UserError, NotReadyError) as error:
         parser.error(str(error))
     try:
         server.serve()

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 import pytest
 from hypothesis import HealthCheck, settings
 
-import lanes
 import messages
-from codebotler.simulator.worker import Lane
+import shared_workers
+from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite, load_suite
 
 # A busy machine is no fault of what is tested; and CI tries the same examples each time.
@@ -99,17 +99,17 @@ def runtime(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 @pytest.fixture(scope="session", autouse=True)
 def engine() -> Iterator[None]:
     """One engine for all tests."""
-    with lanes.shared():
+    with shared_workers.shared():
         yield
-    lanes.end_all()
+    shared_workers.end_all()
 
 
 @pytest.fixture(autouse=True)
 def engine_of_its_own(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let tests of the engine itself start its processes as users do."""
     if request.path.parent.name == "simulator":
-        lanes.end_all()
-        monkeypatch.setattr("codebotler.simulator.engine.Lane", Lane)
+        shared_workers.end_all()
+        monkeypatch.setattr("codebotler.simulator.engine.Worker", Worker)
 
 
 @pytest.fixture(scope="session")

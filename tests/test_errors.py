@@ -11,14 +11,14 @@ import pytest
 from codebotler.core.trace import Option
 
 SOURCES = Path(__file__).parent.parent / "src"
-ROOTS = {"Exception", "ValueError", "RuntimeError", "BadInput"}
+ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError"}
 WITHIN = {"codebotler.robots.ros1_worker", "codebotler.simulator.sandbox.execution"}  # of another Python
 A_SENTENCE = ("a sentence",)
 MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
-    "codebotler.core.errors.BadInput": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),
+    "codebotler.core.errors.UserError": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),
     "codebotler.models.base.BudgetSpentError": ((1_000, 1_012), {}),
     "codebotler.models.base.ModelError": (A_SENTENCE, {"may_pass": True, "retry_after": 2.5}),
-    "codebotler.rtl.semantics.CannotJudge": ((4, 1, Option("3", is_text=False)), {}),
+    "codebotler.rtl.semantics.Inconclusive": ((4, 1, Option("3", is_text=False)), {}),
     "codebotler.rtl.syntax.RtlSyntaxError": ((3, "a bracket is missing"), {}),
     "codebotler.simulator.robot.RobotError": (("PickInvalidObject", "there is no mug"), {}),
     "codebotler.web.guard.RefusedError": ((HTTPStatus.FORBIDDEN, "a sentence"), {}),

@@ -222,14 +222,14 @@ def test_what_is_returned_is_shown_in_a_few_lines() -> None:
 
 NOTEBOOK = """
 import asyncio
-from codebotler import BadInput, generate
+from codebotler import UserError, generate
 async def cell():
     return generate(INSTRUCTION, rooms=["kitchen", "jill's office", "start_loc"])
 assert asyncio.run(cell()).program == generate(INSTRUCTION).program
 for wrong in ({"retries": -1}, {"model": "nobody"}, {"temperature": -1}):
     try:
         generate(INSTRUCTION, **wrong)
-    except BadInput as error:
+    except UserError as error:
         print(error)
 """
 
@@ -245,11 +245,11 @@ for wrong in ({"retries": -1}, {"model": "nobody"}, {"temperature": -1}):
 )
 def test_rooms_that_are_no_names_are_refused(rooms: object, named: str) -> None:
     wrong: Any = rooms
-    with pytest.raises(codebotler.BadInput, match=named):
+    with pytest.raises(codebotler.UserError, match=named):
         codebotler.check("def task_program():\n    go_to('kitchen')\n", rooms=wrong)
-    with pytest.raises(codebotler.BadInput, match=named):
+    with pytest.raises(codebotler.UserError, match=named):
         codebotler.generate("Go to the kitchen.", rooms=wrong)
-    with pytest.raises(codebotler.BadInput, match=named):
+    with pytest.raises(codebotler.UserError, match=named):
         codebotler.prompt_for("Go to the kitchen.", rooms=wrong)
 
 
@@ -268,7 +268,7 @@ def test_rooms_that_are_no_names_are_refused(rooms: object, named: str) -> None:
     ],
 )
 def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], named: str) -> None:
-    with pytest.raises(codebotler.BadInput, match=named):
+    with pytest.raises(codebotler.UserError, match=named):
         codebotler.check("def task_program():\n    say('hello')\n", **wrong)
 
 
@@ -285,15 +285,15 @@ def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], nam
     ],
 )
 def test_settings_of_another_kind_are_refused(wrong: dict[str, Any], named: str) -> None:
-    with pytest.raises(codebotler.BadInput, match=named):
+    with pytest.raises(codebotler.UserError, match=named):
         codebotler.generate("Say hello.", **wrong)
 
 
 def test_what_is_no_text_has_no_program_and_no_prompt() -> None:
     wrong: Any = None
-    with pytest.raises(codebotler.BadInput, match="reply is None"):
+    with pytest.raises(codebotler.UserError, match="reply is None"):
         codebotler.program_of(wrong)
-    with pytest.raises(codebotler.BadInput, match="instruction is None"):
+    with pytest.raises(codebotler.UserError, match="instruction is None"):
         codebotler.prompt_for(wrong)
 
 
@@ -301,7 +301,7 @@ def test_skills_are_a_table() -> None:
     wrong: Any = None
     for call in (codebotler.check, codebotler.prompt_for):
         function: Any = call
-        with pytest.raises(codebotler.BadInput, match=r"skills are None, .*SkillTable"):
+        with pytest.raises(codebotler.UserError, match=r"skills are None, .*SkillTable"):
             function("paper", skills=wrong)
 
 
@@ -319,7 +319,7 @@ def test_skills_are_a_table() -> None:
 )
 def test_a_completion_of_what_is_none_is_refused(wrong: dict[str, Any], named: str) -> None:
     right: dict[str, Any] = {"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}
-    with pytest.raises(codebotler.BadInput, match=named):
+    with pytest.raises(codebotler.UserError, match=named):
         roboeval.Completion(**(right | wrong))
 
 
@@ -364,21 +364,21 @@ def test_a_type_checker_finds_what_is_misspelt(right: str, wrong: str, found: st
 
 
 def test_completions_are_read_from_a_file() -> None:
-    with pytest.raises(codebotler.BadInput, match="no such file") as error:
+    with pytest.raises(codebotler.UserError, match="no such file") as error:
         next(roboeval.read_completions("x.jsonl"))
     assert str(error.value.file) == "x.jsonl"
 
 
 def test_a_suite_is_named_by_its_folder(tmp_path: Path) -> None:
-    with pytest.raises(codebotler.BadInput, match=f'"{tmp_path}"'):
+    with pytest.raises(codebotler.UserError, match=f'"{tmp_path}"'):
         roboeval.load_suite(tmp_path)
 
 
 def test_a_program_and_an_instruction_are_texts() -> None:
     nothing: Any = None
-    with pytest.raises(codebotler.BadInput, match="program is None"):
+    with pytest.raises(codebotler.UserError, match="program is None"):
         codebotler.check(nothing)
-    with pytest.raises(codebotler.BadInput, match="instruction is None"):
+    with pytest.raises(codebotler.UserError, match="instruction is None"):
         codebotler.generate(nothing)
 
 

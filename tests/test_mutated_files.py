@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from codebotler.core.errors import BadInput, YamlFile
+from codebotler.core.errors import UserError, YamlFile
 from codebotler.core.tracefile import OutcomeFile
 from codebotler.core.world import WorldFile
 from roboeval.suites.load import SUITES, read_task
@@ -138,11 +138,11 @@ def test_a_damaged_file_is_read_or_refused_in_a_sentence_with_a_line(files: list
     assert len(refused) == 5, "each kind of damage is noticed at times"
 
 
-def refusal(text: str, read: Read) -> BadInput | None:
+def refusal(text: str, read: Read) -> UserError | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", FutureWarning)  # of regexes that are odd but valid
             read(YamlFile(text, "w.yaml"))
-    except BadInput as error:
+    except UserError as error:
         return error
     return None

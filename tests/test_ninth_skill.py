@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.program import Problem, Program
 from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status
@@ -111,7 +111,7 @@ def test_its_events_are_read_from_files(outcomes: dict[str, Outcome], tmp_path: 
     path = tmp_path / "outcome.yaml"
     path.write_text(outcome_yaml(outcomes["waves"], TABLE))
     assert read_outcome(path, TABLE) == outcomes["waves"]
-    with pytest.raises(BadInput, match='"wave"'):
+    with pytest.raises(UserError, match='"wave"'):
         read_outcome(path)
 
 
@@ -144,7 +144,7 @@ def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> No
             "rtl: not tr.Exists(goto", 'rtl: not tr.Exists(wave("bob")) and not tr.Exists(goto', 1
         )
     )
-    with pytest.raises(BadInput, match="wave"):
+    with pytest.raises(UserError, match="wave"):
         load_suite(tmp_path / "plus")
     loaded = load_suite(tmp_path / "plus", skills=TABLE)
     assert loaded.with_worlds(40).with_own_worlds() == loaded

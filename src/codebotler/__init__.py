@@ -5,12 +5,12 @@ from __future__ import annotations
 __version__ = "0.1.0"
 
 __all__ = [
-    "BadInput",
     "Check",
     "EngineError",
     "Generation",
     "ModelError",
     "Problem",
+    "UserError",
     "__version__",
     "check",
     "generate",
@@ -21,7 +21,7 @@ __all__ = [
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from codebotler.checking.check import Check, Problem, check
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from codebotler.generation.generate import Generation
     from codebotler.generation.onecall import generate
     from codebotler.models.base import ModelError
@@ -34,6 +34,7 @@ else:  # each name is imported when it is first used
     __getattr__, __dir__ = facade(
         __name__,
         {
+            "UserError": "core.errors",
             "BadInput": "core.errors",
             "Check": "checking.check",
             "EngineError": "simulator.worker",

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 ERRORS = {
-    "BadInput": "codebotler.core.errors",
+    "UserError": "codebotler.core.errors",
     "EngineError": "codebotler.simulator.worker",
     "MissionError": "codebotler.missions.mission",
     "ModelError": "codebotler.models.base",

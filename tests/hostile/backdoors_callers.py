@@ -1,4 +1,4 @@
-"""Tries to use what its callers hold: the door through which the zygote gets its descriptors."""
+"""Tries to use what its callers hold: the door through which the fork server gets its descriptors."""
 # ends: python-error PermissionError
 
 

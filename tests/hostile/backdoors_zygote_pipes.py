@@ -1,4 +1,4 @@
-"""Tries to forge what the zygote reports, through the numbers its descriptors have there."""
+"""Tries to forge what the fork server reports, through the numbers its descriptors have there."""
 # ends: finished
 
 import os

@@ -3,7 +3,7 @@
 
 
 def task_program():
-    for process in ("1", "self", "@PARENT_PID@", "@ZYGOTE_PID@"):
+    for process in ("1", "self", "@PARENT_PID@", "@FORK_SERVER_PID@"):
         for name in ("environ", "cmdline", "maps", "mem", "status"):
             try:
                 with open(f"/proc/{process}/{name}", "rb") as file:

@@ -6,7 +6,7 @@ import signal
 
 
 def task_program():
-    for group in (0, @PARENT_PID@, @ZYGOTE_PID@, @BYSTANDER_PID@):
+    for group in (0, @PARENT_PID@, @FORK_SERVER_PID@, @BYSTANDER_PID@):
         try:
             os.killpg(group, signal.SIGTERM)
             say("killed")

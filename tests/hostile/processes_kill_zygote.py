@@ -6,4 +6,4 @@ import signal
 
 
 def task_program():
-    os.kill(@ZYGOTE_PID@, signal.SIGKILL)
+    os.kill(@FORK_SERVER_PID@, signal.SIGKILL)

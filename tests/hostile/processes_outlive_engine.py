@@ -1,4 +1,4 @@
-"""Tries to take back what ends it when the zygote ends, and to widen its limits."""
+"""Tries to take back what ends it when the fork server ends, and to widen its limits."""
 # ends: finished
 # does: say 6 refused
 

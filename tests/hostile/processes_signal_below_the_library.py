@@ -9,7 +9,7 @@ def task_program():
     call = ctypes.CDLL(None).syscall
     kill, tkill, tgkill, queue, pidfd_open, pidfd_send = 62, 200, 234, 129, 434, 424
     refused = 0
-    for pid in (@PARENT_PID@, @ZYGOTE_PID@, @BYSTANDER_PID@):
+    for pid in (@PARENT_PID@, @FORK_SERVER_PID@, @BYSTANDER_PID@):
         for number in (10, 19):
             refused += call(kill, pid, number) == -1
             refused += call(tkill, pid, number) == -1

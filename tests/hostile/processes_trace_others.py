@@ -9,7 +9,7 @@ def task_program():
     kernel = ctypes.CDLL(None)
     attach, seize = 16, 0x4206
     refused = 0
-    for pid in (@PARENT_PID@, @ZYGOTE_PID@, @BYSTANDER_PID@):
+    for pid in (@PARENT_PID@, @FORK_SERVER_PID@, @BYSTANDER_PID@):
         refused += kernel.ptrace(attach, pid, 0, 0) == -1
         refused += kernel.ptrace(seize, pid, 0, 0) == -1
         refused += kernel.process_vm_readv(pid, bytes(16), 1, bytes(16), 1, 0) == -1

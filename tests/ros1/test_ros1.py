@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, Parameter, RosAction, Skill
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
@@ -74,7 +74,7 @@ def test_no_master_is_said_at_once() -> None:
 
 @pytest.mark.parametrize("uri", ["robot", "http://robot", "http://robot:a", "ws://robot:9090"])
 def test_address_that_is_no_uri_is_refused(uri: str) -> None:
-    with pytest.raises(BadInput, match=r"ROS master.* http://localhost:11311"):
+    with pytest.raises(UserError, match=r"ROS master.* http://localhost:11311"):
         open_robot("ros1", Options(address=uri))
 
 
@@ -367,7 +367,7 @@ def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: G
 
 CANCELLED = """
 import ros1_worker
-class Cancelled(ros1_worker.Worker):
+class Cancelled(ros1_worker.Ros1Worker):
     def _send(self, goal, arguments):
         goal.cancel()
         super()._send(goal, arguments)
@@ -422,7 +422,7 @@ def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> Non
 LATE = f"""
 import subprocess, sys, time
 import ros1_worker
-class Late(ros1_worker.Worker):
+class Late(ros1_worker.Ros1Worker):
     def _servers(self, actions):
         servers = super()._servers(actions)
         other = "import rospy; rospy.init_node('codebotler', disable_signals=True); rospy.sleep({LONG})"

@@ -24,7 +24,7 @@ from codebotler.robots.scripted import AS_WRITTEN
 from codebotler.robots.virtual import VirtualRobot
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
 from ros_graph import Graph, free_port, started
 
@@ -94,17 +94,17 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
     virtual = VirtualRobot(worlds[0], speed=SPEED, port=graph.port)
     virtual.start()
     robot = graph.robot(speed=SPEED)
-    lane = Lane()
+    worker = Worker()
     try:
         for (name, _, world), program, expected in zip(tasks, programs, simulated, strict=True):
             virtual.enter(world)
             robot.connect()
             live = LiveRobot(robot, lambda *_, **__: None, clock_starts=AS_WRITTEN.clock_starts)
-            outcome = lane.run_live(program, live)
+            outcome = worker.run_live(program, live)
             assert outcome.status == Status.FINISHED == expected.status, (name, outcome)
             assert outcome.trace == expected.trace, name
     finally:
-        lane.close()
+        worker.close()
         virtual.stop()
 
 

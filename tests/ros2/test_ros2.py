@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
@@ -149,7 +149,7 @@ def test_it_is_said_how_far_it_was_tested() -> None:
 
 def test_address_is_a_domain() -> None:
     assert open_robot("ros2", Options(address="7")).address == "7"
-    with pytest.raises(BadInput, match=r'"robot" .*ROS_DOMAIN_ID'):
+    with pytest.raises(UserError, match=r'"robot" .*ROS_DOMAIN_ID'):
         open_robot("ros2", Options(address="robot"))
 
 

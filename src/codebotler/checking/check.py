@@ -12,26 +12,26 @@ from codebotler.checking.problems import Check, Problem, Sample, failures, no_ro
 from codebotler.checking.reachability import reach
 from codebotler.checking.room_names import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
 from codebotler.core.arguments import expect_skills, expect_text, expect_texts, expect_whole
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.program import Problem as Flaw
 from codebotler.core.program import Program, parsed
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
-from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.fact_sampler import Lot
+from codebotler.simulator.engine import WorkerPool, digest
+from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rules import Rules
-from codebotler.simulator.sampled_robot import AS_WRITTEN, ImaginedRobot, Plan
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
+from codebotler.simulator.worker import Worker
 
 __all__ = [
     "MORE",
     "SAMPLES",
     "Check",
+    "CheckSettings",
     "Problem",
     "Runner",
     "Sample",
-    "Settings",
     "check",
     "check_on",
     "imagined",
@@ -55,7 +55,7 @@ SOME_ROOMS = ("room 1", "room 2")
 
 
 @dataclass(frozen=True)
-class Settings:
+class CheckSettings:
     """How programs are checked.
 
     Args:
@@ -67,7 +67,7 @@ class Settings:
         behaviours: what each skill does; those of the eight skills by default.
 
     Raises:
-        BadInput: a number is none, or out of its range.
+        UserError: a number is none, or out of its range.
     """
 
     samples: int = SAMPLES
@@ -93,8 +93,8 @@ def check(
     skills: SkillTable = SKILLS,
     behaviours: Mapping[str, Behaviour] | None = None,
     workers: int | None = None,
-    lanes: Lanes | None = None,
-    plan: Plan | None = None,
+    pool: WorkerPool | None = None,
+    plan: RoomMap | None = None,
 ) -> Check:
     """Say what is wrong with a program, as far as its text and some imagined worlds tell.
 
@@ -110,12 +110,12 @@ def check(
         skills: what the program may call.
         behaviours: what each skill does; those of the eight skills by default.
         workers: how many runs go on at the same time; one by default, which is enough for one program.
-        lanes: what runs programs, for who checks many; without it, it is started and ended. What runs on a
-            lane itself calls `check_on`.
+        pool: what runs programs, for who checks many; without it, it is started and ended. What runs on a
+            worker itself calls `check_on`.
         plan: the rooms and the start, in the place of those two, for who knows more of them.
 
     Raises:
-        BadInput: the name of a room is no regular expression, the robot starts in none of the rooms, or an
+        UserError: the name of a room is no regular expression, the robot starts in none of the rooms, or an
             argument is not of its kind or range.
         EngineError: no isolated process could be started.
     """
@@ -124,43 +124,43 @@ def check(
     if start is not None:
         expect_text(start, "the start")
     expect_skills(skills)
-    settings = Settings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
+    settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
     plan = plan or _plan(program, rooms, start, skills)
-    with nullcontext(lanes) if lanes else Lanes(1 if workers is None else workers) as open_lanes:
+    with nullcontext(pool) if pool else WorkerPool(1 if workers is None else workers) as open_pool:
 
-        def run(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:
-            return open_lanes.map_distinct(
-                lambda lot: imagined(open_lanes.here(), program, plan, lot, settings),
+        def run(plan: RoomMap, lots: Iterable[FactSampler]) -> Iterator[Sample]:
+            return open_pool.map_distinct(
+                lambda lot: imagined(open_pool.here(), program, plan, lot, settings),
                 lots,
                 name=lambda lot: digest(str(lot)),
             )
 
-        return _checked(program, plan, settings, Runner(run, open_lanes.workers))
+        return _checked(program, plan, settings, Runner(run, open_pool.workers))
 
 
 def check_on(
-    lane: Lane,
+    worker: Worker,
     program: str,
-    plan: Plan | None = None,
-    settings: Settings | None = None,
-    known: dict[Plan, list[Sample]] | None = None,
+    plan: RoomMap | None = None,
+    settings: CheckSettings | None = None,
+    known: dict[RoomMap, list[Sample]] | None = None,
 ) -> Check:
-    """The same on one lane, one run after the other, for who checks many programs at the same time.
+    """The same on one worker, one run after the other, for who checks many programs at the same time.
 
     Args:
-        lane: the calling thread's own.
+        worker: the calling thread's own.
         program: its source, which need not even parse.
         plan: the rooms; without it they are taken from the program.
         settings: how to check it.
         known: runs of the same program under the same rules, by other checks; those of this one are added.
 
     Raises:
-        EngineError: a process was lost twice, or the lane was stopped.
+        EngineError: a process was lost twice, or the worker was stopped.
     """
-    how = settings or Settings()
+    how = settings or CheckSettings()
 
-    def run(plan: Plan, lots: Iterable[Lot]) -> Iterator[Sample]:
-        return (imagined(lane, program, plan, lot, how) for lot in lots)
+    def run(plan: RoomMap, lots: Iterable[FactSampler]) -> Iterator[Sample]:
+        return (imagined(worker, program, plan, lot, how) for lot in lots)
 
     rooms = plan or _plan(program, None, None, how.skills)
     return _checked(program, rooms, how, Runner(run, known={} if known is None else known))
@@ -179,11 +179,11 @@ class Runner:
         known: what came of it, by what was certain of the worlds.
     """
 
-    run: Callable[[Plan, Iterable[Lot]], Iterator[Sample]]
+    run: Callable[[RoomMap, Iterable[FactSampler]], Iterator[Sample]]
     width: int = 1
-    known: dict[Plan, list[Sample]] = field(default_factory=dict)
+    known: dict[RoomMap, list[Sample]] = field(default_factory=dict)
 
-    def runs(self, plan: Plan, lots: Sequence[Lot]) -> list[Sample]:
+    def runs(self, plan: RoomMap, lots: Sequence[FactSampler]) -> list[Sample]:
         """The runs in some worlds, in their order."""
         known = self.known.setdefault(plan, [])
         found = []
@@ -196,34 +196,36 @@ class Runner:
         return found
 
 
-def imagined(lane: Lane, program: str, plan: Plan, lot: Lot, settings: Settings) -> Sample:
+def imagined(
+    worker: Worker, program: str, plan: RoomMap, lot: FactSampler, settings: CheckSettings
+) -> Sample:
     """Run a program in one imagined world.
 
     Args:
-        lane: the calling thread's own.
+        worker: the calling thread's own.
         program: its source, which need not even parse.
         plan: the rooms.
         lot: how the world is drawn.
         settings: how to check it.
     """
-    robots: list[ImaginedRobot] = []
+    robots: list[SampledRobot] = []
 
-    def new_robot() -> ImaginedRobot:
-        robots.append(ImaginedRobot(plan, lot, settings.rules, settings.skills, settings.behaviours))
+    def new_robot() -> SampledRobot:
+        robots.append(SampledRobot(plan, lot, settings.rules, settings.skills, settings.behaviours))
         return robots[-1]
 
-    outcome = lane.run(program, new_robot)
+    outcome = worker.run(program, new_robot)
     robot = robots[-1]
     return Sample(lot.sample, outcome, tuple(robot.facts), tuple(robot.draws), _is_in_vain(outcome, robot))
 
 
-def _is_in_vain(outcome: Outcome, robot: ImaginedRobot) -> bool:
+def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
     if outcome.status is Status.ROBOT_ERROR and outcome.error is not None:
         return any(excuse.startswith(outcome.error.message) for excuse in robot.excuses)
     return outcome.status is Status.TIMEOUT
 
 
-def _checked(program: str, plan: Plan, settings: Settings, runner: Runner) -> Check:
+def _checked(program: str, plan: RoomMap, settings: CheckSettings, runner: Runner) -> Check:
     flaws = _flaws(program, plan, settings.skills)
     if len(flaws) == 1 and isinstance(parsed(program, compiled=True), Flaw):
         return Check(flaws, (), plan, settings.seed, settings.strict)
@@ -239,9 +241,9 @@ def _checked(program: str, plan: Plan, settings: Settings, runner: Runner) -> Ch
     return Check(tuple(problems), tuple(ran), plan, settings.seed, settings.strict)
 
 
-def _samples(plan: Plan, settings: Settings, runner: Runner) -> list[Sample]:
+def _samples(plan: RoomMap, settings: CheckSettings, runner: Runner) -> list[Sample]:
     """The runs in so many worlds, and in more where the program waits or searches in vain in all of them."""
-    first = Lot(settings.seed, 0, settings.strict)
+    first = FactSampler(settings.seed, 0, settings.strict)
     ran = runner.runs(plan, [replace(first, sample=number) for number in range(settings.samples)])
     for more in range(MORE):
         if not all(sample.in_vain and sample.draws for sample in ran) or all(
@@ -256,30 +258,30 @@ def _samples(plan: Plan, settings: Settings, runner: Runner) -> list[Sample]:
 # --- rooms
 
 
-def _plan(program: str, rooms: Sequence[str] | None, start: str | None, skills: SkillTable) -> Plan:
+def _plan(program: str, rooms: Sequence[str] | None, start: str | None, skills: SkillTable) -> RoomMap:
     if rooms is not None:
         for room in rooms:
             _expect_regex(room)
         names = tuple(dict.fromkeys(rooms)) or (start or START,)
         start = start or (START if START in names else names[0])
         if start not in names:
-            raise BadInput(f'the robot starts in "{start}", but the rooms are: {", ".join(names)}')
-        return Plan(names, start)
+            raise UserError(f'the robot starts in "{start}", but the rooms are: {", ".join(names)}')
+        return RoomMap(names, start)
     start = start or START
     named = [room for room in named_rooms(program, skills) if room != start]
     if len(named) < len(SOME_ROOMS) and lists_rooms(program):
         named += [room for room in SOME_ROOMS if room not in named]
-    return Plan((*named, start), start, guessed=True)
+    return RoomMap((*named, start), start, guessed=True)
 
 
 def _expect_regex(room: str) -> None:
     try:
         re.compile(room)
     except (re.error, RecursionError, OverflowError) as error:
-        raise BadInput(f'the room "{room}" is no valid regular expression: {error}') from None
+        raise UserError(f'the room "{room}" is no valid regular expression: {error}') from None
 
 
-def _widened(plan: Plan, ran: Iterable[Sample]) -> Plan:
+def _widened(plan: RoomMap, ran: Iterable[Sample]) -> RoomMap:
     """The rooms, and those that the program drove to although its text does not name them."""
     requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == "goto")
     driven = (plan.room(request) for request in requests)
@@ -301,7 +303,7 @@ HARMLESS = "AskInvalidOptions"
 
 
 @lru_cache(maxsize=16)  # who checks with many seeds does so program by program
-def _flaws(program: str, plan: Plan, skills: SkillTable) -> tuple[Problem, ...]:
+def _flaws(program: str, plan: RoomMap, skills: SkillTable) -> tuple[Problem, ...]:
     """What the text shows, one problem a line."""
     flaws = [flaw for flaw in Program(program).problems(skills) if flaw.kind != HARMLESS]
     if not plan.guessed:

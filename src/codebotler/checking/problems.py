@@ -12,8 +12,8 @@ from codebotler.core.trace import Outcome, Status
 from codebotler.core.tracefile import outcome_data
 from codebotler.core.words import counted, listed
 from codebotler.simulator.child import PROCESSOR_TIME
-from codebotler.simulator.fact_sampler import Draw, Lot
-from codebotler.simulator.sampled_robot import Fact, Plan, brief
+from codebotler.simulator.fact_sampler import Draw, FactSampler
+from codebotler.simulator.sampled_robot import Fact, RoomMap, brief
 
 MOST_FACTS = 4
 
@@ -62,7 +62,7 @@ class Sample:
     draws: tuple[Draw, ...] = field(default=(), repr=False)
     in_vain: bool = False
 
-    def is_as_in(self, lot: Lot) -> bool:
+    def is_as_in(self, lot: FactSampler) -> bool:
         """Whether the same run in another world would meet the same facts, and so be the same."""
         return all(draw.is_drawn_by(lot) for draw in self.draws)
 
@@ -97,7 +97,7 @@ class Check:
 
     problems: tuple[Problem, ...]
     samples: tuple[Sample, ...]
-    plan: Plan
+    plan: RoomMap
     seed: int = 0
     strict: bool = False
 
@@ -147,7 +147,7 @@ class Check:
         }
 
 
-def no_room(request: str, plan: Plan) -> str:
+def no_room(request: str, plan: RoomMap) -> str:
     """That a room does not exist, in a sentence that names the closest one."""
     name = brief(request)
     closest = difflib.get_close_matches(name.lower(), plan.rooms, n=1)
@@ -155,7 +155,7 @@ def no_room(request: str, plan: Plan) -> str:
     return f'there is no room "{name}"{hint}'
 
 
-def failures(ran: Sequence[Sample], plan: Plan) -> Iterator[Problem]:
+def failures(ran: Sequence[Sample], plan: RoomMap) -> Iterator[Problem]:
     """What the runs show: one problem for the runs that ended at the same line in the same way."""
     in_vain = all(sample.in_vain for sample in ran)
     groups: dict[tuple[int | None, str], list[Sample]] = {}
@@ -169,7 +169,7 @@ def failures(ran: Sequence[Sample], plan: Plan) -> Iterator[Problem]:
         yield Problem(kind, _message(same, ran, plan), same[0].outcome.line, _where(same, ran), numbers)
 
 
-def _message(same: Sequence[Sample], ran: Sequence[Sample], plan: Plan) -> str:
+def _message(same: Sequence[Sample], ran: Sequence[Sample], plan: RoomMap) -> str:
     """What the first of some runs says at its end."""
     first = same[0].outcome
     assert first.error is not None

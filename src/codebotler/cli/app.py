@@ -90,19 +90,19 @@ def generate(
     The status is 1 if a check finds problems in it.
     """
     from codebotler.cli.generate import show, write
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from codebotler.core.world import World
-    from codebotler.models.base import Settings
+    from codebotler.models.base import SamplingSettings
     from codebotler.prompts import prompt_for
 
     if not instruction.strip():
-        raise BadInput("the instruction is empty; say what the robot is to do")
+        raise UserError("the instruction is empty; say what the robot is to do")
     known = None if world is None else World.read(world)
     prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
     if show_prompt:
         show(prompt, model)
         return
-    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
     tries = int(repair) if retries is None else retries
     accepted = write(prompt, model, settings, world=known, retries=tries, repair=repair, record=record)
     raise typer.Exit(0 if accepted else 1)
@@ -172,12 +172,12 @@ def run(
     from codebotler.cli.run import run as run_mission
     from codebotler.core.home import home
     from codebotler.core.world import World
-    from codebotler.models.base import Settings
+    from codebotler.models.base import SamplingSettings
     from codebotler.models.open import open_model
     from codebotler.robots.base import Options
     from codebotler.robots.open import open_robot
 
-    request = Request(program, lambda: open_model(model, Settings()), yes, despite_problems)
+    request = Request(program, lambda: open_model(model, SamplingSettings()), yes, despite_problems)
     options = Options(
         world=None if world is None else World.read(world),
         speed=speed or None,
@@ -200,13 +200,13 @@ def missions(
 ) -> None:
     """List past missions, or show what happened in one."""
     from codebotler.cli.missions import show_mission, show_missions, write_mission
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from codebotler.core.home import home
 
     if mcap is not None and mission is None:
-        raise BadInput("--mcap writes one mission; name it, or `last`")
+        raise UserError("--mcap writes one mission; name it, or `last`")
     if clock not in {"wall", "robot"}:
-        raise BadInput(f'"{clock}" is no clock; write wall or robot')
+        raise UserError(f'"{clock}" is no clock; write wall or robot')
     if mission is None:
         show_missions(home(), json=json)
     elif mcap is None:
@@ -271,12 +271,12 @@ def serve(
     """
     from codebotler.core.home import home
     from codebotler.core.world import World
-    from codebotler.models.base import Model, Settings
+    from codebotler.models.base import Model, SamplingSettings
     from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_faced, open_robot
-    from codebotler.web.console import Desk
+    from codebotler.web.console import Console
     from codebotler.web.place import entrance
 
     place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)
@@ -288,12 +288,12 @@ def serve(
         expect_server(*models)
 
     def opened(name: str) -> Model:
-        return open_model(name, Settings(base_url=base_url if runs_on_server(name) else None))
+        return open_model(name, SamplingSettings(base_url=base_url if runs_on_server(name) else None))
 
     options = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
     body = open_robot(robot, options) if shown is None else open_faced(robot, options, shown)
-    desk = Desk(body, home(), opened, models=models, world=known, face=shown)
+    desk = Console(body, home(), opened, models=models, world=known, face=shown)
 
     from codebotler.web.further import installed
     from codebotler.web.serving import serve as serve_page

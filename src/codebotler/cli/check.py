@@ -12,7 +12,7 @@ from rich.text import Text
 
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.storyboard import steps_of, storyboard
-from codebotler.core.errors import MAX_BYTES, BadInput, read_text, text_of
+from codebotler.core.errors import MAX_BYTES, UserError, read_text, text_of
 from codebotler.core.program import TASK, bound_names
 from codebotler.core.terminal import shortened, visible
 from codebotler.prompts.extract import program_of
@@ -31,18 +31,18 @@ def read_program(name: str) -> str:
         name: a file, or `-` for standard input, where also a model's whole reply is understood.
 
     Raises:
-        BadInput: there is no such file, or nothing in it.
+        UserError: there is no such file, or nothing in it.
     """
     if name != "-":
         if not name:
-            raise BadInput("nothing is named; name a file, or - for standard input")
+            raise UserError("nothing is named; name a file, or - for standard input")
         text = read_text(Path(name))
         if not text.strip():
-            raise BadInput("there is no program in it", file=name)
+            raise UserError("there is no program in it", file=name)
         return text
     text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
     if not text.strip():
-        raise BadInput("nothing came; write a program or a model's reply to it", file=INPUT)
+        raise UserError("nothing came; write a program or a model's reply to it", file=INPUT)
     return text if TASK in bound_names(text) else program_of(text).source
 
 

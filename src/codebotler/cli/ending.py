@@ -59,14 +59,14 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 
 def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for one that a user cannot cause."""
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.robots.base import NotReadyError, RobotLostError
     from codebotler.simulator.engine import EngineError
 
     if isinstance(error, USAGE):
         return 2, _usage_sentence(error)
-    if isinstance(error, BadInput):
+    if isinstance(error, UserError):
         return 2, str(error)
     if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
         return 1, str(error)

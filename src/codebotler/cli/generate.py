@@ -14,18 +14,18 @@ from codebotler.core.replacing import expect_replaceable
 from codebotler.core.terminal import busy, note, print_source, visible
 from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, Generation, generate, untold
-from codebotler.models.base import Model, Settings
+from codebotler.models.base import Model, SamplingSettings
 from codebotler.models.open import kind_of, open_model
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt
-from codebotler.simulator.engine import Lanes
-from codebotler.simulator.sampled_robot import Plan
+from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.sampled_robot import RoomMap
 
 
 def write(
     prompt: Prompt,
     model: str,
-    settings: Settings,
+    settings: SamplingSettings,
     *,
     world: World | None,
     retries: int,
@@ -44,7 +44,7 @@ def write(
         record: the file that gets a line for every attempt, if one is named.
 
     Raises:
-        BadInput: there is no such model.
+        UserError: there is no such model.
         ModelError: no whole reply came.
         EngineError: no isolated process could be started.
         OSError: an attempt could not be recorded; the program is printed all the same.
@@ -53,7 +53,7 @@ def write(
         with busy(f"asking {model}"):
             asked = open_model(model, settings)
             note_down = recording.enter_context(recorder(record, asked.name))
-            plan = None if world is None else Plan.of(world)
+            plan = None if world is None else RoomMap.of(world)
             made = generated(asked, prompt, plan=plan, retries=retries, repair=repair, note_down=note_down)
         print_source(made.program)
     return not made.problems
@@ -63,7 +63,7 @@ def generated(
     model: Model,
     prompt: Prompt,
     *,
-    plan: Plan | None = None,
+    plan: RoomMap | None = None,
     retries: int = 0,
     repair: bool = False,
     note_down: Callable[[Attempt], None] = untold,
@@ -82,10 +82,10 @@ def generated(
         ModelError: no whole reply came.
         EngineError: no isolated process could be started.
     """
-    with Lanes(1) as lanes:
+    with WorkerPool(1) as pool:
 
         def problems(program: str) -> list[str]:
-            found = check(program, lanes=lanes, plan=plan)
+            found = check(program, pool=pool, plan=plan)
             return [problem.sentence for problem in found.problems]
 
         def tried(attempt: Attempt) -> None:
@@ -94,7 +94,7 @@ def generated(
 
         async def asked() -> Generation:
             try:
-                paced = Paced(model, concurrency=1)
+                paced = RateLimited(model, concurrency=1)
                 return await generate(paced, prompt, problems, retries=retries, repair=repair, tried=tried)
             finally:
                 await model.close()
@@ -111,7 +111,7 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
         model: the name of who is asked.
 
     Raises:
-        BadInput: the file holds something else.
+        UserError: the file holds something else.
         OSError: at the end, if an attempt could not be added; after it, none is.
     """
     if path is None:
@@ -159,7 +159,7 @@ def show(prompt: Prompt, model: str) -> None:
         model: the name of the model, which tells in which way it is asked.
 
     Raises:
-        BadInput: there is no such kind of model.
+        UserError: there is no such kind of model.
     """
     kind = kind_of(model)
     if kind == "completions":

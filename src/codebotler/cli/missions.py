@@ -22,7 +22,7 @@ def show_missions(home: Path, *, json: bool) -> None:
         json: whether for machines.
 
     Raises:
-        BadInput: one cannot be read.
+        UserError: one cannot be read.
     """
     tell_interrupted(home)
     known = missions(home)
@@ -41,7 +41,7 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
         json: whether for machines.
 
     Raises:
-        BadInput: there is none of that name, or it cannot be read.
+        UserError: there is none of that name, or it cannot be read.
     """
     tell_interrupted(home)
     folder = find(home, name)
@@ -64,7 +64,7 @@ def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
         clock: by which its messages are timed.
 
     Raises:
-        BadInput: there is none of that name, or it cannot be read.
+        UserError: there is none of that name, or it cannot be read.
         OSError: the file cannot be written.
     """
     tell_interrupted(home)
@@ -78,7 +78,7 @@ def tell_interrupted(home: Path) -> None:
     """Close the missions that a tool left behind when it died, and say so.
 
     Raises:
-        BadInput: the folder of missions is none.
+        UserError: the folder of missions is none.
         OSError: that folder cannot be read.
     """
 

@@ -13,7 +13,7 @@ from codebotler.checking.check import check
 from codebotler.cli.check import check_view, read_program
 from codebotler.cli.generate import generated
 from codebotler.cli.missions import tell_interrupted
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.missions.mission import GRACE, Mission, MissionError, State
 from codebotler.missions.preflight import beyond, preflight, unknown_rooms
@@ -22,7 +22,7 @@ from codebotler.models.base import Model
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import Robot
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.sampled_robot import Plan
+from codebotler.simulator.sampled_robot import RoomMap
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",
@@ -43,7 +43,7 @@ class Request:
         despite_problems: whether it may be run if the check finds problems.
 
     Raises:
-        BadInput: it names a program that does not exist, or nothing, or nobody could be asked.
+        UserError: it names a program that does not exist, or nothing, or nobody could be asked.
     """
 
     what: str
@@ -53,11 +53,11 @@ class Request:
 
     def __post_init__(self) -> None:
         if not self.what.strip():
-            raise BadInput("nothing is asked for; name a program, or say what the robot is to do")
+            raise UserError("nothing is asked for; name a program, or say what the robot is to do")
         if self.what.endswith(".py") and not self.is_program:
-            raise BadInput("there is no such file; name one, or write an instruction", file=self.what)
+            raise UserError("there is no such file; name one, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
-            raise BadInput(
+            raise UserError(
                 "the program comes on standard input, so that nobody can be asked there; add --yes"
             )
 
@@ -83,7 +83,7 @@ def run(robot: Robot, request: Request, home: Path) -> int:
 
     Raises:
         NotReadyError: the robot cannot be used.
-        BadInput: the program cannot be read, or the model not be asked.
+        UserError: the program cannot be read, or the model not be asked.
         ModelError: no whole reply came.
     """
     program = read_program(request.what) if request.is_program else None
@@ -110,14 +110,16 @@ def run(robot: Robot, request: Request, home: Path) -> int:
         return _watched(mission, reserved, place)
 
 
-def written(model: Model, instruction: str, plan: Plan | None) -> str:
+def written(model: Model, instruction: str, plan: RoomMap | None) -> str:
     """The program that a model writes for an instruction, with the rooms of the robot in mind."""
     if plan is None:
         return generated(model, prompt_for(instruction)).program
     return generated(model, prompt_for(instruction, rooms=plan.rooms), plan=plan).program
 
 
-def _is_approved(mission: Mission, program: str, robot: Robot, plan: Plan | None, request: Request) -> bool:
+def _is_approved(
+    mission: Mission, program: str, robot: Robot, plan: RoomMap | None, request: Request
+) -> bool:
     """Show what a check finds, and ask."""
     found = check(program, plan=plan)
     name = request.what if request.is_program and request.what != "-" else "the program"

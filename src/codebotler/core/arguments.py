@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from numbers import Integral, Real
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SkillTable
 
 
@@ -17,10 +17,10 @@ def expect_text(given: object, what: str) -> None:
         what: what it is to be, in words.
 
     Raises:
-        BadInput: it is none.
+        UserError: it is none.
     """
     if not isinstance(given, str):
-        raise BadInput(f"{what} is {given!r}, not a text")
+        raise UserError(f"{what} is {given!r}, not a text")
 
 
 def expect_texts(given: object, what: str) -> None:
@@ -31,12 +31,12 @@ def expect_texts(given: object, what: str) -> None:
         what: what they are to be, in words for several.
 
     Raises:
-        BadInput: it is none.
+        UserError: it is none.
     """
     if isinstance(given, str):
-        raise BadInput(f"{what} are one text; put it into a list")
+        raise UserError(f"{what} are one text; put it into a list")
     if not isinstance(given, Sequence):  # a set is in another order each time
-        raise BadInput(f"{what} are {given!r}, not a list of texts")
+        raise UserError(f"{what} are {given!r}, not a list of texts")
     for one in given:
         expect_text(one, f"one of {what}")
 
@@ -49,10 +49,10 @@ def expect_number(given: object, what: str) -> None:
         what: what it is to be, in words.
 
     Raises:
-        BadInput: it is none.
+        UserError: it is none.
     """
     if isinstance(given, bool) or not isinstance(given, Real):
-        raise BadInput(f"{what} is {given!r}, not a number")
+        raise UserError(f"{what} is {given!r}, not a number")
 
 
 def expect_whole(given: object, what: str, *, least: int | None = None, most: int | None = None) -> None:
@@ -65,14 +65,14 @@ def expect_whole(given: object, what: str, *, least: int | None = None, most: in
         most: the largest number that will do.
 
     Raises:
-        BadInput: it is none.
+        UserError: it is none.
     """
     if isinstance(given, bool) or not isinstance(given, Integral):
-        raise BadInput(f"{what} is {given!r}, not a whole number")
+        raise UserError(f"{what} is {given!r}, not a whole number")
     if least is not None and given < least:
-        raise BadInput(f"{what} is {given}, but it must be at least {least}")
+        raise UserError(f"{what} is {given}, but it must be at least {least}")
     if most is not None and not given <= most:
-        raise BadInput(f"{what} is {given}, but it must be at most {most:,}")
+        raise UserError(f"{what} is {given}, but it must be at most {most:,}")
 
 
 def expect_skills(given: object) -> None:
@@ -82,7 +82,7 @@ def expect_skills(given: object) -> None:
         given: what was given.
 
     Raises:
-        BadInput: it is none.
+        UserError: it is none.
     """
     if not isinstance(given, SkillTable):
-        raise BadInput(f"the skills are {given!r}, not a SkillTable")
+        raise UserError(f"the skills are {given!r}, not a SkillTable")

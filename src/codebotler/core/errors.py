@@ -44,7 +44,7 @@ UNPRINTABLE = re.compile(
 )  # what YAML 1.1 keeps out of files
 
 
-class BadInput(ValueError):  # noqa: N818 - named for what it says to the user, not for where it is raised
+class UserError(ValueError):
     """Something a user gave cannot be used; its text is one sentence that says where and how to mend it.
 
     Args:
@@ -60,6 +60,9 @@ class BadInput(ValueError):  # noqa: N818 - named for what it says to the user, 
 
     def __reduce__(self) -> tuple[object, ...]:
         return partial(type(self), file=self.file, line=self.line), (self.sentence,), vars(self)
+
+
+BadInput = UserError  # the former name, for one version
 
 
 def _brief(text: str, most: int = MAX_SENTENCE) -> str:
@@ -123,7 +126,7 @@ class YamlFile:
         name: what error sentences call the file.
 
     Raises:
-        BadInput: it is no YAML, a key stands twice in one mapping, or its anchors make too much of it.
+        UserError: it is no YAML, a key stands twice in one mapping, or its anchors make too much of it.
     """
 
     def __init__(self, text: str, name: Path | str) -> None:
@@ -132,7 +135,7 @@ class YamlFile:
         self._lines: dict[Place, int] = {}
         if found := UNPRINTABLE.search(text):
             code = f"U+{ord(found[0]):04X}"
-            raise BadInput(
+            raise UserError(
                 f"the character {code} may not stand in YAML; remove it",
                 file=name,
                 line=text.count("\n", 0, found.start()) + 1,
@@ -146,14 +149,14 @@ class YamlFile:
         except yaml.YAMLError as error:
             raise self._syntax(error) from None
         except _FaultError as error:
-            raise BadInput(str(error), file=name, line=error.line) from None
+            raise UserError(str(error), file=name, line=error.line) from None
 
     @classmethod
     def read(cls, path: Path) -> YamlFile:
         """Read and parse a file.
 
         Raises:
-            BadInput: it is missing, unreadable, too large, or no YAML.
+            UserError: it is missing, unreadable, too large, or no YAML.
         """
         return cls(read_text(path), path)
 
@@ -167,9 +170,9 @@ class YamlFile:
             path = (*around, str(last)) if isinstance(last, int) else tuple(around)
         return self._lines[path]
 
-    def wrong(self, sentence: str, *place: str | int) -> BadInput:
+    def wrong(self, sentence: str, *place: str | int) -> UserError:
         """The error that says a sentence about what stands at a place."""
-        return BadInput(sentence, file=self.name, line=self.line(place))
+        return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[Model], data: object = None, *, at: Place = ()) -> Model:
         """This file's content (or a part of it) as a model.
@@ -180,7 +183,7 @@ class YamlFile:
             at: where the part stands.
 
         Raises:
-            BadInput: it does not look like it; the sentence is about the first fault.
+            UserError: it does not look like it; the sentence is about the first fault.
         """
         try:
             return model.model_validate(self.data if data is None and not at else data)
@@ -196,7 +199,7 @@ class YamlFile:
             return "this key"
         return f'"{place[-1]}"' if isinstance(place[-1], str) and place in self._lines else "this entry"
 
-    def _syntax(self, error: yaml.YAMLError) -> BadInput:
+    def _syntax(self, error: yaml.YAMLError) -> UserError:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         problem = getattr(error, "problem", None)
         said = [getattr(error, "context", None), problem or getattr(error, "reason", None)]
@@ -204,7 +207,7 @@ class YamlFile:
         if problem in MENDS:
             sentence += "; " + MENDS[problem]
         line = None if mark is None else min(mark.line + 1, self._last)  # it may stand behind the end
-        return BadInput(f"this is no valid YAML: {sentence}", file=self.name, line=line)
+        return UserError(f"this is no valid YAML: {sentence}", file=self.name, line=line)
 
     def _remember(self, node: yaml.Node, place: Place) -> None:
         self._lines[place] = node.start_mark.line + 1
@@ -250,17 +253,17 @@ def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
         limit: the largest size in bytes.
 
     Raises:
-        BadInput: it is missing, a folder, unreadable, larger than the limit, or no UTF-8.
+        UserError: it is missing, a folder, unreadable, larger than the limit, or no UTF-8.
     """
     try:
         with path.open("rb") as file:
             data = file.read(limit + 1)
     except FileNotFoundError:
-        raise BadInput("there is no such file", file=path) from None
+        raise UserError("there is no such file", file=path) from None
     except IsADirectoryError:
-        raise BadInput("is a folder; name a file", file=path) from None
+        raise UserError("is a folder; name a file", file=path) from None
     except OSError as error:
-        raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+        raise UserError(f"cannot be read ({error.strerror})", file=path) from None
     return text_of(data, path, limit=limit)
 
 
@@ -273,15 +276,15 @@ def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
         limit: the largest size in bytes.
 
     Raises:
-        BadInput: it is larger than the limit, or no UTF-8.
+        UserError: it is larger than the limit, or no UTF-8.
     """
     if len(data) > limit:
-        raise BadInput(f"is larger than {limit:,} bytes", file=name)
+        raise UserError(f"is larger than {limit:,} bytes", file=name)
     try:
         return io.StringIO(data.decode("utf-8-sig"), newline=None).read()
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise BadInput("is no UTF-8 text; save it as UTF-8", file=name, line=line) from None
+        raise UserError("is no UTF-8 text; save it as UTF-8", file=name, line=line) from None
 
 
 EXPECTED = {

@@ -12,7 +12,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 MAX_ROW = 5_000_000
 CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no folder to the disk
@@ -32,22 +32,22 @@ def read_lines(
         name: what sentences call the file; its path by default.
 
     Raises:
-        BadInput: the file is missing, or a line is too long.
+        UserError: the file is missing, or a line is too long.
     """
     name = name or path
     try:
         file = path.open("rb")
     except FileNotFoundError:
-        raise BadInput("there is no such file", file=name) from None
+        raise UserError("there is no such file", file=name) from None
     except OSError as error:
-        raise BadInput(f"cannot be read ({error.strerror})", file=name) from None
+        raise UserError(f"cannot be read ({error.strerror})", file=name) from None
     with file:
         for number in count(1):
             line = file.readline(limit + 1)
             if not line:
                 return
             if len(line) > limit:
-                raise BadInput(f"this row is longer than {limit:,} bytes", file=name, line=number)
+                raise UserError(f"this row is longer than {limit:,} bytes", file=name, line=number)
             yield number, line
 
 
@@ -66,19 +66,19 @@ def read_rows(
         name: what sentences call the file; its path by default.
 
     Raises:
-        BadInput: the file is missing, or a line is too long or no JSON object.
+        UserError: the file is missing, or a line is too long or no JSON object.
     """
     name = name or path
     for number, line in read_lines(path, name=name):
         if line.strip():
             try:
                 row = parsed_row(line)
-            except BadInput as error:
-                raise BadInput(error.sentence, file=name, line=number) from None
+            except UserError as error:
+                raise UserError(error.sentence, file=name, line=number) from None
             if row is None and growing and not line.endswith(b"\n"):
                 return
             if row is None:
-                raise BadInput("this line is no JSON", file=name, line=number)
+                raise UserError("this line is no JSON", file=name, line=number)
             yield number, row
 
 
@@ -86,7 +86,7 @@ def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None
     """The JSON object that a line says; None if it is no JSON.
 
     Raises:
-        BadInput: it is JSON, but no object.
+        UserError: it is JSON, but no object.
     """
     try:
         row = json.loads(line)
@@ -94,7 +94,7 @@ def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None
         return None
     if not isinstance(row, dict):
         mend = "" if example is None else f"; a row looks like {example}"
-        raise BadInput(f"this line is no JSON object{mend}")
+        raise UserError(f"this line is no JSON object{mend}")
     return row
 
 

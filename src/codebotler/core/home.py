@@ -6,14 +6,14 @@ import errno
 import os
 from pathlib import Path
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 
 def home() -> Path:
     """What CODEBOTLER_HOME names; without it, a folder among the user's state. It need not exist.
 
     Raises:
-        BadInput: nothing says where it is.
+        UserError: nothing says where it is.
     """
     named = os.environ.get("CODEBOTLER_HOME")
     if named:
@@ -22,7 +22,7 @@ def home() -> Path:
     try:
         return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
     except RuntimeError:
-        raise BadInput("nobody knows where your home is; set CODEBOTLER_HOME to a folder") from None
+        raise UserError("nobody knows where your home is; set CODEBOTLER_HOME to a folder") from None
 
 
 NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
@@ -32,7 +32,7 @@ def make_folder(folder: Path) -> None:
     """Make a folder there, if it is not there already, to write into.
 
     Raises:
-        BadInput: this is not allowed.
+        UserError: this is not allowed.
         OSError: it cannot be made for another reason.
     """
     try:
@@ -41,7 +41,7 @@ def make_folder(folder: Path) -> None:
         if error.errno not in NOT_ALLOWED:
             raise
         sentence = f"this cannot be made ({error.strerror}); name another folder by CODEBOTLER_HOME"
-        raise BadInput(sentence, file=folder) from None
+        raise UserError(sentence, file=folder) from None
     if not os.access(folder, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids):
         sentence = "nothing can be written into this folder; name another by CODEBOTLER_HOME"
-        raise BadInput(sentence, file=folder)
+        raise UserError(sentence, file=folder)

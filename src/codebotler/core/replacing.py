@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 
 def expect_replaceable(path: Path, *beginnings: bytes) -> None:
@@ -15,7 +15,7 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
         beginnings: what files of its kind begin with.
 
     Raises:
-        BadInput: it holds something else.
+        UserError: it holds something else.
         OSError: it cannot be read.
     """
     if not path.is_file():
@@ -23,4 +23,4 @@ def expect_replaceable(path: Path, *beginnings: bytes) -> None:
     with path.open("rb") as file:
         start = file.read(max(map(len, beginnings)))
     if start and not start.startswith(beginnings):
-        raise BadInput("this file holds something else; name another one, or remove it", file=path)
+        raise UserError("this file holds something else; name another one, or remove it", file=path)

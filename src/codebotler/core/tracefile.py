@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, StrictStr, model_validator
 
-from codebotler.core.errors import BadInput, YamlFile
+from codebotler.core.errors import UserError, YamlFile
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 
@@ -28,7 +28,7 @@ def trace_from(data: Iterable[object], skills: SkillTable = SKILLS, *, further: 
         further: whether events of skills that are not among them may stand in it too.
 
     Raises:
-        BadInput: an element is none.
+        UserError: an element is none.
     """
     return tuple(
         _further_event_from(element)
@@ -57,7 +57,7 @@ def read_outcome(path: Path, skills: SkillTable = SKILLS) -> Outcome:
         skills: what can stand in its trace.
 
     Raises:
-        BadInput: the file is missing or wrong; the sentence names the line and the mend.
+        UserError: the file is missing or wrong; the sentence names the line and the mend.
     """
     file = YamlFile.read(path)
     return file.validate(OutcomeFile).outcome(file, skills)
@@ -79,7 +79,7 @@ def _event_data(event: Event, skills: SkillTable) -> list[Any]:
 def _event_from(element: object, skills: SkillTable) -> Event:
     match element:
         case [str(kind), *_] if kind not in skills.recordings:
-            raise BadInput(f'"{kind}" is no kind of event; write one of {", ".join(skills.recordings)}')
+            raise UserError(f'"{kind}" is no kind of event; write one of {", ".join(skills.recordings)}')
         case [str(kind), str(text)] if not _asks(kind, skills):
             return Event(kind, text)
         case [str(kind), str(text), bool(found)] if _looks(kind, skills):
@@ -87,7 +87,7 @@ def _event_from(element: object, skills: SkillTable) -> Event:
         case [str(kind), str(text), list(data), (str() | None) as answer] if _asks(kind, skills):
             options = tuple(map(_option_from, data))
             if answer is not None and answer not in {option.text for option in options}:
-                raise BadInput(f'"{answer}" is no option of the question "{text}"; correct the answer')
+                raise UserError(f'"{answer}" is no option of the question "{text}"; correct the answer')
             return Event(kind, text, options, answer=answer)
         case [str(kind), *_] if _asks(kind, skills):
             form = f"[{kind}, question, [option, ...], answer or null]"
@@ -95,7 +95,7 @@ def _event_from(element: object, skills: SkillTable) -> Event:
             form = f"[{kind}, text, true or false]" if _looks(kind, skills) else f"[{kind}, text]"
         case _:
             form = "[kind, text, ...]"
-    raise BadInput(f"{element!r} is no element of a trace; write {form}, with texts in quotes")
+    raise UserError(f"{element!r} is no element of a trace; write {form}, with texts in quotes")
 
 
 def _is_further(element: object, skills: SkillTable) -> bool:
@@ -113,7 +113,7 @@ def _further_event_from(element: object) -> Event:
             return Event(kind, text, found=found)
         case [str(kind), str(text), list(options), (str() | None) as answer]:
             return Event(kind, text, tuple(map(_option_from, options)), answer=answer)
-    raise BadInput(f"{element!r} is no element of a trace")
+    raise UserError(f"{element!r} is no element of a trace")
 
 
 def _asks(kind: str, skills: SkillTable) -> bool:
@@ -137,7 +137,7 @@ def _option_from(data: object) -> Option:
             return Option(text)
         case {"no text": str(text)}:
             return Option(text, is_text=False)
-    raise BadInput(f'{data!r} is no option; write a text, or {{"no text": ...}} for what is none')
+    raise UserError(f'{data!r} is no option; write a text, or {{"no text": ...}} for what is none')
 
 
 class _Form(BaseModel):
@@ -173,13 +173,13 @@ class OutcomeFile(_Form):
             skills: what can stand in its trace.
 
         Raises:
-            BadInput: an element of the trace is none.
+            UserError: an element of the trace is none.
         """
         trace = []
         for index, element in enumerate(self.trace):
             try:
                 trace.append(_event_from(element, skills))
-            except BadInput as fault:
+            except UserError as fault:
                 raise file.wrong(fault.sentence, "trace", index) from None
         error = None if self.error is None else RunError(self.error.kind, self.error.message)
         return Outcome(self.status, tuple(trace), error, self.line)

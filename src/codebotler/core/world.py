@@ -93,7 +93,7 @@ class World:
         """Read a world file.
 
         Raises:
-            BadInput: the file is missing or wrong; the sentence names the line and the mend.
+            UserError: the file is missing or wrong; the sentence names the line and the mend.
         """
         file = YamlFile.read(path)
         return file.validate(WorldFile).world(file)
@@ -231,7 +231,7 @@ class WorldFile(_Form):
             at: where in the file.
 
         Raises:
-            BadInput: a room does not exist or stands twice, or a regex is invalid.
+            UserError: a room does not exist or stands twice, or a regex is invalid.
         """
         names = [room.name for room in self.rooms]
         for index, name in enumerate(names):
@@ -320,7 +320,7 @@ def expect_regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
         place: where in it.
 
     Raises:
-        BadInput: it is none.
+        UserError: it is none.
     """
     if isinstance(text, OptionFile):
         return

@@ -8,14 +8,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 from codebotler.checking.check import check
 from codebotler.core.arguments import expect_text, expect_texts, expect_whole
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.generation.generate import Generation
 from codebotler.generation.generate import generate as ask
-from codebotler.models.base import Model, Settings
+from codebotler.models.base import Model, SamplingSettings
 from codebotler.models.open import open_model
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import prompt_for
-from codebotler.simulator.engine import Lanes
+from codebotler.simulator.engine import WorkerPool
 
 
 def generate(
@@ -53,7 +53,7 @@ def generate(
         base_url: where the model is served, such as `http://localhost:8000/v1`.
 
     Raises:
-        BadInput: there is no such model, or an argument is out of its range.
+        UserError: there is no such model, or an argument is out of its range.
         ModelError: no whole reply came.
         EngineError: no isolated process could be started.
     """
@@ -62,17 +62,17 @@ def generate(
     tries = int(repair) if retries is None else retries
     expect_whole(tries, "the number of retries", least=0)
     if not instruction.strip():
-        raise BadInput("the instruction is empty; say what the robot is to do")
-    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+        raise UserError("the instruction is empty; say what the robot is to do")
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
     prompt = prompt_for(instruction, rooms=rooms or ())
     asked = open_model(model, settings)
-    with Lanes(1) as lanes:
+    with WorkerPool(1) as pool:
 
         def problems(program: str) -> list[str]:
-            return [problem.sentence for problem in check(program, rooms=rooms, lanes=lanes).problems]
+            return [problem.sentence for problem in check(program, rooms=rooms, pool=pool).problems]
 
         async def written() -> Generation:
-            paced = Paced(asked, concurrency=1)
+            paced = RateLimited(asked, concurrency=1)
             return await ask(paced, prompt, problems, retries=tries, repair=repair)
 
         return _result(written, asked)

@@ -37,7 +37,7 @@ class StoppedError(Exception):
 
 
 class LiveRobot:
-    """What `Lane.run_live` asks of a robot, answered by a real or simulated one.
+    """What `Worker.run_live` asks of a robot, answered by a real or simulated one.
 
     Args:
         robot: connected.

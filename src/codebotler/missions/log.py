@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 EVENTS, SUMMARY = "events.jsonl", "mission.json"
 TEXTS = ("id", "state", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
@@ -75,7 +75,7 @@ class Summary:
         """The summary of a mission.
 
         Raises:
-            BadInput: it is none.
+            UserError: it is none.
             OSError: it cannot be read.
         """
         path = folder / SUMMARY
@@ -86,7 +86,7 @@ class Summary:
             datetime.fromtimestamp(summary.created, UTC)
             "".join((*summary.problems, *(getattr(summary, name) for name in TEXTS)))
         except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-            raise BadInput("this is no summary of a mission; remove its folder", file=path) from None
+            raise UserError("this is no summary of a mission; remove its folder", file=path) from None
         return summary
 
     def write(self, folder: Path) -> None:
@@ -172,7 +172,7 @@ def events_of(folder: Path) -> list[Line]:
     """The events of a mission, without a last line that was cut off.
 
     Raises:
-        BadInput: a line is no event.
+        UserError: a line is no event.
         OSError: they cannot be read.
     """
     path = folder / EVENTS
@@ -188,7 +188,7 @@ def _event(text: bytes, path: Path, number: int) -> Line:
             return dict(line)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         pass
-    raise BadInput("this is no event of a mission; remove the line", file=path, line=number)
+    raise UserError("this is no event of a mission; remove the line", file=path, line=number)
 
 
 def doing(events: Iterable[Line]) -> Line | None:

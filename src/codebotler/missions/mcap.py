@@ -196,7 +196,7 @@ def export(
         folder: of the mission, for its pictures; None to leave them out.
 
     Raises:
-        BadInput: the file holds something else.
+        UserError: the file holds something else.
         OSError: it cannot be written.
     """
     path = path.resolve()

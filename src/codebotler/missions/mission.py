@@ -21,7 +21,7 @@ from codebotler.missions.log import Line, Log, Summary
 from codebotler.missions.pictures import Pictures
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.worker import EngineError, Lane
+from codebotler.simulator.worker import EngineError, Worker
 
 GRACE = 10.0
 """Real seconds in which a robot has to end what it does once it was told to stop."""
@@ -99,7 +99,7 @@ class Mission:
         self._stopped_by: str | None = None
         self._asked, self._passed_on = 0.0, math.inf  # when it was first to stop, and when the robot knew
         self._live: LiveRobot | None = None
-        self._lane: Lane | None = None
+        self._worker: Worker | None = None
         self._over, self._wake = threading.Event(), threading.Event()
         self._fault: Exception | None = None
         self.trace: Trace = ()
@@ -203,15 +203,15 @@ class Mission:
         with self._gate:
             if self._stopped_by is None:
                 self._stopped_by, self._asked = by, asked
-            live, lane = self._live, self._lane
+            live, worker = self._live, self._worker
         self._wake.set()  # a robot that cannot be told must not keep anybody from hearing so
         try:
             if live is not None:
                 live.stop()
         finally:
             self._passed_on = min(self._passed_on, time.monotonic())
-            if lane is not None:
-                lane.stop()
+            if worker is not None:
+                worker.stop()
         with self._book:
             if self.state is State.STOPPED and not had_ended:
                 return  # by this very stop, whose end was written first
@@ -275,16 +275,16 @@ class Mission:
             self._end(State.DONE if done else State.FAILED, reason, line=outcome.line)
 
     def _outcome(self, live: LiveRobot) -> Outcome:
-        lane = Lane()
+        worker = Worker()
         try:
             with self._gate:
-                self._lane = lane
+                self._worker = worker
                 is_stopped = self._stopped_by is not None
             if is_stopped:
                 raise StoppedError
-            return lane.run_live(self.summary.program, live)
+            return worker.run_live(self.summary.program, live)
         finally:
-            lane.close()
+            worker.close()
 
     def _end(self, state: State, reason: str = "", line: int | None = None) -> None:
         """Come to an end, the first that is told; what ends because it was stopped is stopped."""

@@ -9,7 +9,7 @@ from codebotler.core.terminal import note, shortened, visible
 from codebotler.missions.live import answered
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
 from codebotler.simulator.robot import RobotError
-from codebotler.simulator.sampled_robot import Plan
+from codebotler.simulator.sampled_robot import RoomMap
 
 MOST_ROOMS = 1_000
 """Of a robot, for a check: each drive is compared with all of them."""
@@ -18,7 +18,7 @@ WITH_PATTERNS = frozenset({"simulated", "pyrobosim"})
 """Robots whose rooms have regexes for names, as in the world files they come from."""
 
 
-def preflight(robot: Robot) -> tuple[Plan | None, str]:
+def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
     """What a connected robot says of its rooms, in its own words.
 
     Returns:
@@ -57,10 +57,10 @@ def preflight(robot: Robot) -> tuple[Plan | None, str]:
     if place and place not in rooms:
         note(shortened(f'the robot says it is in "{place}", which is none of the rooms that it knows'))
     names = dict.fromkeys([*rooms, place] if place else rooms)
-    return Plan(tuple(names), place or rooms[0], plain=robot.name not in WITH_PATTERNS), place
+    return RoomMap(tuple(names), place or rooms[0], plain=robot.name not in WITH_PATTERNS), place
 
 
-def unknown_rooms(program: str, plan: Plan) -> list[str]:
+def unknown_rooms(program: str, plan: RoomMap) -> list[str]:
     """For each room that a program names and the robot does not know, a sentence.
 
     Args:

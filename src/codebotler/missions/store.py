@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.pasted import mission_command
 from codebotler.missions.live import in_words
 from codebotler.missions.log import SUMMARY, Line, Log, Summary, doing, events_of
@@ -24,7 +24,7 @@ def missions(home: Path) -> list[Summary]:
         home: the folder of missions.
 
     Raises:
-        BadInput: one cannot be read, or the folder is none.
+        UserError: one cannot be read, or the folder is none.
         OSError: the folder cannot be read.
     """
     return sorted(map(summary_of, _folders(home)), key=lambda summary: (summary.created, summary.id))
@@ -38,14 +38,14 @@ def find(home: Path, name: str) -> Path:
         name: the mission's own, or `last`.
 
     Raises:
-        BadInput: there is none of that name.
+        UserError: there is none of that name.
     """
     if name == "last" and (known := missions(home)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
     if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
         lists = mission_command("missions")
-        raise BadInput(f'there is no mission "{name}"; `{lists}` lists those there are')
+        raise UserError(f'there is no mission "{name}"; `{lists}` lists those there are')
     return folder
 
 
@@ -53,12 +53,12 @@ def summary_of(folder: Path) -> Summary:
     """The summary of a mission.
 
     Raises:
-        BadInput: it is none.
+        UserError: it is none.
         OSError: it cannot be read.
     """
     summary = Summary.read(folder)
     if summary.state not in tuple(State):
-        raise BadInput("this is no summary of a mission; remove its folder", file=folder / SUMMARY)
+        raise UserError("this is no summary of a mission; remove its folder", file=folder / SUMMARY)
     return summary
 
 
@@ -78,14 +78,14 @@ def recover(home: Path, unclosed: Callable[[str, OSError], None] = untold) -> li
         so that it keeps no robot from working.
 
     Raises:
-        BadInput: the folder is none.
+        UserError: the folder is none.
         OSError: the folder cannot be read.
     """
     found = []
     for folder in _folders(home):
         try:
             found += _interrupted(folder)
-        except BadInput:
+        except UserError:
             continue
         except OSError as error:
             unclosed(folder.name, error)
@@ -100,7 +100,7 @@ def _folders(home: Path) -> list[Path]:
     except FileNotFoundError:
         return []
     except NotADirectoryError:
-        raise BadInput(
+        raise UserError(
             "this cannot be a folder of missions; name another by CODEBOTLER_HOME", file=folder
         ) from None
     return [path for path in found if os.path.exists(path / SUMMARY)]  # noqa: PTH110 - raises nothing

@@ -11,7 +11,7 @@ from typing import Protocol, TypeAlias
 from urllib.parse import urlsplit
 
 from codebotler.core.arguments import expect_number, expect_whole
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.prompts import Prompt
 from codebotler.prompts.extract import program_of
 
@@ -23,7 +23,7 @@ NOT_IN_URL = "keys belong into the environment, not into a URL, which is recorde
 
 
 @dataclass(frozen=True)
-class Settings:
+class SamplingSettings:
     """How a model is to be asked.
 
     Args:
@@ -37,7 +37,7 @@ class Settings:
         base_url: where the model is served, such as `http://localhost:8000/v1`; None for the provider's own.
 
     Raises:
-        BadInput: one of them is out of its range.
+        UserError: one of them is out of its range.
     """
 
     temperature: float | None = 0.2
@@ -51,17 +51,17 @@ class Settings:
         if self.temperature is not None:
             expect_number(self.temperature, "the temperature")
             if not 0 <= self.temperature <= 100:  # noqa: PLR2004 - a typo beyond it
-                raise BadInput(f"the temperature is {self.temperature:g}, but it must be between 0 and 100")
+                raise UserError(f"the temperature is {self.temperature:g}, but it must be between 0 and 100")
         if self.top_p is not None:
             expect_number(self.top_p, "top-p")
             if not 0 < self.top_p <= 1:
-                raise BadInput(f"top-p is {self.top_p:g}, but it must be above 0 and at most 1")
+                raise UserError(f"top-p is {self.top_p:g}, but it must be above 0 and at most 1")
         expect_whole(self.max_tokens, "the limit of tokens", least=1)
         if self.seed is not None:
             expect_whole(self.seed, "the seed")
         expect_number(self.timeout, "the timeout")
         if not 0 < self.timeout < math.inf:
-            raise BadInput(f"the timeout is {self.timeout:g} seconds, but it must be above 0")
+            raise UserError(f"the timeout is {self.timeout:g} seconds, but it must be above 0")
         if self.base_url is not None:
             _check_url(self.base_url)
 
@@ -73,14 +73,14 @@ class Settings:
 def _check_url(url: str) -> None:
     # Nothing of it is quoted: where it is mistyped, nobody knows which part of it is a password.
     if any(mark in url for mark in "@?#"):
-        raise BadInput(f"the base URL has a user name, a password, a query or a fragment; {NOT_IN_URL}")
+        raise UserError(f"the base URL has a user name, a password, a query or a fragment; {NOT_IN_URL}")
     try:
         parts = urlsplit(url)
         _ = parts.port
     except ValueError:
-        raise BadInput(f"the base URL has no valid host and port; {A_URL}") from None
+        raise UserError(f"the base URL has no valid host and port; {A_URL}") from None
     if parts.scheme not in {"http", "https"} or not parts.hostname:
-        raise BadInput(f"the base URL does not begin with http:// or https:// and a host; {A_URL}")
+        raise UserError(f"the base URL does not begin with http:// or https:// and a host; {A_URL}")
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,8 @@ from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings
 
-from codebotler.core.errors import BadInput
-from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
+from codebotler.core.errors import UserError
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, program_in, unheard
 from codebotler.models.keys import blank_is_unset, key_in
 from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.models.reply_limit import bound, limit_of
@@ -62,11 +62,11 @@ class Chat:
         settings: how it is to be asked.
 
     Raises:
-        BadInput: there is no such provider, its key is not in the environment or cannot be sent, or its
+        UserError: there is no such provider, its key is not in the environment or cannot be sent, or its
             library is missing.
     """
 
-    def __init__(self, name: str, settings: Settings) -> None:
+    def __init__(self, name: str, settings: SamplingSettings) -> None:
         provider, _, model = name.partition(":")
         if provider == "openai" and settings.base_url is not None:
             name = f"{OWN_SERVER}:{model}"
@@ -187,14 +187,14 @@ def _usage(response: ModelResponse) -> Usage:
     return Usage(told.input_tokens, told.output_tokens)
 
 
-def _spoken(name: str, settings: Settings) -> Spoken:
+def _spoken(name: str, settings: SamplingSettings) -> Spoken:
     provider = name.partition(":")[0]
     try:
         made = infer_provider_class(provider)
     except ValueError:
-        raise BadInput(_unknown(provider)) from None
+        raise UserError(_unknown(provider)) from None
     except ImportError as error:
-        raise BadInput(_not_installed(name, error)) from None
+        raise UserError(_not_installed(name, error)) from None
     variables = _key_variables(provider, made)
     for variable in variables:
         key_in(variable)
@@ -203,12 +203,12 @@ def _spoken(name: str, settings: Settings) -> Spoken:
             return infer_model(
                 name, lambda wanted: _bounded(_provider(wanted, settings.base_url), name, settings)
             )
-    except BadInput:
+    except UserError:
         raise
     except ImportError as error:
-        raise BadInput(_not_installed(name, error)) from None
+        raise UserError(_not_installed(name, error)) from None
     except Exception as error:  # noqa: BLE001 - libraries of many providers, each with errors of its own
-        raise BadInput(_not_set(name, error)) from None
+        raise UserError(_not_set(name, error)) from None
 
 
 def _key_variables(provider: str, made: type[Provider[object]]) -> list[str]:
@@ -222,13 +222,13 @@ def _provider(name: str, base_url: str | None) -> Provider[object]:
         return infer_provider(name)
     made: Callable[..., Provider[object]] = infer_provider_class(name)
     if name.startswith("gateway/") or "base_url" not in inspect.signature(made).parameters:
-        raise BadInput(
+        raise UserError(
             f'the provider "{name}" takes no base URL; for a server of your own name {OWN_SERVER}:MODEL'
         )
     return made(base_url=base_url)
 
 
-def _bounded(provider: Provider[object], name: str, settings: Settings) -> Provider[object]:
+def _bounded(provider: Provider[object], name: str, settings: SamplingSettings) -> Provider[object]:
     """A provider whose own client takes no endless reply, and neither does one that takes its place."""
     first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - nothing else tells
     if first is None or make is None:  # what talks to it is no client of HTTP, or one that a library keeps

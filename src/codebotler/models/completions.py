@@ -9,8 +9,8 @@ import time
 import openai
 from openai.types import Completion
 
-from codebotler.core.errors import BadInput
-from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
+from codebotler.core.errors import UserError
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, program_in, unheard
 from codebotler.models.keys import key_in
 from codebotler.models.redaction import guard_logs, without_keys
 from codebotler.models.reply_limit import bound, limit_of
@@ -38,13 +38,13 @@ class Completions:
         settings: how it is to be asked.
 
     Raises:
-        BadInput: neither a URL nor a key is given, or the key cannot be sent.
+        UserError: neither a URL nor a key is given, or the key cannot be sent.
     """
 
-    def __init__(self, model: str, settings: Settings) -> None:
+    def __init__(self, model: str, settings: SamplingSettings) -> None:
         key = key_in(KEY)
         if settings.base_url is None and not key:
-            raise BadInput(
+            raise UserError(
                 f"completions:{model} needs --base-url, or {KEY} in the environment for OpenAI's own"
             )
         self.model, self.settings = model, settings

@@ -6,20 +6,20 @@ import os
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 
 def key_in(variable: str) -> str | None:
     """The key that a variable of the environment holds; None if it is not set, or blank.
 
     Raises:
-        BadInput: it cannot be sent, because headers hold printable ASCII only.
+        UserError: it cannot be sent, because headers hold printable ASCII only.
     """
     key = os.environ.get(variable, "")
     if not key.strip():
         return None
     if not (key.isascii() and key.isprintable() and key == key.strip()):
-        raise BadInput(
+        raise UserError(
             f"the key in {variable} cannot be sent: it has a line break, a space at an end, or what is no "
             "printable ASCII; set it again"
         )

@@ -14,8 +14,8 @@ import jinja2
 import torch
 import transformers
 
-from codebotler.core.errors import BadInput
-from codebotler.models.base import Heard, ModelError, Reply, Settings, Usage, program_in, unheard
+from codebotler.core.errors import UserError
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, program_in, unheard
 from codebotler.models.redaction import guard_logs
 from codebotler.models.server_errors import brief, fault
 from codebotler.prompts import Message, Prompt
@@ -76,15 +76,15 @@ class Local:
         settings: how it is to be asked; a timeout has no meaning here.
 
     Raises:
-        BadInput: it cannot be loaded, or a base URL is given.
+        UserError: it cannot be loaded, or a base URL is given.
     """
 
-    def __init__(self, path: str, settings: Settings) -> None:
+    def __init__(self, path: str, settings: SamplingSettings) -> None:
         self.name, self.settings = f"hf:{path}", settings
         if settings.base_url is not None:
-            raise BadInput(f"{self.name} runs on this machine and takes no --base-url")
+            raise UserError(f"{self.name} runs on this machine and takes no --base-url")
         if path.startswith((".", "/", "~")) and not Path(path).expanduser().is_dir():
-            raise BadInput("there is no such folder of a model", file=path)
+            raise UserError("there is no such folder of a model", file=path)
         self.device, dtype = _place()
         transformers.utils.logging.disable_progress_bar()
         where = str(Path(path).expanduser())
@@ -92,7 +92,7 @@ class Local:
             self.tokenizer = transformers.AutoTokenizer.from_pretrained(where, padding_side="left")
             model = transformers.AutoModelForCausalLM.from_pretrained(where, dtype=dtype)
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
-            raise BadInput(f"{self.name} cannot be loaded: {brief(error)}") from None
+            raise UserError(f"{self.name} cannot be loaded: {brief(error)}") from None
         self.model = model.to(self.device).eval()
         if self.tokenizer.pad_token_id is None:
             self.tokenizer.pad_token = self.tokenizer.eos_token or self.tokenizer.convert_ids_to_tokens(0)

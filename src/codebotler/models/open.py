@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from codebotler.core.arguments import expect_text
-from codebotler.core.errors import BadInput
-from codebotler.models.base import Model, Settings
-from codebotler.models.recorded import Recital, recorded_model
+from codebotler.core.errors import UserError
+from codebotler.models.base import Model, SamplingSettings
+from codebotler.models.recorded import RecordedModel, recorded_model
 
 KINDS = (
     "recorded, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
@@ -14,7 +14,7 @@ KINDS = (
 EXTRA = 'pip install "codebotler[transformers]"'
 
 
-def open_model(name: str, settings: Settings) -> Model:
+def open_model(name: str, settings: SamplingSettings) -> Model:
     """The model of a name, ready to be asked.
 
     Args:
@@ -23,7 +23,7 @@ def open_model(name: str, settings: Settings) -> Model:
         settings: how it is to be asked.
 
     Raises:
-        BadInput: there is no such model, a key is not in the environment, or something is not installed.
+        UserError: there is no such model, a key is not in the environment, or something is not installed.
     """
     expect_text(name, "the model's name")
     kind, rest = kind_of(name), name.partition(":")[2]
@@ -32,7 +32,7 @@ def open_model(name: str, settings: Settings) -> Model:
         case "recorded":
             if settings.base_url is not None:
                 expect_server(name)
-            return Recital(recorded_model(name))
+            return RecordedModel(recorded_model(name))
         case "completions":
             from codebotler.models.completions import Completions  # noqa: PLC0415 - see above
 
@@ -41,7 +41,7 @@ def open_model(name: str, settings: Settings) -> Model:
             try:
                 from codebotler.models.local import Local  # noqa: PLC0415 - see above
             except ImportError:
-                raise BadInput(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
+                raise UserError(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
             return Local(rest, settings)
         case _:
             from codebotler.models.chat import Chat  # noqa: PLC0415 - see above
@@ -56,10 +56,10 @@ def expect_server(*names: str) -> None:
         names: of the models.
 
     Raises:
-        BadInput: nobody would be asked there.
+        UserError: nobody would be asked there.
     """
     if not any(map(runs_on_server, names)):
-        raise BadInput(
+        raise UserError(
             f"a base URL is given, but {' and '.join(names)} run{'s' * (len(names) == 1)} on no server; "
             "name a model that does, such as openai-chat:NAME"
         )
@@ -74,11 +74,11 @@ def kind_of(name: str) -> str:
     """What stands before the colon of a model's name, as far as it can be told without a large library.
 
     Raises:
-        BadInput: there is no such recorded model, or this is the name of none.
+        UserError: there is no such recorded model, or this is the name of none.
     """
     kind, _, rest = name.partition(":")
     if kind == "recorded":
         recorded_model(name)
     elif not kind or not rest.strip():
-        raise BadInput(f'"{name}" names no model; write {KINDS}')
+        raise UserError(f'"{name}" names no model; write {KINDS}')
     return kind

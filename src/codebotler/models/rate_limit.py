@@ -15,7 +15,7 @@ from tenacity import (
     wait_exponential_jitter,
 )
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
 
@@ -26,7 +26,7 @@ CHARACTERS = 3  # of a text, for a token of it, where nobody says how many it ha
 
 
 @dataclass
-class Paced:
+class RateLimited:
     """Another model, with limits.
 
     What may pass is tried again: 429, 5xx, timeouts, connections that fail or break off, and answers that
@@ -44,7 +44,7 @@ class Paced:
         first_wait: about how many seconds pass before the second try; before each further one, twice as many.
 
     Raises:
-        BadInput: one of them is out of its range.
+        UserError: one of them is out of its range.
     """
 
     model: Model
@@ -69,13 +69,13 @@ class Paced:
 
     def __post_init__(self) -> None:
         if self.concurrency < 1:
-            raise BadInput(f"the concurrency is {self.concurrency}, but it must be at least 1")
+            raise UserError(f"the concurrency is {self.concurrency}, but it must be at least 1")
         if self.requests_per_minute is not None and not self.requests_per_minute > 0:
-            raise BadInput(f"the requests a minute are {self.requests_per_minute:g}, but must be above 0")
+            raise UserError(f"the requests a minute are {self.requests_per_minute:g}, but must be above 0")
         if self.retries < 0:
-            raise BadInput(f"the retries are {self.retries}, but must be at least 0")
+            raise UserError(f"the retries are {self.retries}, but must be at least 0")
         if self.token_budget is not None and self.token_budget < 1:
-            raise BadInput(f"the token budget is {self.token_budget}, but it must be at least 1")
+            raise UserError(f"the token budget is {self.token_budget}, but it must be at least 1")
         self._free = asyncio.Semaphore(self.concurrency)
 
     @property

@@ -15,7 +15,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.errors import BadInput, YamlFile
+from codebotler.core.errors import UserError, YamlFile
 from codebotler.models import base
 from codebotler.models.base import Heard, ModelError, Usage, unheard
 from codebotler.prompts import Prompt
@@ -66,7 +66,7 @@ class RecordedFile(BaseModel):
 
 
 @dataclass(frozen=True)
-class RecordedModel:
+class RecordedReplies:
     """Replies by instruction.
 
     Args:
@@ -88,14 +88,14 @@ class RecordedModel:
 
 
 @dataclass(frozen=True)
-class Recital:
+class RecordedModel:
     """A recorded model that is asked like any other.
 
     Args:
         recorded: what it recites.
     """
 
-    recorded: RecordedModel
+    recorded: RecordedReplies
 
     @property
     def name(self) -> str:
@@ -151,20 +151,20 @@ def _short(text: str) -> str:
     return textwrap.shorten(text, SHOWN, placeholder=" ...")
 
 
-def recorded_model(name: str) -> RecordedModel:
+def recorded_model(name: str) -> RecordedReplies:
     """A recorded model by its name.
 
     Args:
         name: `recorded` (the careful one), `recorded:careful` or `recorded:hasty`.
 
     Raises:
-        BadInput: there is no such model.
+        UserError: there is no such model.
     """
     short = name.removeprefix("recorded").removeprefix(":") or NAMES[0]
     if short not in NAMES:
         known = ", ".join(f"recorded:{known}" for known in NAMES)
-        raise BadInput(f'there is no recorded model "{name}"; there are {known}')
-    return RecordedModel(short, {one.instruction: one.by(short) for one in _recordings()})
+        raise UserError(f'there is no recorded model "{name}"; there are {known}')
+    return RecordedReplies(short, {one.instruction: one.by(short) for one in _recordings()})
 
 
 @cache

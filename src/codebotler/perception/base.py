@@ -7,7 +7,7 @@ from typing import Protocol, TypeAlias
 
 from PIL.Image import Image
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 
 Box: TypeAlias = tuple[float, float, float, float]
@@ -62,7 +62,7 @@ class Detector(Protocol):
             label: what to look for, in a few plain words such as `red mug`.
 
         Raises:
-            BadInput: the label is no name.
+            UserError: the label is no name.
             PerceptionError: it could not be told whether it is there.
         """
 
@@ -86,16 +86,16 @@ def named(label: str) -> str:
     """A label as it is looked for, on one line.
 
     Raises:
-        BadInput: it is empty, too long, or has characters that no name has.
+        UserError: it is empty, too long, or has characters that no name has.
     """
     words = " ".join(label.split())
     if not words:
-        raise BadInput("nothing is named that could be looked for; name an object")
+        raise UserError("nothing is named that could be looked for; name an object")
     if len(words) > LONGEST_LABEL:
-        raise BadInput(
+        raise UserError(
             f"the name of what is to be looked for has {len(words):,} characters; "
             f"name it in at most {LONGEST_LABEL}"
         )
     if not words.isprintable():
-        raise BadInput(f'"{visible(words)}" has characters that no name has; leave them out')
+        raise UserError(f'"{visible(words)}" has characters that no name has; leave them out')
     return words

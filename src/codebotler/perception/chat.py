@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from PIL.Image import Image
 
 from codebotler.models.base import Model, ModelError
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.models.server_errors import brief
 from codebotler.perception.base import Box, PerceptionError, Sighting, named
 from codebotler.perception.image import jpeg_of
@@ -51,7 +51,7 @@ class ChatDetector:
 
     def __init__(self, model: Model) -> None:
         self._runner = asyncio.Runner()
-        self._model = Paced(model, retries=RETRIES)
+        self._model = RateLimited(model, retries=RETRIES)
 
     @property
     def name(self) -> str:
@@ -62,7 +62,7 @@ class ChatDetector:
         """Show the picture, and ask again where a reply cannot be used.
 
         Raises:
-            BadInput: the label is no name.
+            UserError: the label is no name.
             PerceptionError: no reply came, or none that can be used.
         """
         shown = Shown("user", json.dumps(named(label)), jpeg_of(image))

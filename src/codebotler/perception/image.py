@@ -10,7 +10,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.unwarned import unwarned
 from codebotler.models.server_errors import brief
 from codebotler.perception.base import Sighting
@@ -40,12 +40,12 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
         name: what error sentences call it.
 
     Raises:
-        BadInput: it is none, is broken or cut off, or is too large.
+        UserError: it is none, is broken or cut off, or is too large.
     """
     if not data:
-        raise BadInput(f"{name} is empty")
+        raise UserError(f"{name} is empty")
     if len(data) > MAX_BYTES:
-        raise BadInput(f"{name} is larger than {MAX_BYTES:,} bytes; take a smaller one")
+        raise UserError(f"{name} is larger than {MAX_BYTES:,} bytes; take a smaller one")
     try:
         # A picture that says it is huge is refused here before anything of it is unpacked.
         with unwarned([Image.DecompressionBombWarning]):
@@ -53,29 +53,29 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
         _check_size(*opened.size, name)
         opened.load()
         return _plain(ImageOps.exif_transpose(opened))
-    except BadInput:
+    except UserError:
         raise
     except UnidentifiedImageError:
-        raise BadInput(f"{name} is no JPEG, PNG or WebP file") from None
+        raise UserError(f"{name} is no JPEG, PNG or WebP file") from None
     except Image.DecompressionBombError:
-        raise BadInput(f"{name} has more than {MAX_PIXELS:,} pixels; take a smaller one") from None
+        raise UserError(f"{name} has more than {MAX_PIXELS:,} pixels; take a smaller one") from None
     except Exception as error:  # noqa: BLE001 - decoders fail in many ways at what is no picture
-        raise BadInput(f"{name} cannot be read, it is broken or cut off ({brief(error)})") from None
+        raise UserError(f"{name} cannot be read, it is broken or cut off ({brief(error)})") from None
 
 
 def read_image(path: Path) -> Image.Image:
     """The picture in a file.
 
     Raises:
-        BadInput: the file is missing, cannot be read, or holds no picture.
+        UserError: the file is missing, cannot be read, or holds no picture.
     """
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
-        raise BadInput("there is no such file", file=path) from None
+        raise UserError("there is no such file", file=path) from None
     except OSError as error:
-        raise BadInput(f"cannot be read ({error.strerror})", file=path) from None
+        raise UserError(f"cannot be read ({error.strerror})", file=path) from None
     return image_of(data, str(path))
 
 
@@ -87,7 +87,7 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
         name: what error sentences call it.
 
     Raises:
-        BadInput: it holds none, or is too large.
+        UserError: it holds none, or is too large.
     """
     match message:
         case {"encoding": str(encoding), "width": int(width), "height": int(height), "step": int(step)}:
@@ -95,7 +95,7 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
             return _raw(encoding, (width, height), step, data, is_big=is_big, name=name)
         case {"data": _}:
             return image_of(_bytes_in(message, name), name)
-    raise BadInput(f"{name} is no message with a picture")
+    raise UserError(f"{name} is no message with a picture")
 
 
 def _bytes_in(message: Mapping[str, object], name: str) -> bytes:
@@ -103,18 +103,20 @@ def _bytes_in(message: Mapping[str, object], name: str) -> bytes:
     with suppress(ValueError):  # it is no base64
         if isinstance(data, str):
             return base64.b64decode(data, validate=True)
-    raise BadInput(f"{name} is no message with a picture")
+    raise UserError(f"{name} is no message with a picture")
 
 
 def _raw(
     encoding: str, size: tuple[int, int], step: int, data: bytes, *, is_big: bool, name: str
 ) -> Image.Image:
     if encoding not in ENCODINGS:
-        raise BadInput(f'{name} has the encoding "{encoding}", not one of {", ".join(ENCODINGS)}')
+        raise UserError(f'{name} has the encoding "{encoding}", not one of {", ".join(ENCODINGS)}')
     mode, order, width = ENCODINGS[encoding]
     _check_size(*size, name)
     if step < size[0] * width or len(data) < step * size[1]:
-        raise BadInput(f"{name} is cut off: {len(data):,} bytes are too few for {size[0]} x {size[1]} pixels")
+        raise UserError(
+            f"{name} is cut off: {len(data):,} bytes are too few for {size[0]} x {size[1]} pixels"
+        )
     if is_big and order == "I;16":
         order = "I;16B"
     return _plain(Image.frombytes(mode, size, data[: step * size[1]], "raw", order, step))
@@ -151,11 +153,11 @@ def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
 
 def _check_size(width: int, height: int, name: str) -> None:
     if width * height > MAX_PIXELS:
-        raise BadInput(
+        raise UserError(
             f"{name} has {width:,} x {height:,} pixels, more than {MAX_PIXELS:,} in all; take a smaller one"
         )
     if min(width, height) < MIN_SIDE:
-        raise BadInput(
+        raise UserError(
             f"{name} has {width} x {height} pixels, too few to see anything; take one of at least "
             f"{MIN_SIDE} x {MIN_SIDE}"
         )

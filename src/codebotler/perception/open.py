@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from codebotler.core.errors import BadInput
-from codebotler.models.base import Settings
+from codebotler.core.errors import UserError
+from codebotler.models.base import SamplingSettings
 from codebotler.models.open import EXTRA, kind_of
 from codebotler.perception.base import Detector
 
-LOOKING = Settings(temperature=0.0, top_p=None, max_tokens=2000, timeout=30.0)
+LOOKING = SamplingSettings(temperature=0.0, top_p=None, max_tokens=2000, timeout=30.0)
 """How a chat model is asked by default; one that reasons thinks within the tokens, too."""
 
 LEAST_SCORE = 0.1
@@ -16,7 +16,9 @@ LEAST_SCORE = 0.1
 BLIND = ("recorded", "completions")
 
 
-def open_detector(name: str, settings: Settings = LOOKING, *, least_score: float = LEAST_SCORE) -> Detector:
+def open_detector(
+    name: str, settings: SamplingSettings = LOOKING, *, least_score: float = LEAST_SCORE
+) -> Detector:
     """What looks for things in pictures by the model of a name.
 
     Args:
@@ -26,12 +28,12 @@ def open_detector(name: str, settings: Settings = LOOKING, *, least_score: float
         least_score: from which score on, above 0 and up to 1, a zero-shot detector has found something.
 
     Raises:
-        BadInput: there is no such model, it sees nothing, a key is not in the environment, or something is
+        UserError: there is no such model, it sees nothing, a key is not in the environment, or something is
             not installed.
     """
     kind = kind_of(name)
     if kind in BLIND:
-        raise BadInput(f"{name} sees no pictures; name a chat model that does, or hf:PATH")
+        raise UserError(f"{name} sees no pictures; name a chat model that does, or hf:PATH")
     # Each of these imports a large library, which only who uses it should wait for.
     if kind != "hf":
         from codebotler.models.chat import Chat  # noqa: PLC0415 - see above
@@ -41,5 +43,5 @@ def open_detector(name: str, settings: Settings = LOOKING, *, least_score: float
     try:
         from codebotler.perception.zeroshot import ZeroShot  # noqa: PLC0415 - see above
     except ImportError:
-        raise BadInput(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
+        raise UserError(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
     return ZeroShot(name.partition(":")[2], least_score=least_score)

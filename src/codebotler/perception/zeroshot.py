@@ -10,7 +10,7 @@ import torch
 import transformers
 from PIL.Image import Image
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.models.redaction import guard_logs
 from codebotler.models.server_errors import brief
 from codebotler.perception.base import PerceptionError, Sighting, named
@@ -26,15 +26,15 @@ class ZeroShot:
         least_score: from which score on, above 0 and up to 1, something is found.
 
     Raises:
-        BadInput: it cannot be loaded, or the score is out of its range.
+        UserError: it cannot be loaded, or the score is out of its range.
     """
 
     def __init__(self, path: str, *, least_score: float) -> None:
         self.name = f"hf:{path}"
         if not 0 < least_score <= 1:
-            raise BadInput(f"the least score is {least_score:g}, but it must be above 0 and at most 1")
+            raise UserError(f"the least score is {least_score:g}, but it must be above 0 and at most 1")
         if path.startswith((".", "/", "~")) and not Path(path).expanduser().is_dir():
-            raise BadInput("there is no such folder of a model", file=path)
+            raise UserError("there is no such folder of a model", file=path)
         self._least = least_score
         transformers.utils.logging.disable_progress_bar()
         os.environ.setdefault("TOKENIZERS_PARALLELISM", "false")  # else it complains at every label
@@ -43,16 +43,16 @@ class ZeroShot:
                 TASK, model=str(Path(path).expanduser()), device=0 if torch.cuda.is_available() else "cpu"
             )
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
-            raise BadInput(f"{self.name} cannot be loaded as a zero-shot detector: {brief(error)}") from None
+            raise UserError(f"{self.name} cannot be loaded as a zero-shot detector: {brief(error)}") from None
         guard_logs()
         if not all(bool(torch.isfinite(weight).all()) for weight in self._pipeline.model.parameters()):
-            raise BadInput(f"{self.name} has weights that are no numbers, so that it would find nothing")
+            raise UserError(f"{self.name} has weights that are no numbers, so that it would find nothing")
 
     def look(self, image: Image, label: str) -> Sighting:
         """Look for the label's words; the clearest place counts.
 
         Raises:
-            BadInput: the label is no name, or has too many words for the model.
+            UserError: the label is no name, or has too many words for the model.
             PerceptionError: the model fails at it.
         """
         words = named(label)
@@ -81,7 +81,7 @@ class ZeroShot:
         text = getattr(self._pipeline.model.config, "text_config", None)
         most = getattr(text, "max_position_embeddings", None) or length
         if length > most:
-            raise BadInput(
+            raise UserError(
                 f'the name "{words}" has {length} tokens, but {self.name} takes only {most}; shorten it'
             )
 

@@ -27,7 +27,7 @@ def program_of(reply: str) -> Program:
         reply: code with or without fences and prose, or the indented body of `task_program` alone.
 
     Raises:
-        BadInput: the reply is no text.
+        UserError: the reply is no text.
     """
     expect_text(reply, "the reply")
     lines = re.split(r"\r\n|\r|\n", reply)

@@ -130,7 +130,7 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
         skills: what a program may call.
 
     Raises:
-        BadInput: the instruction is no text, the rooms are no list of texts, or the skills no table of them.
+        UserError: the instruction is no text, the rooms are no list of texts, or the skills no table of them.
     """
     expect_text(instruction, "the instruction")
     expect_texts(rooms, "the rooms")

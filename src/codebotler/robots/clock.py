@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 FASTEST, SLOWEST = 1e6, 1e-6
 """Speeds beyond which numbers of seconds stop being exact, and nobody would watch."""
@@ -19,12 +19,12 @@ class Clock:
             takes no real time, and time passes only by waiting.
 
     Raises:
-        BadInput: the speed is out of its range.
+        UserError: the speed is out of its range.
     """
 
     def __init__(self, speed: float | None = 1.0) -> None:
         if speed is not None and not SLOWEST <= speed <= FASTEST:
-            raise BadInput(f"the speed is {speed:g}, but it must be from {SLOWEST:f} to {FASTEST:,.0f}")
+            raise UserError(f"the speed is {speed:g}, but it must be from {SLOWEST:f} to {FASTEST:,.0f}")
         self.speed = speed
         self._start = time.monotonic()
         self._waited = 0.0

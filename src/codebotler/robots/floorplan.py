@@ -114,7 +114,7 @@ class Floorplan:
 
 
 def planned(world: World) -> Floorplan:
-    """Plan a world.
+    """RoomMap a world.
 
     Rooms that nobody measured stand on both sides of a corridor, with a door each. Of the others each has a
     passage to what is nearest, until all of them can be reached. If there is any object, there is a table in

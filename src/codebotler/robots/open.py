@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Protocol, cast
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.robots.base import Options, Readiness, Robot
 from codebotler.robots.face import Face
 from codebotler.robots.faced import Faced, unspoken
@@ -37,7 +37,7 @@ class Kind(Protocol):
         """The robot that a user means, not yet connected.
 
         Raises:
-            BadInput: what the user says of it is missing or wrong.
+            UserError: what the user says of it is missing or wrong.
         """
 
 
@@ -56,13 +56,13 @@ def open_robot(name: str, options: Options | None = None) -> Robot:
         options: what the user says about it.
 
     Raises:
-        BadInput: there is no such kind, or what the user says is missing or wrong.
+        UserError: there is no such kind, or what the user says is missing or wrong.
     """
     if name not in KINDS:
-        raise BadInput(f'there is no robot "{name}"; there are {", ".join(KINDS)}')
+        raise UserError(f'there is no robot "{name}"; there are {", ".join(KINDS)}')
     kind = _kind(name)
     if kind is None:
-        raise BadInput(f"there is no robot {name} here: {ABSENT}")
+        raise UserError(f"there is no robot {name} here: {ABSENT}")
     return kind.robot(options or Options())
 
 
@@ -75,7 +75,7 @@ def open_faced(name: str, options: Options, face: Face) -> Robot:
         face: on which it speaks.
 
     Raises:
-        BadInput: there is no such kind, or what the user says is missing or wrong.
+        UserError: there is no such kind, or what the user says is missing or wrong.
     """
     silent = open_robot(name, replace(options, skills=unspoken(options.skills)))
     return Faced(silent, face, options.skills)

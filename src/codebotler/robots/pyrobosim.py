@@ -12,7 +12,7 @@ from importlib import metadata
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.world import World
 from codebotler.robots.base import (
@@ -46,7 +46,7 @@ class Pyrobosim:
         skills: what it can be asked to do.
 
     Raises:
-        BadInput: the speed is out of its range.
+        UserError: the speed is out of its range.
     """
 
     name, address = "pyrobosim", ""
@@ -155,10 +155,10 @@ def robot(options: Options) -> Pyrobosim:
     """The robot in pyrobosim that a user means.
 
     Raises:
-        BadInput: no world was named, or the speed is out of its range.
+        UserError: no world was named, or the speed is out of its range.
     """
     if options.world is None:
-        raise BadInput("the robot in pyrobosim needs a world to be in; name one with --world FILE")
+        raise UserError("the robot in pyrobosim needs a world to be in; name one with --world FILE")
     return Pyrobosim(options.world, speed=options.speed, skills=options.skills)
 
 

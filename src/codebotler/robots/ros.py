@@ -21,7 +21,7 @@ from codebotler.robots.base import (
     untold,
 )
 from codebotler.robots.clock import Clock
-from codebotler.robots.worker import ENDED, Message, Worker
+from codebotler.robots.worker import ENDED, Message, RosWorker
 from codebotler.simulator.robot import RobotError
 
 PYTHON = Path("/usr/bin/python3")
@@ -86,7 +86,7 @@ class RosRobot:
         self.clock = Clock(speed)
         self.missing: Mapping[str, str] = {}
         self._ros, self._waits = ros, waits or Waits()
-        self._worker: Worker | None = None
+        self._worker: RosWorker | None = None
         self._doubtful = False  # whether something may still go on that nobody looks after
         self._stopped, self._number = True, 0
         self._order = threading.Lock()  # what was asked for before a stop is sent before it
@@ -150,7 +150,7 @@ class RosRobot:
         if worker is not None and not worker.leave():
             self._doubtful = True
 
-    def _start(self, *, cancel_all: bool) -> Worker:
+    def _start(self, *, cancel_all: bool) -> RosWorker:
         start = {
             "node": self._ros.node,
             "actions": actions_of(self.skills),
@@ -159,7 +159,7 @@ class RosRobot:
             "silence": self._waits.silence,
             "longest": self._waits.longest,
         }
-        return Worker(self._ros.python, self._ros.script, start, self._ros.environment)
+        return RosWorker(self._ros.python, self._ros.script, start, self._ros.environment)
 
     def _perform(self, skill: Skill, arguments: Sequence[Argument], told: Feedback) -> Result:
         with self._order:
@@ -198,7 +198,7 @@ class RosRobot:
         self._doubtful = self._doubtful or message["is"] == "lost"
         raise RobotLostError(message["text"])
 
-    def _lost(self, worker: Worker, message: Message | None) -> Exception:
+    def _lost(self, worker: RosWorker, message: Message | None) -> Exception:
         """What to raise when nobody looks after the goal any more, after all goals were cancelled."""
         if message is not None and message["is"] == "gone":
             self._doubtful = True
@@ -206,7 +206,7 @@ class RosRobot:
         how = "does not answer" if message is None else f"has died ({worker.epitaph()})"
         return RobotLostError(f"the worker of {self.name} {how}; {self._rescue(worker)}")
 
-    def _rescue(self, worker: Worker) -> str:
+    def _rescue(self, worker: RosWorker) -> str:
         """Replace a lost worker by one that cancels all goals; what became of that, in words."""
         with self._rescue_lock:
             if self._worker is not worker:

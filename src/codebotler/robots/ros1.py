@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.robots.address import endpoint
 from codebotler.robots.base import Options, Readiness
@@ -33,7 +33,7 @@ class Ros1(RosRobot):
         waits: for how long what is waited for.
 
     Raises:
-        BadInput: the URI is none.
+        UserError: the URI is none.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ def master_uri(address: str = "") -> str:
     """The URI of a master: the one that is named, that of ROS_MASTER_URI, or the usual one.
 
     Raises:
-        BadInput: it is no URI of a master.
+        UserError: it is no URI of a master.
     """
     uri = address or os.environ.get("ROS_MASTER_URI") or MASTER
     try:
@@ -63,7 +63,7 @@ def master_uri(address: str = "") -> str:
     except ValueError:  # the port is no number
         is_whole = False
     if not is_whole:
-        raise BadInput(f'"{uri}" is no URI of a ROS master; write one such as {MASTER}')
+        raise UserError(f'"{uri}" is no URI of a ROS master; write one such as {MASTER}')
     return uri
 
 
@@ -82,6 +82,6 @@ def robot(options: Options) -> Ros1:
     """The robot that a user means.
 
     Raises:
-        BadInput: the address is no URI of a master.
+        UserError: the address is no URI of a master.
     """
     return Ros1(options.address, python=options.ros_python, skills=options.skills, speed=options.speed)

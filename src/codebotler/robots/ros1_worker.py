@@ -413,7 +413,7 @@ class Goal:
                 self.stop()
 
 
-class Worker:
+class Ros1Worker:
     """Executes skills, one at a time.
 
     Args:
@@ -658,7 +658,7 @@ def value_of(result: Any) -> Any:
     return getattr(result, fields[0]) if fields else None
 
 
-def main(work: Callable[[Channel, Message], Any] = Worker) -> None:
+def main(work: Callable[[Channel, Message], Any] = Ros1Worker) -> None:
     """Serve until the input ends.
 
     Args:

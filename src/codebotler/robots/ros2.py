@@ -9,7 +9,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
@@ -75,8 +75,8 @@ def robot(options: Options) -> Ros2:
     """The robot that a user means.
 
     Raises:
-        BadInput: the address is no domain.
+        UserError: the address is no domain.
     """
     if options.address and not options.address.isdecimal():
-        raise BadInput(f'"{options.address}" is no ROS_DOMAIN_ID; write a number such as 0')
+        raise UserError(f'"{options.address}" is no ROS_DOMAIN_ID; write a number such as 0')
     return Ros2(options.address, python=options.ros_python, skills=options.skills, speed=options.speed)

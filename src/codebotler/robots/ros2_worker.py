@@ -12,7 +12,7 @@ import threading
 import time
 from typing import Any
 
-from ros1_worker import PACKAGE, Goal, Message, NotReadyError, Worker, main
+from ros1_worker import PACKAGE, Goal, Message, NotReadyError, Ros1Worker, main
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
@@ -127,7 +127,7 @@ class Server2:
         self._cancel_all.call_async(self._request())
 
 
-class Worker2(Worker):  # type: ignore[misc]  # found only where it runs
+class Ros2Worker(Ros1Worker):  # type: ignore[misc]  # found only where it runs
     """Executes skills over ROS 2, one at a time."""
 
     def _entered(self, node: str) -> Any:
@@ -182,4 +182,4 @@ class Worker2(Worker):  # type: ignore[misc]  # found only where it runs
 
 
 if __name__ == "__main__":
-    main(Worker2)
+    main(Ros2Worker)

@@ -34,7 +34,7 @@ from codebotler.robots.bridge_guard import CLOSES, Voice
 from codebotler.robots.bridged import Dialect, Message, News, Operations, Topics
 from codebotler.robots.clock import Clock
 from codebotler.robots.ros import Waits, error_of
-from codebotler.robots.worker import Worker
+from codebotler.robots.worker import RosWorker
 from codebotler.simulator.robot import RobotError
 
 ADDRESS = "ws://localhost:9090"
@@ -76,7 +76,7 @@ class Rosbridge:
         self.address, self.skills, self.clock = endpoint(self._where), skills, Clock(speed)
         self._waits = waits or Waits()
         self._line: Line | None = None
-        self._guard: Worker | None = None
+        self._guard: RosWorker | None = None
         self._going: tuple[RosAction, str] | None = None
         self._stopped = True
         self._order = threading.Lock()
@@ -91,7 +91,7 @@ class Rosbridge:
         actions = [skill.ros for skill in self.skills.rows if skill.ros is not None]
         self._line, self._stopped = Line(self._where, actions, self._waits.patience), False
         start = {"address": self._where, "opening": _advertised(self._line.dialect, actions)}
-        self._guard = Worker(Path(sys.executable), GUARD, start, {"PYTHONSAFEPATH": "1"})
+        self._guard = RosWorker(Path(sys.executable), GUARD, start, {"PYTHONSAFEPATH": "1"})
         self.clock.restart()
 
     def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.world import World, laid_out
 from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Readiness, Result, untold
@@ -25,7 +25,7 @@ class Simulated:
         metres_per_second: how fast it drives, above 0; infinite if driving takes no time.
 
     Raises:
-        BadInput: the speed is out of its range.
+        UserError: the speed is out of its range.
     """
 
     name, address = "simulated", ""
@@ -111,8 +111,8 @@ def robot(options: Options) -> Simulated:
     """The simulated robot that a user means.
 
     Raises:
-        BadInput: no world was named, or the speed is out of its range.
+        UserError: no world was named, or the speed is out of its range.
     """
     if options.world is None:
-        raise BadInput("the simulated robot needs a world to be in; name one with --world FILE")
+        raise UserError("the simulated robot needs a world to be in; name one with --world FILE")
     return Simulated(options.world, speed=options.speed, skills=options.skills)

@@ -15,7 +15,7 @@ from codebotler.robots.base import Argument, CancelledError, RobotLostError, unt
 from codebotler.robots.ros import PYTHON, actions_of
 from codebotler.robots.ros1 import master_uri
 from codebotler.robots.simulated import Simulated
-from codebotler.robots.worker import Message, Worker
+from codebotler.robots.worker import Message, RosWorker
 from codebotler.simulator.robot import RobotError
 
 SCRIPT = Path(__file__).with_name("ros1_servers.py")
@@ -38,7 +38,7 @@ class VirtualRobot:
         told: told what it does, in lines.
 
     Raises:
-        BadInput: the speed is out of its range, or ROS_MASTER_URI is no URI.
+        UserError: the speed is out of its range, or ROS_MASTER_URI is no URI.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class VirtualRobot:
         self._lock = threading.Lock()
         self._current = ""
         self._cancelled: set[str] = set()
-        self._worker: Worker | None = None
+        self._worker: RosWorker | None = None
         self._threads: list[threading.Thread] = []
         self._ended = threading.Event()
 
@@ -74,7 +74,7 @@ class VirtualRobot:
         environment = {"ROS_MASTER_URI": self.address}
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
-        self._worker = Worker(
+        self._worker = RosWorker(
             self._python, SCRIPT, {"node": NODE, "actions": actions, "port": port}, environment
         )
         self._threads = [threading.Thread(target=run, daemon=True) for run in (self._listen, self._work)]

@@ -24,7 +24,7 @@ LAST_LINES = 5  # of what it printed, for the sentence about its end
 ENDED = "ended"  # what is received when it has
 
 
-class Worker:
+class RosWorker:
     """A process that runs one of our scripts.
 
     It has a session of its own, so that Ctrl-C does not reach it before the robot was told to stop.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, assert_never
 from codebotler.core.words import listed, times
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, AtLeast, Count, Exists, Stay
 from codebotler.rtl.phrases import is_any, missing, room, room_name
-from codebotler.rtl.semantics import CannotJudge, at_place, first, first_stay, matches
+from codebotler.rtl.semantics import Inconclusive, at_place, first, first_stay, matches
 from codebotler.rtl.window import Window
 from codebotler.rtl.wording import did, happened, lacking, pastimes
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from codebotler.core.trace import Trace
-    from codebotler.rtl.formula import Element, Formula, Test
+    from codebotler.rtl.formula import EventPattern, Formula, Test
     from codebotler.rtl.wording import Deed
 
 _MOST = 5
@@ -179,11 +179,11 @@ class Absence:
         return Reason(self.test, event, told, detail)
 
 
-def seen(element: Element, trace: Trace, at: int) -> bool:
+def seen(element: EventPattern, trace: Trace, at: int) -> bool:
     """Whether an event is of a kind, where that can be judged."""
     try:
         return matches(element, trace, at)
-    except CannotJudge:
+    except Inconclusive:
         return False
 
 

@@ -10,7 +10,7 @@ from codebotler.core.words import listed, times
 from codebotler.rtl.absence import Absence, Reason, seen, steps_of
 from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or
 from codebotler.rtl.phrases import is_any, shortened
-from codebotler.rtl.semantics import CannotJudge, at_place, cut, first, holds, matches
+from codebotler.rtl.semantics import Inconclusive, at_place, cut, first, holds, matches
 from codebotler.rtl.window import Window
 from codebotler.rtl.wording import did, happened, offered
 
@@ -48,7 +48,7 @@ def explain(formula: Formula, trace: Trace) -> Explanation | None:
     try:
         if holds(formula, trace):
             return None
-    except CannotJudge as error:
+    except Inconclusive as error:
         reason = _unjudged(formula, trace, error)
     else:
         reason = _why_false(formula, trace)
@@ -56,7 +56,7 @@ def explain(formula: Formula, trace: Trace) -> Explanation | None:
     return Explanation(reason.clause, reason.event, " ".join((reason.told + reason.detail).split()))
 
 
-def _unjudged(formula: Formula, trace: Trace, error: CannotJudge) -> Reason:
+def _unjudged(formula: Formula, trace: Trace, error: Inconclusive) -> Reason:
     option = f"option {error.number + 1} of the question at step {error.event + 1}"
     told = f"{option} is no text but {shortened(error.option.text)}, so what was required cannot be judged"
     return Reason(_unjudged_part(formula, trace), error.event, told)
@@ -73,7 +73,7 @@ def _unjudged_part(formula: Formula, trace: Trace) -> Formula:
     for part in parts:
         try:
             holds(part, trace)
-        except CannotJudge:
+        except Inconclusive:
             return _unjudged_part(part, trace)
     return formula
 

@@ -81,7 +81,7 @@ Text: TypeAlias = Regex | Words | Without | Number | Time | Claim
 
 
 @dataclass(frozen=True)
-class Element:
+class EventPattern:
     """What an event may be: a kind with a text and, for a question, an option.
 
     Args:
@@ -118,7 +118,7 @@ class Element:
 
 
 @dataclass(frozen=True)
-class Cut:
+class Scope:
     """A part of a trace: what lies before or after the first or last event that an element matches.
 
     Args:
@@ -127,13 +127,13 @@ class Cut:
     """
 
     name: CutName
-    element: Element
+    element: EventPattern
 
     def __str__(self) -> str:
         return f".{self.name}({self.element})"
 
 
-Cuts: TypeAlias = tuple[Cut, ...]
+Cuts: TypeAlias = tuple[Scope, ...]
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Exists:
         cuts: how the trace is cut before, in order.
     """
 
-    element: Element
+    element: EventPattern
     cuts: Cuts = ()
 
     def __str__(self) -> str:
@@ -163,7 +163,7 @@ class _ActAtPlace:
     """
 
     place: str
-    element: Element
+    element: EventPattern
     cuts: Cuts = ()
 
     @cached_property
@@ -193,7 +193,7 @@ class _Counting:
         cuts: how the trace is cut before, in order.
     """
 
-    element: Element
+    element: EventPattern
     number: int
     cuts: Cuts = ()
 
@@ -264,13 +264,13 @@ class Stay:
         departure: the move that ends it.
     """
 
-    arrival: Element
-    departure: Element
+    arrival: EventPattern
+    departure: EventPattern
 
     @classmethod
     def at(cls, place: str) -> Stay:
         """A stay at the place that a regex names."""
-        return cls(Element("goto", Regex(place)), Element("goto", Without(place)))
+        return cls(EventPattern("goto", Regex(place)), EventPattern("goto", Without(place)))
 
 
 def _cut_trace(cuts: Cuts) -> str:

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from codebotler.core.trace import Event, Option, Trace
-    from codebotler.rtl.formula import Cut, Cuts, Element, Formula, Stay, Test
+    from codebotler.rtl.formula import Cuts, EventPattern, Formula, Scope, Stay, Test
 
 Span: TypeAlias = tuple[int, int]
 """The events from the first position on and before the second."""
 
 
-class CannotJudge(Exception):  # noqa: N818 - not a mistake of the caller but a third verdict
+class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a third verdict
     """A question was to be judged, but one of its options is no text.
 
     Args:
@@ -48,7 +48,7 @@ def holds(formula: Formula, trace: Trace) -> bool:
         trace: what the robot did.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
     match formula:
         case And(parts):
@@ -70,7 +70,7 @@ def test_holds(test: Test, trace: Trace, span: Span) -> bool:
         span: the part.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
     match test:
         case Exists(element):
@@ -90,7 +90,7 @@ def test_holds(test: Test, trace: Trace, span: Span) -> bool:
 test_holds.__test__ = False  # type: ignore[attr-defined]  # lest pytest takes it for a test
 
 
-def matches(element: Element, trace: Trace, at: int) -> bool:
+def matches(element: EventPattern, trace: Trace, at: int) -> bool:
     """Whether an element matches an event.
 
     Args:
@@ -99,7 +99,7 @@ def matches(element: Element, trace: Trace, at: int) -> bool:
         at: the event's position.
 
     Raises:
-        CannotJudge: both are questions, and an option that is no text comes before the first that
+        Inconclusive: both are questions, and an option that is no text comes before the first that
             matches; whether the question's text matches plays no part.
     """
     event = trace[at]
@@ -114,17 +114,17 @@ def matches(element: Element, trace: Trace, at: int) -> bool:
     return element.text.matches(event.text)
 
 
-def _offers(element: Element, event: Event, at: int) -> bool:
+def _offers(element: EventPattern, event: Event, at: int) -> bool:
     assert element.options is not None
     for number, option in enumerate(event.options):
         if not option.is_text:
-            raise CannotJudge(at, number, option)
+            raise Inconclusive(at, number, option)
         if element.options.matches(option.text):
             return True
     return False
 
 
-def first(element: Element, trace: Trace, span: Span) -> int | None:
+def first(element: EventPattern, trace: Trace, span: Span) -> int | None:
     """The position of the first event that matches.
 
     Args:
@@ -133,12 +133,12 @@ def first(element: Element, trace: Trace, span: Span) -> int | None:
         span: where to look.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
     return next((at for at in range(*span) if matches(element, trace, at)), None)
 
 
-def last(element: Element, trace: Trace, span: Span) -> int | None:
+def last(element: EventPattern, trace: Trace, span: Span) -> int | None:
     """The position of the last event that matches; all are compared, from the first on.
 
     Args:
@@ -147,7 +147,7 @@ def last(element: Element, trace: Trace, span: Span) -> int | None:
         span: where to look.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
     found = None
     for at in range(*span):
@@ -156,7 +156,7 @@ def last(element: Element, trace: Trace, span: Span) -> int | None:
     return found
 
 
-def at_least(element: Element, number: int, trace: Trace, span: Span) -> int:
+def at_least(element: EventPattern, number: int, trace: Trace, span: Span) -> int:
     """How many events match, counted no further than a number.
 
     Args:
@@ -166,7 +166,7 @@ def at_least(element: Element, number: int, trace: Trace, span: Span) -> int:
         span: where to look.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
     found = 0
     for at in range(*span):
@@ -184,7 +184,7 @@ def cut(cuts: Cuts, trace: Trace) -> Span:
         trace: what the robot did.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
     span = (0, len(trace))
     for one in cuts:
@@ -192,7 +192,7 @@ def cut(cuts: Cuts, trace: Trace) -> Span:
     return span
 
 
-def find(one: Cut, trace: Trace, span: Span) -> int | None:
+def find(one: Scope, trace: Trace, span: Span) -> int | None:
     """The position at which a cut is made.
 
     Args:
@@ -201,13 +201,13 @@ def find(one: Cut, trace: Trace, span: Span) -> int | None:
         span: the part to be cut.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
     search = first if one.name.endswith("First") else last
     return search(one.element, trace, span)
 
 
-def cut_at(one: Cut, at: int | None, span: Span) -> Span:
+def cut_at(one: Scope, at: int | None, span: Span) -> Span:
     """What a cut leaves of a part of a trace: all of it where nothing was found.
 
     Args:

@@ -16,14 +16,14 @@ from codebotler.rtl.formula import (
     And,
     AtLeast,
     Count,
-    Cut,
     CutName,
-    Element,
+    EventPattern,
     Exists,
     Formula,
     Not,
     Or,
     Regex,
+    Scope,
     Test,
     Without,
     Words,
@@ -150,7 +150,7 @@ class _Parser:
                 return AtLeast(self.element(arguments[0]), self.number(arguments[1]), cuts)
 
     def cuts(self, node: ast.expr) -> Cuts:
-        cuts: list[Cut] = []
+        cuts: list[Scope] = []
         while True:
             self.limit(node, len(cuts))
             match node:
@@ -163,12 +163,12 @@ class _Parser:
                         raise self.unknown(function, f"cut {name}", name, CUTS)
                     self.no_keywords(keywords)
                     self.count_arguments(function, name, arguments, 1)
-                    cuts.append(Cut(CUTS[name], self.element(arguments[0])))
+                    cuts.append(Scope(CUTS[name], self.element(arguments[0])))
                     node = inner
                 case _:
                     raise self.expected("tr or a cut of it such as tr.AfterFirst(...)", node)
 
-    def element(self, node: ast.expr) -> Element:
+    def element(self, node: ast.expr) -> EventPattern:
         match node:
             case ast.Call(ast.Name("at"), arguments, keywords):
                 self.no_keywords(keywords)
@@ -189,10 +189,10 @@ class _Parser:
                 self.count_arguments(node, kind, arguments, 2 if asks else 1)
                 texts = [self.matched(argument, 0) for argument in arguments]
                 if about == "mention" and asking is not None:
-                    return Element(asking, texts[0], mention=True)
+                    return EventPattern(asking, texts[0], mention=True)
                 if about and asking is not None:
-                    return Element(asking, Regex(".*"), answer=texts[0])
-                return Element(kind, texts[0], texts[1] if asks else None)
+                    return EventPattern(asking, Regex(".*"), answer=texts[0])
+                return EventPattern(kind, texts[0], texts[1] if asks else None)
         raise self.expected('an element such as goto("lobby")', node)
 
     def matched(self, node: ast.expr, depth: int) -> Text:

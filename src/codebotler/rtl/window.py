@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from codebotler.rtl.semantics import CannotJudge, cut_at, find
+from codebotler.rtl.semantics import Inconclusive, cut_at, find
 from codebotler.rtl.wording import did, happened
 
 if TYPE_CHECKING:
     from codebotler.core.trace import Trace
-    from codebotler.rtl.formula import Cut, Cuts
+    from codebotler.rtl.formula import Cuts, Scope
 
 
 class Window:
@@ -20,7 +20,7 @@ class Window:
         trace: what the robot did.
 
     Raises:
-        CannotJudge: an option that is no text had to be compared.
+        Inconclusive: an option that is no text had to be compared.
     """
 
     def __init__(self, cuts: Cuts, trace: Trace) -> None:
@@ -67,10 +67,10 @@ class Window:
                 return f"never {did((one.element,), 'past', never=True)}"
         return ""
 
-    def _anywhere(self, one: Cut) -> bool:
+    def _anywhere(self, one: Scope) -> bool:
         try:
             return find(one, self.trace, (0, len(self.trace))) is not None
-        except CannotJudge:
+        except Inconclusive:
             return True
 
     def _event(self, side: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 from codebotler.core.words import listed
-from codebotler.rtl.formula import Element, Regex, Text, Without
+from codebotler.rtl.formula import EventPattern, Regex, Text, Without
 from codebotler.rtl.phrases import either, is_any, lacks, literals, quoted, room, room_name, with_texts
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from codebotler.core.trace import Event
 
 Form: TypeAlias = Literal["base", "past", "ing"]
-Deed: TypeAlias = tuple[Element, ...]
+Deed: TypeAlias = tuple[EventPattern, ...]
 """What one robot may do: any of these elements. Two of them are one text, in a question or in its options."""
 
 # The kinds of the paper read best with verbs of their own; further skills are told by their names.
@@ -180,7 +180,7 @@ def _wanted(deed: Deed) -> Text:
     return options if options is not None and is_any(deed[0].text) else deed[0].text
 
 
-def _question(element: Element, question: str) -> str:
+def _question(element: EventPattern, question: str) -> str:
     text, options = element.text, element.options
     offered = "" if options is None or is_any(options) else f"with an option {with_texts(options)}"
     if is_any(text):

@@ -19,9 +19,9 @@ from codebotler.core.world import World
 from codebotler.simulator.distinct import Distinct
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
-from codebotler.simulator.worker import EngineError, Lane
+from codebotler.simulator.worker import EngineError, Worker
 
-__all__ = ["EngineError", "Lanes", "digest", "run"]
+__all__ = ["EngineError", "WorkerPool", "digest", "run"]
 
 LOG = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
@@ -54,15 +54,15 @@ def run(
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Raises:
-        BadInput: there are no workers.
+        UserError: there are no workers.
         EngineError: no isolated process could be started.
     """
     workers = (os.cpu_count() or 1) if workers is None else workers
-    with Lanes(workers, require_isolation=require_isolation) as lanes:
+    with WorkerPool(workers, require_isolation=require_isolation) as pool:
 
         def run_pair(pair: tuple[str, World]) -> Outcome:
             source, world = pair
-            return lanes.here().run(source, lambda: SimulatedRobot(world, rules, skills, behaviours))
+            return pool.here().run(source, lambda: SimulatedRobot(world, rules, skills, behaviours))
 
         worlds: dict[World, int] = {}
 
@@ -70,7 +70,7 @@ def run(
             source, world = pair
             return digest(source, str(worlds.setdefault(world, len(worlds))))
 
-        yield from lanes.map_distinct(run_pair, pairs, name=name)
+        yield from pool.map_distinct(run_pair, pairs, name=name)
 
 
 def digest(*texts: str) -> bytes:
@@ -82,7 +82,7 @@ def digest(*texts: str) -> bytes:
     return hashed.digest()
 
 
-class Lanes:
+class WorkerPool:
     """Threads that each own one zygote; use as a context manager.
 
     Args:
@@ -90,7 +90,7 @@ class Lanes:
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
 
     Raises:
-        BadInput: there are to be less than 1.
+        UserError: there are to be less than 1.
         EngineError: no zygote can be started, or a wall is missing that is required.
     """
 
@@ -99,16 +99,16 @@ class Lanes:
         if sys.platform == "win32":
             raise EngineError(ON_WINDOWS)
         self.workers = workers
-        self._pool = ThreadPoolExecutor(workers, thread_name_prefix="lane")
+        self._threads = ThreadPoolExecutor(workers, thread_name_prefix="worker")
         self._local = threading.local()
-        first = Lane()
+        first = Worker()
         if not first.has_seccomp:
             missing = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
             if require_isolation:
                 first.close()
                 raise EngineError(missing)
             LOG.warning(missing)
-        self._lanes = [first]
+        self._workers = [first]
         self._idle = [first]
         self._stopping = False
 
@@ -116,31 +116,31 @@ class Lanes:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._threads.shutdown(wait=False, cancel_futures=True)
         self._stopping = True
-        for lane in self._lanes:
-            lane.stop()
-        self._pool.shutdown(wait=True)
-        for lane in self._lanes:
-            lane.close()
+        for worker in self._workers:
+            worker.stop()
+        self._threads.shutdown(wait=True)
+        for worker in self._workers:
+            worker.close()
 
-    def here(self) -> Lane:
-        """The lane of the calling thread."""
-        lane: Lane | None = getattr(self._local, "lane", None)
-        if lane is None:
+    def here(self) -> Worker:
+        """The worker of the calling thread."""
+        worker: Worker | None = getattr(self._local, "worker", None)
+        if worker is None:
             try:
-                lane = self._idle.pop()
+                worker = self._idle.pop()
             except IndexError:
-                lane = Lane()
-                self._lanes.append(lane)
+                worker = Worker()
+                self._workers.append(worker)
                 if self._stopping:
-                    lane.stop()
-            self._local.lane = lane
-            self._keep_together(lane)
-        return lane
+                    worker.stop()
+            self._local.worker = worker
+            self._keep_together(worker)
+        return worker
 
-    def _keep_together(self, lane: Lane) -> None:
-        """Keep this thread and the processes of its lane on one core.
+    def _keep_together(self, worker: Worker) -> None:
+        """Keep this thread and the processes of its worker on one core.
 
         They take turns, and to wake one on another core costs more than a skill call. For that reason, too,
         this thread does not push a child aside each time that it says something.
@@ -148,22 +148,22 @@ class Lanes:
         if sys.platform != "linux":
             return
         cores = sorted(os.sched_getaffinity(0))
-        core = cores[(os.getpid() + self._lanes.index(lane)) % len(cores)]
+        core = cores[(os.getpid() + self._workers.index(worker)) % len(cores)]
         with contextlib.suppress(OSError):  # only slower without
             os.sched_setaffinity(0, {core})
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-            lane.stay_on(core)
+            worker.stay_on(core)
 
     def submit(
         self, function: Callable[Arguments, Value], *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> Future[Value]:
-        """Call a function in one of the threads, which may ask for its lane there; from any thread."""
-        return self._pool.submit(function, *args, **kwargs)
+        """Call a function in one of the threads, which may ask for its worker there; from any thread."""
+        return self._threads.submit(function, *args, **kwargs)
 
     def forget(self) -> None:
-        """Let go of all in a forked process: the lanes, and the threads, are those of the process before."""
-        for lane in self._lanes:
-            lane.forget()
+        """Let go of all in a forked process: the pool, and the threads, are those of the process before."""
+        for worker in self._workers:
+            worker.forget()
 
     @overload
     def map_distinct(
@@ -198,4 +198,4 @@ class Lanes:
             name: a short name of a key, which no other key has.
             then: what to make of each result, in the thread that asks for them; what it returns is pickled.
         """
-        return Distinct(self._pool, 8 * self.workers, function, name, then).results(keys)
+        return Distinct(self._threads, 8 * self.workers, function, name, then).results(keys)

@@ -10,7 +10,7 @@ EIGHTS = 8
 
 
 @dataclass(frozen=True)
-class Lot:
+class FactSampler:
     """How the facts of one imagined world are drawn: each from its own name, in whatever order.
 
     Args:
@@ -62,7 +62,7 @@ class Presence:
     name: str
     drawn: bool
 
-    def is_drawn_by(self, lot: Lot) -> bool:
+    def is_drawn_by(self, lot: FactSampler) -> bool:
         """Whether the same would be drawn in another world."""
         return lot.is_there(self.room, self.name) == self.drawn
 
@@ -83,7 +83,7 @@ class Answer:
     question: tuple[str, ...]
     drawn: int
 
-    def is_drawn_by(self, lot: Lot) -> bool:
+    def is_drawn_by(self, lot: FactSampler) -> bool:
         """Whether the same would be drawn in another world."""
         return lot.answer(self.count, self.agreeing, *self.question) == self.drawn
 

@@ -1,4 +1,4 @@
-"""A zygote, seen from outside: forks a closed child whenever one is asked for."""
+"""A fork_server, seen from outside: forks a closed child whenever one is asked for."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from codebotler.simulator.child import Child, LostChildError
 from codebotler.simulator.isolated import start
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import WITHOUT_REFERENCES
-from codebotler.simulator.skill_protocol import Conversation, described
+from codebotler.simulator.skill_protocol import SkillProtocol, described
 from codebotler.simulator.warm_up import LESSONS, PLAY, STAGE
 
 NUMBER = 8  # bytes of a number that it reports
@@ -19,11 +19,11 @@ REHEARSALS = 8
 EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
 
 
-class Zygote:
-    """One zygote and the children it forks, one at a time.
+class ForkServer:
+    """One fork server and the children it forks, one at a time.
 
     Args:
-        role: of the three kinds of zygotes.
+        role: of the three kinds of fork servers.
 
     Raises:
         LostChildError: it does not start.
@@ -46,7 +46,7 @@ class Zygote:
                 self._rehearse()
         except (LostChildError, OSError):
             self.close()
-            raise LostChildError("the zygote does not start") from None
+            raise LostChildError("the fork_server does not start") from None
         except BaseException:  # an interrupt
             self.close()
             raise
@@ -55,12 +55,12 @@ class Zygote:
         """A fresh child.
 
         Raises:
-            LostChildError: the zygote has ended.
+            LostChildError: the fork server has ended.
         """
         try:
             ours = self._ask_for_line()
         except OSError:
-            raise LostChildError("the zygote has ended") from None
+            raise LostChildError("the fork_server has ended") from None
         return Child(self._pid_of_child, ours, self._end_of_child, closes=self.has_seccomp)
 
     @property
@@ -86,14 +86,14 @@ class Zygote:
         self._door.close()
 
     def _teach(self) -> None:
-        """Let the zygote itself run a program, so that its children have less to learn."""
+        """Let the fork server itself run a program, so that its children have less to learn."""
         child = Child(lambda: self.pid, self._ask_for_line(), self._process.wait, closes=False)
-        Conversation(child, PLAY, SimulatedRobot(STAGE), may_import=True).talk()
+        SkillProtocol(child, PLAY, SimulatedRobot(STAGE), may_import=True).talk()
         child.hang_up()
 
     def _rehearse(self) -> None:
-        """Run an empty program: by then the heap of the zygote, which programs can see, has settled."""
-        Conversation(self.fork(), EMPTY, SimulatedRobot(STAGE), may_import=True).outcome()
+        """Run an empty program: by then the heap of the fork server, which programs can see, has settled."""
+        SkillProtocol(self.fork(), EMPTY, SimulatedRobot(STAGE), may_import=True).outcome()
 
     def _ask_for_line(self) -> socket.socket:
         ours, theirs = socket.socketpair()
@@ -111,7 +111,7 @@ class Zygote:
         self._end_is_unread = True
         pid = self._read_report()
         if pid <= 1:  # a signal to it would hit a whole group of processes
-            raise LostChildError("the zygote does not say which process it forked")
+            raise LostChildError("the fork_server does not say which process it forked")
         return pid
 
     def _end_of_child(self) -> int:
@@ -121,5 +121,5 @@ class Zygote:
     def _read_report(self) -> int:
         data = os.read(self._report, NUMBER)
         if not data:
-            raise LostChildError("the zygote has ended")
+            raise LostChildError("the fork_server has ended")
         return int.from_bytes(data, sys.byteorder, signed=True)

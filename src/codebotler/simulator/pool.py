@@ -1,4 +1,4 @@
-"""Lanes that stay: for who has programs run now and then, from many threads, until the process ends."""
+"""WorkerPool that stay: for who has programs run now and then, from many threads, until the process ends."""
 
 from __future__ import annotations
 
@@ -6,41 +6,41 @@ import atexit
 import os
 import threading
 
-from codebotler.simulator.engine import Lanes
+from codebotler.simulator.engine import WorkerPool
 
 
-def warm() -> Lanes:
-    """The lanes of this process, started when they are first asked for; one for each core it may use.
+def warm() -> WorkerPool:
+    """The pool of this process, started when they are first asked for; one for each core it may use.
 
     They are ended with the process. A forked process gets others.
 
     Raises:
         EngineError: no isolated process can be started.
     """
-    return STAYING.lanes()
+    return STAYING.pool()
 
 
 class Staying:
-    """The lanes of this process, if there are any yet."""
+    """The pool of this process, if there are any yet."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._lanes: Lanes | None = None
-        self._inherited: list[Lanes] = []  # never taken apart: their threads are not here
+        self._pool: WorkerPool | None = None
+        self._inherited: list[WorkerPool] = []  # never taken apart: their threads are not here
 
-    def lanes(self) -> Lanes:
+    def pool(self) -> WorkerPool:
         """Those that there are, or else new ones."""
         with self._lock:
-            if self._lanes is None:
-                self._lanes = Lanes(cores())
-            return self._lanes
+            if self._pool is None:
+                self._pool = WorkerPool(cores())
+            return self._pool
 
     def end(self) -> None:
         """End them."""
         with self._lock:
-            if self._lanes is not None:
-                self._lanes.__exit__()
-                self._lanes = None
+            if self._pool is not None:
+                self._pool.__exit__()
+                self._pool = None
 
     def before_fork(self) -> None:
         """Let nobody start them in the meantime."""
@@ -52,10 +52,10 @@ class Staying:
 
     def begin_anew(self) -> None:
         """Let go of them, in the process that was forked."""
-        if self._lanes is not None:
-            self._lanes.forget()
-            self._inherited.append(self._lanes)
-            self._lanes = None
+        if self._pool is not None:
+            self._pool.forget()
+            self._inherited.append(self._pool)
+            self._pool = None
         self._lock.release()
 
 

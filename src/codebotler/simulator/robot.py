@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from typing import TypeAlias
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Event, Option, Trace
 from codebotler.core.world import Answer, Person, World
@@ -93,7 +93,7 @@ class SimulatedRobot:
         behaviours: what each skill does, by name.
 
     Raises:
-        BadInput: it does not say what one of them does.
+        UserError: it does not say what one of them does.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class SimulatedRobot:
         self.rules, self.skills = rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
         if missing := [name for name in skills if name not in self.behaviours]:
-            raise BadInput(f'no behaviour says what the skill "{missing[0]}" does')
+            raise UserError(f'no behaviour says what the skill "{missing[0]}" does')
         self.never_fails = frozenset(name for name, does in self.behaviours.items() if does is say)
         self.only_looks = frozenset(name for name, does in self.behaviours.items() if does in LOOKING)
         self.rooms = tuple(room.name for room in world.rooms)

@@ -12,7 +12,7 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Option
 from codebotler.core.world import Room, World
 from codebotler.simulator import robot as real
-from codebotler.simulator.fact_sampler import Answer, Draw, Lot, Presence
+from codebotler.simulator.fact_sampler import Answer, Draw, FactSampler, Presence
 from codebotler.simulator.robot import (
     Behaviour,
     RobotError,
@@ -42,7 +42,7 @@ _ARTICLE = re.compile(r"(?:the|an?|any|some)\s+")
 
 
 @dataclass(frozen=True)
-class Plan:
+class RoomMap:
     """What is known of a world before anything in it is imagined.
 
     Args:
@@ -59,7 +59,7 @@ class Plan:
     plain: bool = False
 
     @classmethod
-    def of(cls, world: World) -> Plan:
+    def of(cls, world: World) -> RoomMap:
         """The rooms of a world, and where the robot starts in it."""
         return cls(tuple(room.name for room in world.rooms), world.robot)
 
@@ -161,7 +161,7 @@ class Hope:
         return len(self.vain) > 1 and not self.found
 
 
-class ImaginedRobot(SimulatedRobot):
+class SampledRobot(SimulatedRobot):
     """A robot in a world that is drawn while the program runs; a fact once drawn stays true.
 
     What the program looks for is there or not by chance. What it never looked for is as it takes it to be:
@@ -180,8 +180,8 @@ class ImaginedRobot(SimulatedRobot):
 
     def __init__(
         self,
-        plan: Plan,
-        lot: Lot,
+        plan: RoomMap,
+        lot: FactSampler,
         rules: Rules = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         behaviours: Mapping[str, Behaviour] | None = None,
@@ -269,7 +269,7 @@ def is_name(request: str) -> bool:
     return request.strip()[:1].isupper()
 
 
-def drive(robot: ImaginedRobot, location: str) -> None:
+def drive(robot: SampledRobot, location: str) -> None:
     """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
     robot.record("goto", location)
     room = robot.plan.room(location)
@@ -278,7 +278,7 @@ def drive(robot: ImaginedRobot, location: str) -> None:
     robot.room = room
 
 
-def look(robot: ImaginedRobot, entity: str) -> bool:
+def look(robot: SampledRobot, entity: str) -> bool:
     """Look for an object or for somebody; whether they are there is drawn at the first look."""
     name = meant(entity)
     here = robot.is_here(name)
@@ -297,7 +297,7 @@ def look(robot: ImaginedRobot, entity: str) -> bool:
     return here
 
 
-def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
+def ask(robot: SampledRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
     """Ask somebody, who is there unless the program saw that they are not; they choose by chance."""
     who = meant(person)
     if not options or not _answers(robot, who):
@@ -318,7 +318,7 @@ def ask(robot: ImaginedRobot, person: str, question: str, options: tuple[Option,
     return chosen
 
 
-def _answers(robot: ImaginedRobot, who: str) -> bool:
+def _answers(robot: SampledRobot, who: str) -> bool:
     here = robot.is_here(who)
     if here is None and robot.scene.lacks(SOMEBODY):
         here = False
@@ -330,7 +330,7 @@ def _answers(robot: ImaginedRobot, who: str) -> bool:
     return here
 
 
-def pick(robot: ImaginedRobot, obj: str) -> None:
+def pick(robot: SampledRobot, obj: str) -> None:
     """Take an object, which is there unless the program saw that it is not."""
     name = meant(obj)
     if robot.held is None and robot.is_here(name) is None and _lies_there(robot, name):
@@ -343,7 +343,7 @@ def pick(robot: ImaginedRobot, obj: str) -> None:
     robot.scene.people.discard(name)
 
 
-def _lies_there(robot: ImaginedRobot, name: str) -> bool:
+def _lies_there(robot: SampledRobot, name: str) -> bool:
     if name in robot.scene.gone:  # it may have been one of several, if nobody has looked since
         return not robot.lot.strict
     here = robot.drawn(name) if robot.lot.strict else True
@@ -351,7 +351,7 @@ def _lies_there(robot: ImaginedRobot, name: str) -> bool:
     return here
 
 
-def place(robot: ImaginedRobot, obj: str) -> None:
+def place(robot: SampledRobot, obj: str) -> None:
     """Put down what the robot holds, which must be named exactly as it was picked up."""
     with robot.excused(when=robot.held is None and robot.hope(meant(obj)).is_lost):
         real.place(robot, obj)

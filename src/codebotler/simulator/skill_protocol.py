@@ -60,7 +60,7 @@ class Robot(Protocol):
         """Let time pass, until `now` seconds since the start; back at once when it is to stop."""
 
 
-class Conversation:
+class SkillProtocol:
     """One run: answers what the child asks until it ends, and says how it ended.
 
     Args:

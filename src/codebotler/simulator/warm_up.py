@@ -1,7 +1,7 @@
-"""The play that a zygote runs itself before it serves: a little of all that most programs do.
+"""The play that a fork server runs itself before it serves: a little of all that most programs do.
 
 What the interpreter learns by it, such as where it finds an attribute, lies in memory that the children of
-the zygote then share.
+the fork server then share.
 """
 
 from __future__ import annotations

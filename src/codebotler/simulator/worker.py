@@ -1,4 +1,4 @@
-"""A lane: the processes that run programs one at a time: a preparer and two zygotes."""
+"""A worker: the processes that run programs one at a time: a preparer and two fork servers."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from collections.abc import Callable
 
 from codebotler.core.trace import Outcome
 from codebotler.simulator.child import LostChildError
-from codebotler.simulator.fork_server import Zygote
+from codebotler.simulator.fork_server import ForkServer
 from codebotler.simulator.preparer import Prepared, Preparer
-from codebotler.simulator.sandbox import LIBRARY_ZYGOTE, LIVE_ZYGOTE, ZYGOTE
-from codebotler.simulator.skill_protocol import Conversation, ImportsMoreError, Robot
+from codebotler.simulator.sandbox import FORK_SERVER, LIBRARY_SERVER, LIVE_SERVER
+from codebotler.simulator.skill_protocol import ImportsMoreError, Robot, SkillProtocol
 
 EVENTS = logging.getLogger("codebotler.engine.events")
 """What happens to each run: started, how it ended and why; at level DEBUG, so that it is off by default."""
 
 
-class Lane:
+class Worker:
     """What runs programs one at a time.
 
-    Nearly all programs import nothing. They run in children of a zygote that is small, and cheap to fork; the
-    others in those of a zygote that has the standard library, which is started when the first of them comes.
+    Nearly all programs import nothing. They run in children of a fork server that is small, and cheap to
+    fork; the others in those of one that has the standard library, which is started when the first of them
+    comes.
 
     Raises:
         EngineError: the processes cannot be started.
@@ -31,10 +32,10 @@ class Lane:
     def __init__(self) -> None:
         self._stopped = False
         self._preparer = Preparer()
-        self._preparer.start()  # beside the zygote
-        self._zygotes: dict[str, Zygote] = {}
+        self._preparer.start()  # beside the fork server
+        self._fork_servers: dict[str, ForkServer] = {}
         try:
-            self.has_seccomp = self._zygote(ZYGOTE).has_seccomp
+            self.has_seccomp = self._fork_server(FORK_SERVER).has_seccomp
         except LostChildError as error:
             self._preparer.close()
             raise EngineError(f"the engine does not start: {error}") from None
@@ -50,7 +51,7 @@ class Lane:
             new_robot: makes the robot who executes its skills, in the initial state of its world.
 
         Raises:
-            EngineError: a process was lost twice, or the lane was stopped.
+            EngineError: a process was lost twice, or the worker was stopped.
         """
         name = zlib.crc32(source.encode(errors="surrogatepass"))
         EVENTS.debug("program %08x: started", name)
@@ -74,11 +75,11 @@ class Lane:
             robot: who executes its skills; what it raises besides `RobotError` ends the run and is thrown.
 
         Raises:
-            EngineError: a process was lost, or the lane was stopped.
+            EngineError: a process was lost, or the worker was stopped.
         """
         try:
             prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
-            return prepared if isinstance(prepared, Outcome) else self._converse(LIVE_ZYGOTE, prepared, robot)
+            return prepared if isinstance(prepared, Outcome) else self._converse(LIVE_SERVER, prepared, robot)
         except LostChildError as error:
             self.close()
             stopped = "the engine was stopped" if self._stopped else f"an isolated process was lost: {error}"
@@ -88,25 +89,25 @@ class Lane:
         """End all processes and with them a run that is still going on; its thread notices."""
         self._stopped = True
         self._preparer.kill()
-        for zygote in list(self._zygotes.values()):
-            zygote.kill()
+        for fork_server in list(self._fork_servers.values()):
+            fork_server.kill()
 
     def stay_on(self, core: int) -> None:
         """Let the processes run on one core only."""
-        for zygote in self._zygotes.values():
-            os.sched_setaffinity(zygote.pid, {core})
+        for fork_server in self._fork_servers.values():
+            os.sched_setaffinity(fork_server.pid, {core})
 
     def close(self) -> None:
-        """Give back all that the lane holds; nothing may be running."""
+        """Give back all that the worker holds; nothing may be running."""
         self._preparer.close()
-        while self._zygotes:
-            self._zygotes.popitem()[1].close()
+        while self._fork_servers:
+            self._fork_servers.popitem()[1].close()
 
     def forget(self) -> None:
         """Close what a forked process has inherited, and let the processes be, which are not its own."""
         self._preparer.forget()
-        while self._zygotes:
-            self._zygotes.popitem()[1].forget()
+        while self._fork_servers:
+            self._fork_servers.popitem()[1].forget()
 
     def _try(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
         try:
@@ -115,11 +116,11 @@ class Lane:
             if isinstance(prepared, Outcome):
                 return prepared
             if prepared.imports:
-                return self._converse(LIBRARY_ZYGOTE, prepared, robot)
+                return self._converse(LIBRARY_SERVER, prepared, robot)
             try:
-                return self._converse(ZYGOTE, prepared, robot)
+                return self._converse(FORK_SERVER, prepared, robot)
             except ImportsMoreError as error:
-                return self._converse(LIBRARY_ZYGOTE, prepared, new_robot(), patience=error.patience)
+                return self._converse(LIBRARY_SERVER, prepared, new_robot(), patience=error.patience)
         except (LostChildError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
@@ -129,17 +130,17 @@ class Lane:
     def _converse(
         self, role: str, prepared: Prepared, robot: Robot, *, patience: float | None = None
     ) -> Outcome:
-        child = self._zygote(role).fork()
+        child = self._fork_server(role).fork()
         if patience is not None:
             child.patience = patience
-        return Conversation(child, prepared.code, robot, may_import=role != ZYGOTE).outcome()
+        return SkillProtocol(child, prepared.code, robot, may_import=role != FORK_SERVER).outcome()
 
-    def _zygote(self, role: str) -> Zygote:
-        if role not in self._zygotes:
-            self._zygotes[role] = Zygote(role)
+    def _fork_server(self, role: str) -> ForkServer:
+        if role not in self._fork_servers:
+            self._fork_servers[role] = ForkServer(role)
             if self._stopped:
-                self._zygotes[role].kill()
-        return self._zygotes[role]
+                self._fork_servers[role].kill()
+        return self._fork_servers[role]
 
 
 class EngineError(RuntimeError):

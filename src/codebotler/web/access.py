@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 TRIES, WINDOW = 10, 60.0
 """So many wrong tokens may come from an address in so many seconds."""
@@ -70,17 +70,17 @@ class Access:
             is_loopback: whether only this machine gets there.
 
         Raises:
-            BadInput: that would let in whoever should not be.
+            UserError: that would let in whoever should not be.
         """
         if open_to_all and (operator or face or not is_loopback):
-            raise BadInput("--no-token is only for this machine; leave out --host and all tokens")
+            raise UserError("--no-token is only for this machine; leave out --host and all tokens")
         for token in (operator, face):
             if token is not None and len(token) < SHORTEST_TOKEN:
-                raise BadInput(
+                raise UserError(
                     f"this token can be guessed; take {SHORTEST_TOKEN} characters or more, or none"
                 )
         if operator is not None and operator == face:
-            raise BadInput("the face's token would open the operator's page; take another one")
+            raise UserError("the face's token would open the operator's page; take another one")
         long = frozenset(
             role for role, token in ((Role.OPERATOR, operator), (Role.FACE, face)) if token is None
         )

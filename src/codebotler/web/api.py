@@ -15,13 +15,13 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS, Line, Summary, events_of
 from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import MissionError
 from codebotler.missions.store import find, missions, summary_of
-from codebotler.web.console import MOST_PROGRAM, Desk
+from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.turn import Turn
 from codebotler.web.view import Order, View
 
@@ -89,7 +89,7 @@ def refused(_request: Request, error: Exception) -> AnyText:
     return AnyText({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
-def router(desk: Desk) -> APIRouter:
+def router(desk: Console) -> APIRouter:
     """The addresses of the API.
 
     Args:
@@ -103,7 +103,7 @@ def router(desk: Desk) -> APIRouter:
     return api
 
 
-def _add_missions(api: APIRouter, desk: Desk) -> None:
+def _add_missions(api: APIRouter, desk: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
         """All missions, in the order in which they began."""
@@ -145,7 +145,7 @@ def _add_missions(api: APIRouter, desk: Desk) -> None:
         return _file(file.getvalue(), f"{summary.id}.mcap", "application/octet-stream")
 
 
-def _add_changes(api: APIRouter, desk: Desk) -> None:
+def _add_changes(api: APIRouter, desk: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Put another program in the place of the one at hand; it is checked meanwhile."""
@@ -182,7 +182,7 @@ def _add_changes(api: APIRouter, desk: Desk) -> None:
         return {"stopping": desk.stop_soon(STOPS, only_moving=only_moving)}
 
 
-def _add_events(api: APIRouter, desk: Desk) -> None:
+def _add_events(api: APIRouter, desk: Console) -> None:
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
         """The events as they happen (server-sent), from the first one on or after `Last-Event-ID`."""
@@ -193,7 +193,7 @@ def _add_events(api: APIRouter, desk: Desk) -> None:
         )
 
 
-def _add_rest(api: APIRouter, desk: Desk) -> None:
+def _add_rest(api: APIRouter, desk: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: ProgramToCheck) -> dict[str, Any]:
         """Say what is wrong with a program, in the rooms of the mission at hand if there is one."""
@@ -218,7 +218,7 @@ def _add_rest(api: APIRouter, desk: Desk) -> None:
         }
 
 
-async def _stream(desk: Desk, turn: Turn, known: int) -> AsyncIterator[str]:
+async def _stream(desk: Console, turn: Turn, known: int) -> AsyncIterator[str]:
     """Lines of a server-sent stream. Who reads slowly is sent what there is by then; nothing waits for it."""
 
     def has_more() -> bool:
@@ -257,7 +257,7 @@ def view_data(view: View) -> dict[str, Any]:
     }
 
 
-def _at_hand(desk: Desk, mission: str) -> Turn:
+def _at_hand(desk: Console, mission: str) -> Turn:
     turn = desk.turn
     if turn is not None and mission in {HERE, turn.view.id}:
         return turn
@@ -265,20 +265,20 @@ def _at_hand(desk: Desk, mission: str) -> Turn:
     raise HTTPException(409, f"mission {summary.id} is not the one at hand; only what it left can be read")
 
 
-def _past(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:
+def _past(desk: Console, mission: str) -> tuple[Summary, list[Line]]:
     name = desk.view.id if mission == HERE else mission
     if not name:
         none = "there is no mission yet; POST /api/missions begins one"
         raise HTTPException(404, none if desk.turn is None else "the mission at hand has not begun")
     try:
         folder = find(desk.home, name)
-    except BadInput:
+    except UserError:
         raise HTTPException(
             404, f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
         ) from None
     try:
         return summary_of(folder), events_of(folder)
-    except BadInput as error:
+    except UserError as error:
         raise HTTPException(404, error.sentence) from None
 
 
@@ -288,7 +288,7 @@ def _refusing() -> Iterator[None]:
         yield
     except MissionError as error:
         raise HTTPException(409, error.sentence) from None
-    except BadInput as error:
+    except UserError as error:
         raise HTTPException(422, str(error)) from None
 
 

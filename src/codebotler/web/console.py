@@ -18,9 +18,9 @@ from codebotler.missions.store import recover
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
-from codebotler.simulator.engine import Lanes
-from codebotler.simulator.sampled_robot import Plan
-from codebotler.web.notifier import Board
+from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.web.notifier import Notifier
 from codebotler.web.turn import Means, Turn
 from codebotler.web.view import Order, View
 
@@ -30,7 +30,7 @@ MOST_PROGRAM = 200_000
 NOTHING = View()
 
 
-class Desk:
+class Console:
     """Holds a robot and the mission at hand; as a context manager, from the start of the tool to its end.
 
     All methods are for any thread. Those that say so are back at once, the others may wait for a disk or for
@@ -56,7 +56,7 @@ class Desk:
         face: Face | None = None,
     ) -> None:
         self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
-        self.board, self.face = Board(), face
+        self.board, self.face = Notifier(), face
         if face is not None:
             face.changed = self.board.change
         self.interrupted: tuple[Summary, ...] = ()
@@ -65,7 +65,7 @@ class Desk:
         self._turn: Turn | None = None
         self._checking = threading.Lock()
         self._held = ExitStack()
-        self._lanes: Lanes | None = None
+        self._pool: WorkerPool | None = None
 
     def __enter__(self) -> Self:
         self.interrupted = tuple(recover(self.home))
@@ -165,7 +165,7 @@ class Desk:
         threading.Thread(target=self.stop, args=(by,), daemon=True).start()
         return True
 
-    def check(self, program: str, plan: Plan | None = None) -> Check:
+    def check(self, program: str, plan: RoomMap | None = None) -> Check:
         """Say what is wrong with a program, one after the other.
 
         Args:
@@ -176,9 +176,9 @@ class Desk:
             EngineError: no isolated process could be started.
         """
         with self._checking:
-            if self._lanes is None:
-                self._lanes = self._held.enter_context(Lanes(1))
-            return check(program, plan=plan, lanes=self._lanes)
+            if self._pool is None:
+                self._pool = self._held.enter_context(WorkerPool(1))
+            return check(program, plan=plan, pool=self._pool)
 
 
 def _expect_short(text: str) -> None:

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from codebotler.core.terminal import visible_lines
 from codebotler.missions.mission import UNCONFIRMED
 from codebotler.robots.face import AnswerError, Ended, Face, Question
-from codebotler.web.console import Desk
+from codebotler.web.console import Console
 
 PAGE = Path(__file__).with_name("static") / "face.html"
 POLICY = (
@@ -38,7 +38,7 @@ class Answer(BaseModel):
     option: int = Field(strict=True, ge=0, description="The position of the chosen option, from 0.")
 
 
-def router(desk: Desk, face: Face) -> APIRouter:
+def router(desk: Console, face: Face) -> APIRouter:
     """The addresses of the face.
 
     Args:
@@ -87,7 +87,7 @@ def router(desk: Desk, face: Face) -> APIRouter:
     return here
 
 
-async def _tell(socket: WebSocket, desk: Desk, face: Face) -> None:
+async def _tell(socket: WebSocket, desk: Console, face: Face) -> None:
     """Whoever reads slowly is sent what there is by then; nothing queues up."""
     sent: object = None
     with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
@@ -101,7 +101,7 @@ async def _tell(socket: WebSocket, desk: Desk, face: Face) -> None:
             await desk.board.until(lambda: desk.board.version != seen)  # noqa: B023 - looked at before the next round
 
 
-def face_data(desk: Desk, face: Face) -> dict[str, Any]:
+def face_data(desk: Console, face: Face) -> dict[str, Any]:
     """What a face shows, as plain data."""
     view, shown = desk.view, face.shown
     question = shown.question

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 
-class Board:
+class Notifier:
     """Counts changes and wakes whoever waits for one. Viewers then read what there is; nothing queues up."""
 
     def __init__(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from codebotler.web.console import Desk
+from codebotler.web.console import Console
 from codebotler.web.elements import Words
 from codebotler.web.frame import PATIENCE, Frame
 from codebotler.web.panes.instruction import Instruct
@@ -18,7 +18,7 @@ EVERY = 0.1
 """Seconds after which a page looks whether something has changed."""
 
 
-def add(desk: Desk, frame: Frame) -> None:
+def add(desk: Console, frame: Frame) -> None:
     """Put the operator's pages at their addresses.
 
     Args:

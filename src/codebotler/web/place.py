@@ -7,7 +7,7 @@ import socket
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.web.access import Access
 from codebotler.web.guard import LOOPBACK, Rules
 
@@ -25,7 +25,7 @@ class Place:
         names: under which it may be called besides.
 
     Raises:
-        BadInput: nobody can listen there.
+        UserError: nobody can listen there.
     """
 
     host: str = "127.0.0.1"
@@ -51,7 +51,7 @@ class Place:
             bound.bind(address)
             bound.listen(WAITING)  # whoever opens the link at once waits, and is not turned away
         except OSError as error:
-            raise BadInput(
+            raise UserError(
                 f"nobody can listen on {self.host}, port {self.port}: {error.strerror}; "
                 "choose another --port, or --host"
             ) from None
@@ -78,7 +78,7 @@ def entrance(
         no_token: whether everybody on this machine may open it.
 
     Raises:
-        BadInput: more people than that would get in.
+        UserError: more people than that would get in.
     """
     place = Place(host, port, tuple(names))
     return place, Access.asked_for(token, face, open_to_all=no_token, is_loopback=place.is_loopback)

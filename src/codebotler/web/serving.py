@@ -28,7 +28,7 @@ from codebotler.core.terminal import note
 from codebotler.core.words import listed
 from codebotler.web import api, apipage, facepage, operate
 from codebotler.web.access import Access
-from codebotler.web.console import Desk
+from codebotler.web.console import Console
 from codebotler.web.frame import FACE, ROBOT, Frame
 from codebotler.web.further import Further, Site
 from codebotler.web.guard import MOST_BYTES, REFUSAL, Guard
@@ -44,7 +44,7 @@ LINGER = 3
 
 
 def serve(
-    desk: Desk | None,
+    desk: Console | None,
     place: Place,
     access: Access,
     further: Further = (),
@@ -63,7 +63,7 @@ def serve(
         alone_for: a robot that runs is stopped so many seconds after the last operator left; None: never.
 
     Raises:
-        BadInput: nobody can listen there.
+        UserError: nobody can listen there.
         OSError: the missions cannot be written.
     """
     with place.listening() as bound, desk or nullcontext():
@@ -89,7 +89,7 @@ def serve(
         _Server(settings, desk).run([bound])
 
 
-def _links(place: Place, port: int, access: Access, desk: Desk | None) -> str:
+def _links(place: Place, port: int, access: Access, desk: Console | None) -> str:
     shown = "localhost" if place.is_loopback else socket.gethostname()
     address = f"http://{shown}:{port}/"
 
@@ -112,7 +112,7 @@ def _links(place: Place, port: int, access: Access, desk: Desk | None) -> str:
     return "\n".join(told)
 
 
-def application(desk: Desk | None, further: Further = (), runs: Path = RUNS) -> FastAPI:
+def application(desk: Console | None, further: Further = (), runs: Path = RUNS) -> FastAPI:
     """The page and its API, without the guard.
 
     Args:
@@ -190,7 +190,7 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
 class _Server(uvicorn.Server):
     """Stops the robot as soon as somebody wants to end the tool, before anything else ends."""
 
-    def __init__(self, config: uvicorn.Config, desk: Desk | None) -> None:
+    def __init__(self, config: uvicorn.Config, desk: Console | None) -> None:
         super().__init__(config)
         self._desk = desk
 

@@ -11,23 +11,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from codebotler.checking.problems import Check
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import generate
 from codebotler.missions.log import Line
 from codebotler.missions.mission import STEPS, Mission, MissionError, State
 from codebotler.missions.preflight import beyond, preflight, unknown_rooms
 from codebotler.models.base import Model, ModelError
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
 from codebotler.simulator.engine import EngineError
-from codebotler.simulator.sampled_robot import Plan
+from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.view import Order, View, digest
 
 LOG = logging.getLogger("codebotler.web")
-EXPECTED = (BadInput, ModelError, NotReadyError, EngineError, MissionError, OSError)
+EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Means:
     robot: Robot
     home: Path
     open_model: Callable[[str], Model]
-    check: Callable[[str, Plan | None], Check]
+    check: Callable[[str, RoomMap | None], Check]
     changed: Callable[[], None]
 
 
@@ -232,7 +232,7 @@ class Turn:
             if before.program:
                 self._restore(before)
             return
-        except (BadInput, ModelError) as error:
+        except (UserError, ModelError) as error:
             if not before.program:
                 raise
             self._restore(before)
@@ -254,7 +254,7 @@ class Turn:
 
         async def ask() -> str:
             try:
-                made = await generate(Paced(model, concurrency=1), prompt, heard=self._heard)
+                made = await generate(RateLimited(model, concurrency=1), prompt, heard=self._heard)
             finally:
                 await model.close()
             return made.program

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from codebotler.checking.problems import Check
 from codebotler.missions.mission import State
-from codebotler.simulator.sampled_robot import Plan
+from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.progress import Progress
 
 
@@ -61,7 +61,7 @@ class View:
     found: Check | None = None
     problems: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
-    plan: Plan | None = None
+    plan: RoomMap | None = None
     reason: str = ""
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from math import fsum
 from typing import Any
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from codebotler.core.words import counted
 from roboeval.analysis.metrics import Estimate, by_formula
@@ -60,10 +60,10 @@ class Comparison:
 
 
 def compared(first: PromptScores, second: PromptScores) -> Comparison:
-    """Compare two models prompt by prompt; raises BadInput if they have none in common."""
+    """Compare two models prompt by prompt; raises UserError if they have none in common."""
     keys = [key for key in first if key in second]
     if not keys:
-        raise BadInput("the runs have no prompt in common, so there is nothing to compare")
+        raise UserError("the runs have no prompt in common, so there is nothing to compare")
     by_task: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for key in keys:
         by_task[key[0]].append((first[key], second[key]))
@@ -144,14 +144,14 @@ def _said(value: object) -> str:
 
 
 def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, again: Mapping[str, str]) -> None:
-    """Raise BadInput if runs were judged by suites of different content."""
+    """Raise UserError if runs were judged by suites of different content."""
     digests = {path: str(head.get("digest")) for path, head in heads.items()}
     if len({*digests.values()}) < 2:  # noqa: PLR2004 - two that differ
         return
     stale = next(path for path, digest in digests.items() if digest != suite.digest)
     other = next(path for path, digest in digests.items() if digest != digests[stale])
     hashes = f"{digests[stale][:8]} and {digests[other][:8]}"
-    raise BadInput(
+    raise UserError(
         f"{stale} and {other} were judged by suites of other content ({hashes}); "
         f"`{again[stale]} --redo` judges it by the suite as it is now"
     )

@@ -11,7 +11,7 @@ from typing import Any
 
 from codebotler.core.trace import Trace
 from codebotler.core.tracefile import trace_from
-from codebotler.rtl import CannotJudge, Formula, holds, parse
+from codebotler.rtl import Formula, Inconclusive, holds, parse
 from roboeval.evaluation.runs.completions import Key
 from roboeval.evaluation.runs.rows import key_of
 
@@ -103,7 +103,7 @@ def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Ma
 def _holds(formula: Formula, data: Iterable[object]) -> bool:
     try:
         return holds(formula, _driven(trace_from(data, further=True)))
-    except CannotJudge:
+    except Inconclusive:
         return False
 
 

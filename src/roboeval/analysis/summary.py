@@ -9,7 +9,7 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, completions_of, overall, task_scores
 from roboeval.evaluation.failures import CLASSES
@@ -63,15 +63,15 @@ def summary(
     k: Sequence[int] = (1,),
     ablated: bool = False,
 ) -> Summary:
-    """Count how completions did; raises BadInput where there is none, or k is too large for a prompt."""
+    """Count how completions did; raises UserError where there is none, or k is too large for a prompt."""
     tasks = task_scores(table, suite.tasks)
     if not tasks:
-        raise BadInput(f"0 of {how_many(scope.total)} judged, so there is nothing to count")
+        raise UserError(f"0 of {how_many(scope.total)} judged, so there is nothing to count")
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
         fewest = min(prompt.n for task in tasks for prompt in task.prompts)
-        raise BadInput(f"{visible(str(error))}; choose k from 1 to {fewest}") from None
+        raise UserError(f"{visible(str(error))}; choose k from 1 to {fewest}") from None
     scored = {score.task for score in tasks}
     expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
     missing = _missing([name for name in expected if name not in scored], scope)

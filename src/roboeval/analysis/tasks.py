@@ -9,7 +9,7 @@ from typing import Any
 
 import polars as pl
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import completions_of, pass_at_k
 from roboeval.evaluation.explanation import reason
@@ -115,11 +115,11 @@ class Selection:
         return "/".join(str(part) for part in (self.task, self.prompt, self.index) if part is not None)
 
     def expect_judged(self, results: Results) -> None:
-        """Raise BadInput if nothing of this part was judged."""
+        """Raise UserError if nothing of this part was judged."""
         wanted = self.task, self.prompt, self.index
         if not any(all(w in {None, h} for w, h in zip(wanted, key, strict=True)) for key in results.places):
             what = f"completion {self}" if self.index is not None else f"completion of {self}"
-            raise BadInput(f"no {what if self.task else 'completion'} has been judged in this run")
+            raise UserError(f"no {what if self.task else 'completion'} has been judged in this run")
 
 
 def parse_selection(text: str | None, suite: Suite) -> Selection:
@@ -128,11 +128,11 @@ def parse_selection(text: str | None, suite: Suite) -> Selection:
         return Selection()
     name, *numbers = text.removesuffix("/").split("/")
     if len(numbers) > 2 or not all(n.isascii() and n.isdecimal() and len(n) < 10 for n in numbers):  # noqa: PLR2004 - parts
-        raise BadInput(f'"{visible(text)}" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX')
+        raise UserError(f'"{visible(text)}" selects nothing; write TASK, TASK/PROMPT or TASK/PROMPT/INDEX')
     if name not in suite.tasks:
         name = next((task for task in suite.tasks if task.lower() == name.lower()), name)
     task = suite.task(name)
     selection = Selection(name, *map(int, numbers))
     if selection.prompt is not None and selection.prompt >= len(task.prompts):
-        raise BadInput(f"{name} has prompts 0 to {len(task.prompts) - 1}, so {selection} selects nothing")
+        raise UserError(f"{name} has prompts 0 to {len(task.prompts) - 1}, so {selection} selects nothing")
     return selection

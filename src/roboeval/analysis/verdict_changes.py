@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.analysis.cluster import Cluster, cluster_data, clusters, groups
 from roboeval.analysis.compare import Comparison, PromptScores, compared, comparison_data
 from roboeval.analysis.metrics import pass_at_1
@@ -54,10 +54,10 @@ class VerdictChanges:
 
 
 def verdict_changes(name: str, first: Results, second: Results) -> VerdictChanges:
-    """Find the completions whose verdicts differ; raises BadInput if none was judged by both."""
+    """Find the completions whose verdicts differ; raises UserError if none was judged by both."""
     both = first.places.keys() & second.places.keys()
     if not both:
-        raise BadInput("no completion was judged by both suites", file=name)
+        raise UserError("no completion was judged by both suites", file=name)
     lost = [key for key in sorted(both) if key in second.failed and key not in first.failed]
     won = [key for key in sorted(both) if key in first.failed and key not in second.failed]
     programs = first.programs

@@ -87,14 +87,14 @@ def find(
 
 def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
     """Refuse a wrong formula, and a world that no task has."""
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from codebotler.rtl import RtlSyntaxError, parse
 
     if question.formula is not None:
         try:
             parse(question.formula)
         except RtlSyntaxError as error:
-            raise BadInput(f"this is no formula: {error}") from None
+            raise UserError(f"this is no formula: {error}") from None
     if question.world is None:
         return
     tasks = [suite.tasks[question.task]] if question.task else list(suite.tasks.values())

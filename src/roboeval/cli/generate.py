@@ -39,7 +39,7 @@ from roboeval.cli.output import metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
-    from codebotler.models.base import Settings
+    from codebotler.models.base import SamplingSettings
     from roboeval.evaluation.generate import Pace, Progress
 
 
@@ -63,10 +63,10 @@ def generate(
 
     The same command goes on after any interruption.
     """
-    from codebotler.models.base import Settings
+    from codebotler.models.base import SamplingSettings
     from roboeval.evaluation.generate import Pace
 
-    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
     pace = Pace(concurrency, requests_per_minute, token_budget)
     path = complete(model, out, suite, tasks, num_completions, settings, pace)
     note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
@@ -98,10 +98,10 @@ def run(
 
     The tables are printed, and the same command goes on after any interruption.
     """
-    from codebotler.models.base import Settings
+    from codebotler.models.base import SamplingSettings
     from roboeval.evaluation.generate import Pace
 
-    settings = Settings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
     pace = Pace(concurrency, requests_per_minute, token_budget)
     path = complete(model, out, suite, tasks, num_completions, settings, pace)
     evaluate(
@@ -124,7 +124,7 @@ def complete(
     suite_name: str,
     tasks: str | None,
     num_completions: int,
-    settings: Settings,
+    settings: SamplingSettings,
     pace: Pace,
 ) -> Path:
     """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""

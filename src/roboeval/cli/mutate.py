@@ -58,7 +58,7 @@ def mutate(
 
     Mutants of right programs, wrong as models get them wrong, are run and judged.
     """
-    from codebotler.simulator.engine import Lanes
+    from codebotler.simulator.engine import WorkerPool
     from roboeval.mutation.report import keep
     from roboeval.mutation.trials import mutation_score
 
@@ -68,8 +68,8 @@ def mutate(
     wanted = [known.task(name) for name in dict.fromkeys(names)]
     further = named_programs(also or [], known)
     score = partial(mutation_score, worlds=worlds, most=most, seed=seed, watched=watched)
-    with Lanes(workers or cores()) as lanes:
-        scores = [score(task, known, lanes, further=further.get(task.name, ())) for task in wanted]
+    with WorkerPool(workers or cores()) as pool:
+        scores = [score(task, known, pool, further=further.get(task.name, ())) for task in wanted]
     show_scores(scores, known.name, brief=brief)
     if out is not None:
         keep(scores, out)

@@ -33,12 +33,12 @@ def suite_names(incomplete: str) -> list[str]:
 
 def task_names(context: typer.Context, incomplete: str) -> list[str]:
     """The tasks of the suite that the line names, or of the paper's."""
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from roboeval.suites.load import suite_folder, task_files
 
     try:
         files = task_files(suite_folder(context.params.get("suite") or "paper"))
-    except BadInput:
+    except UserError:
         return []
     return [file.stem for file in files if file.stem.startswith(incomplete)]
 
@@ -138,7 +138,7 @@ def open_run(
     run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
 ) -> Opened:
     """Read a judged run; `see` is called with each line of its verdicts."""
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key
     from roboeval.evaluation.runs.results import read_results
 
@@ -146,14 +146,16 @@ def open_run(
     suite = as_judged(folder, load(suite_name), ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not folder.completions.is_file():
-        raise BadInput("is no run: it holds no completions.jsonl", file=run)
+        raise UserError("is no run: it holds no completions.jsonl", file=run)
     if not folder.rows(key).is_file():
         others = folder.judged_by()
         if others and suite.name not in others:
             judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
-            raise BadInput(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run)
+            raise UserError(
+                f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run
+            )
         again = command("evaluate", run, suite=suite_name, ablated=ablated)
-        raise BadInput(f"has not been judged; `{again}` does it", file=run)
+        raise UserError(f"has not been judged; `{again}` does it", file=run)
     results = read_results(
         folder, key, suite, see=see, watch=lambda lines, total: watched(lines, "reading", total)
     )
@@ -168,15 +170,15 @@ def open_current(
 ) -> Opened:
     """Read a judged run of which every verdict counts.
 
-    Raises BadInput if there is none, or if the programs were changed since.
+    Raises UserError if there is none, or if the programs were changed since.
     """
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
 
     opened = open_run(run, suite_name, ablated=ablated, see=see)
     if (complaint := complaint_of(opened.results)) is not None:
-        raise BadInput(f"{complaint}; `{opened.again} --redo` judges what stands there")
+        raise UserError(f"{complaint}; `{opened.again} --redo` judges what stands there")
     if opened.results.table.is_empty():
-        raise BadInput(f"no completion has been judged; `{opened.again}` goes on", file=run)
+        raise UserError(f"no completion has been judged; `{opened.again}` goes on", file=run)
     if (unfinished := unfinished_of(opened.results)) is not None:
         note(f"{unfinished}, and only these count; `{opened.again}` goes on")
     return opened

@@ -137,7 +137,7 @@ def serve(
 
     They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
     """
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from codebotler.web.place import entrance
     from codebotler.web.serving import serve as serve_page
     from roboeval.web.pages import pages
@@ -145,7 +145,7 @@ def serve(
 
     place, access = entrance(host, port, name or (), token, no_token=no_token)
     if not runs.is_dir():
-        raise BadInput("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
+        raise UserError("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
     suites = [load(each) for each in suite or ()]
     if not RunStore(runs).names():
         note(f"{runs} holds no run yet; those that come are shown, too")

@@ -101,7 +101,7 @@ def suite_data(suite: Suite, only: str | None = None) -> dict[str, Any]:
 
 def other_suites(name: str) -> Iterator[str]:
     """Sentences about the other suites that --suite takes, and about installed ones that are unusable."""
-    from codebotler.core.errors import BadInput
+    from codebotler.core.errors import UserError
     from roboeval.suites.installed import installed_suites
     from roboeval.suites.load import load_suite, shipped_suites
 
@@ -116,7 +116,7 @@ def other_suites(name: str) -> Iterator[str]:
             continue
         try:
             load_suite(suite.name)
-        except BadInput as error:
+        except UserError as error:
             yield str(error)
         else:
             others += [f"{suite.name} ({suite.package})"] * (suite.name != name)

@@ -8,10 +8,10 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from codebotler import __version__
-from codebotler.checking.check import Check, Settings, check_on
+from codebotler.checking.check import Check, CheckSettings, check_on
 from codebotler.core.files import Appender, to_line, to_text, write_whole
-from codebotler.simulator.sampled_robot import Plan
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON, OpenEngine, Work
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.folder import Run, load_head
@@ -43,8 +43,8 @@ def check_programs(
         new = {key: program for key, program in programs.items() if key not in known}
         if not new:
             return
-        plans = {task.name: Plan.of(task.scenarios[0].world) for task in suite.tasks.values()}
-        check = partial(_check, plans, Settings(samples=samples, seed=seed, rules=suite.rules))
+        plans = {task.name: RoomMap.of(task.scenarios[0].world) for task in suite.tasks.values()}
+        check = partial(_check, plans, CheckSettings(samples=samples, seed=seed, rules=suite.rules))
         works = ((task, program) for (task, _), program in new.items())
         with engine as opened:
             for key, problems in zip(new, opened.map_distinct(check, works, _sentences), strict=True):
@@ -61,9 +61,9 @@ def _open(run: Run, metadata: dict[str, Any]) -> Appender:
     return Appender(rows)
 
 
-def _check(plans: Mapping[str, Plan], settings: Settings, lane: Lane, work: Work) -> Check:
+def _check(plans: Mapping[str, RoomMap], settings: CheckSettings, worker: Worker, work: Work) -> Check:
     task, program = work
-    return check_on(lane, program, plans[task], settings)
+    return check_on(worker, program, plans[task], settings)
 
 
 def _sentences(check: Check) -> list[str]:

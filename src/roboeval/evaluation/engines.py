@@ -8,8 +8,8 @@ from contextlib import AbstractContextManager
 from typing import Protocol, Self, TypeAlias, TypeVar
 
 from codebotler.core.arguments import expect_whole
-from codebotler.simulator.engine import Lanes, digest
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.engine import WorkerPool, digest
+from codebotler.simulator.worker import Worker
 
 PYTHON = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
@@ -21,7 +21,7 @@ class Engine(Protocol):
     """Calls functions that run programs isolated."""
 
     def map_distinct(
-        self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
+        self, function: Callable[[Worker, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
         """The values of `then`, in the order of the programs, which are read as needed; equal ones run once.
 
@@ -34,27 +34,29 @@ OpenEngine = AbstractContextManager[Engine]
 
 
 class Local:
-    """The cores of this machine: given lanes, or some of its own, which end with the context."""
+    """The cores of this machine: given pool, or some of its own, which end with the context."""
 
-    def __init__(self, lanes: Lanes | int, *, require_isolation: bool = False) -> None:
-        if not isinstance(lanes, Lanes):
-            expect_whole(lanes, "the number of workers", least=1)
-        self._given, self._required = lanes, require_isolation
+    def __init__(self, pool: WorkerPool | int, *, require_isolation: bool = False) -> None:
+        if not isinstance(pool, WorkerPool):
+            expect_whole(pool, "the number of workers", least=1)
+        self._given, self._required = pool, require_isolation
 
     def __enter__(self) -> Self:
         given = self._given
-        self._lanes = given if isinstance(given, Lanes) else Lanes(given, require_isolation=self._required)
+        self._pool = (
+            given if isinstance(given, WorkerPool) else WorkerPool(given, require_isolation=self._required)
+        )
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._lanes is not self._given:
-            self._lanes.__exit__()
+        if self._pool is not self._given:
+            self._pool.__exit__()
 
     def map_distinct(
-        self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
+        self, function: Callable[[Worker, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
         """See `Engine`."""
-        here = self._lanes.here
-        return self._lanes.map_distinct(
+        here = self._pool.here
+        return self._pool.map_distinct(
             lambda work: function(here(), work), works, name=lambda work: digest(*work), then=then
         )

@@ -9,7 +9,7 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, to_line, to_text, write_whole
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import evaluation, head, judgements
@@ -113,19 +113,19 @@ def _judged_before(
         if completion is None or completion.key != row.key:
             expected = "nothing more" if completion is None else name_of(completion.key)
             sentence = f"judges {name_of(row.key)} where the completions have {expected}"
-            raise BadInput(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
+            raise UserError(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
         if completion.program_sha256 != row.program_sha256:
             sentence = f"the program of {name_of(row.key)} has changed since it was judged"
-            raise BadInput(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
+            raise UserError(f"{sentence}; --redo starts over", file=rows.path, line=line.number)
         yield row
     return seal
 
 
 def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> dict[str, Any]:
-    """The content of KEY.json; raises BadInput if the rows were judged otherwise."""
+    """The content of KEY.json; raises UserError if the rows were judged otherwise."""
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
-            raise BadInput(
+            raise UserError(
                 "is missing, so that nobody knows by what the rows were judged; --redo starts over", file=path
             )
         write_whole(path, to_text(about))
@@ -134,7 +134,7 @@ def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> dict[str,
     for name, now in about.items():
         if was.get(name) != now:
             what = f"{CALLED.get(name, name)} ({_brief(name, was.get(name))}, now {_brief(name, now)})"
-            raise BadInput(f"was judged with another {what}; --redo starts over", file=path)
+            raise UserError(f"was judged with another {what}; --redo starts over", file=path)
     return was
 
 

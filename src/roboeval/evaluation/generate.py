@@ -11,8 +11,16 @@ from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field
 
 from codebotler.core.files import MAX_ROW, Appender, to_line, to_text, write_whole
-from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, Reply, Settings, unheard
-from codebotler.models.rate_limit import Paced
+from codebotler.models.base import (
+    BudgetSpentError,
+    Heard,
+    Model,
+    ModelError,
+    Reply,
+    SamplingSettings,
+    unheard,
+)
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt, prompt_for
 from roboeval.evaluation.requests import (
     GenerationPlan,
@@ -70,7 +78,7 @@ def generate_run(
     run: Run,
     plan: GenerationPlan,
     model: Model,
-    settings: Settings,
+    settings: SamplingSettings,
     pace: Pace,
     *,
     on_progress: Callable[[Progress], None] = lambda _: None,
@@ -150,7 +158,7 @@ class _Generation:
     _synced: int = 0
 
     def __post_init__(self) -> None:
-        self._paced = Paced(_LoggedModel(self.model, self.log), **asdict(self.pace))
+        self._paced = RateLimited(_LoggedModel(self.model, self.log), **asdict(self.pace))
         self._syncing = asyncio.Lock()
 
     async def generate(self, keys: list[Key]) -> None:

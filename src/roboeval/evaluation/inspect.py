@@ -12,7 +12,7 @@ from inspect_ai.dataset import MemoryDataset, Sample
 from inspect_ai.scorer import CORRECT, INCORRECT, Score, Scorer, Target, accuracy, grouped, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
-from codebotler.models.base import Settings
+from codebotler.models.base import SamplingSettings
 from codebotler.prompts import prompt_for
 from codebotler.prompts.extract import program_of
 from codebotler.simulator.pool import warm
@@ -47,7 +47,7 @@ def roboeval(
         worlds: how many worlds to draw, 1 to 10,000, for a suite whose worlds are drawn.
         seed: from which to draw them.
     """
-    our, drawn = Settings(), _suite(suite, worlds, seed)
+    our, drawn = SamplingSettings(), _suite(suite, worlds, seed)
     samples = [
         Sample(
             id=f"{name}/{number}",

@@ -16,13 +16,13 @@ from typing import Any
 from msgspec import to_builtins
 
 from codebotler import __version__
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status, Trace
 from codebotler.core.tracefile import outcome_data
-from codebotler.rtl import CannotJudge, holds
+from codebotler.rtl import Inconclusive, holds
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON, Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown
@@ -56,7 +56,7 @@ def is_met(requirement: Requirement, trace: Trace) -> bool:
     """Whether a trace satisfies a requirement; one that cannot be judged is not satisfied."""
     try:
         return holds(requirement.formula, trace)
-    except CannotJudge:
+    except Inconclusive:
         return False
 
 
@@ -80,10 +80,10 @@ def evaluate(
         ablated: whether to require common sense only; then all tasks have an ablation.
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
-        engine: where programs are run; by default in so many lanes of this machine, started and ended for it.
+        engine: where programs are run; by default in so many pool of this machine, started and ended for it.
 
     Raises:
-        BadInput: there are no workers; or, when it is read, a completion is none or not of the suite.
+        UserError: there are no workers; or, when it is read, a completion is none or not of the suite.
         EngineError: no isolated process can be started.
     """
     chosen = engine or Local(workers, require_isolation=require_isolation)
@@ -122,20 +122,20 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
     if not isinstance(completion, Completion):  # such as a row of a file
         kind = type(completion).__name__
         what = "make it a Completion(task=..., prompt=..., index=..., program=...)"
-        raise BadInput(f"a completion is of the type {kind}; {what}")
+        raise UserError(f"a completion is of the type {kind}; {what}")
     if (problem := unknown(completion.key, suite)) is not None:
-        raise BadInput(problem)
+        raise UserError(problem)
     if ablated and suite.tasks[completion.task].ablation is None:
-        raise BadInput(f'the task "{completion.task}" has no ablation')
+        raise UserError(f'the task "{completion.task}" has no ablation')
 
 
 def run_in_worlds(
-    suite: Suite, lane: Lane, work: tuple[str, str], *, ablated: bool
+    suite: Suite, worker: Worker, work: tuple[str, str], *, ablated: bool
 ) -> tuple[str, Sequence[Outcome]]:
     """Run a program in each world of its task; return the task and how each run ended."""
     task, program = work
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
-    return task, [lane.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios]
+    return task, [worker.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios]
 
 
 def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> Judgement | None:

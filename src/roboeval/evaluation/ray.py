@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.simulator.distinct import MOST_AHEAD, Done
 from codebotler.simulator.engine import NO_SECCOMP, digest
-from codebotler.simulator.worker import EngineError, Lane
+from codebotler.simulator.worker import EngineError, Worker
 from roboeval.evaluation.engines import PYTHON, Ran, Value, Work
 
 LOG = logging.getLogger("roboeval.ray")
@@ -36,7 +36,7 @@ class RayCluster:
     Where there is none, or RAY_ADDRESS is "local", one is started on this machine, which no other machine
     reaches, and ended again. By default twice as many shards are under way as the cluster has cores.
 
-    Raises BadInput if Ray is not installed, or no cluster answers at the address.
+    Raises UserError if Ray is not installed, or no cluster answers at the address.
     """
 
     def __init__(self, workers: int | None = None, *, require_isolation: bool = False) -> None:
@@ -64,7 +64,7 @@ class RayCluster:
         self._ray.shutdown()
 
     def map_distinct(
-        self, function: Callable[[Lane, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
+        self, function: Callable[[Worker, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
         """See `Engine`.
 
@@ -133,8 +133,8 @@ class RayCluster:
         except (OSError, ValueError, OverflowError) as error:
             raise self._no_cluster(str(error)) from None
 
-    def _no_cluster(self, why: str) -> BadInput:
-        return BadInput(
+    def _no_cluster(self, why: str) -> UserError:
+        return UserError(
             f"RAY_ADDRESS: no Ray cluster answers at {self._address} ({why}); start its head with "
             "`ray start --head`, or set RAY_ADDRESS=local to use the cores of this machine"
         )
@@ -146,7 +146,7 @@ def shard_size(sent: int, most: int) -> int:
 
 
 def run_shard(
-    functions: tuple[Callable[[Lane, Work], Ran], Callable[[Ran], Value]],
+    functions: tuple[Callable[[Worker, Work], Ran], Callable[[Ran], Value]],
     works: Sequence[Work],
     versions: str,  # others might judge otherwise
     require_isolation: bool,  # noqa: FBT001 - Ray passes positions
@@ -157,21 +157,21 @@ def run_shard(
         raise EngineError(f"{machine} has {VERSIONS}, and not {versions}")
     function, then = functions
     try:
-        lane = own_lane(require_isolation=require_isolation)
-        values = [then(function(lane, work)) for work in works]
+        worker = own_worker(require_isolation=require_isolation)
+        values = [then(function(worker, work)) for work in works]
     except EngineError as error:
         raise EngineError(f"{machine}: {error}") from None
-    return values, None if lane.has_seccomp else f"{machine}: {NO_SECCOMP}"
+    return values, None if worker.has_seccomp else f"{machine}: {NO_SECCOMP}"
 
 
 @cache
-def own_lane(*, require_isolation: bool) -> Lane:
-    """The lane of this process, kept for the next shard."""
-    lane = Lane()
-    if require_isolation and not lane.has_seccomp:
-        lane.close()
+def own_worker(*, require_isolation: bool) -> Worker:
+    """The worker of this process, kept for the next shard."""
+    worker = Worker()
+    if require_isolation and not worker.has_seccomp:
+        worker.close()
         raise EngineError(NO_SECCOMP)
-    return lane
+    return worker
 
 
 def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types here
@@ -180,5 +180,5 @@ def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types here
     try:
         import ray  # noqa: PLC0415 - an extra, which starts slowly
     except ImportError:
-        raise BadInput("the engine ray needs Ray; pip install 'codebotler[ray]'") from None
+        raise UserError("the engine ray needs Ray; pip install 'codebotler[ray]'") from None
     return ray

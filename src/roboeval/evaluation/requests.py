@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
-from codebotler.models.base import Settings
+from codebotler.models.base import SamplingSettings
 from codebotler.prompts import template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
 from roboeval.evaluation.runs.folder import Run, load_head
@@ -43,13 +43,13 @@ class GenerationPlan:
         return self.suite.tasks[key[0]].prompts[key[1]]
 
     def completed(self, run: Run) -> Iterator[Completion]:
-        """The completions that a run has; raises BadInput if one's instruction is no longer the suite's."""
+        """The completions that a run has; raises UserError if one's instruction is no longer the suite's."""
         if not run.completions.stat().st_size:
             return
         for completion in read_completions(run.completions, self.suite):
             if completion.instruction != self.instruction(completion.key):
                 which = f"{name_of(completion.key)} was generated from another instruction"
-                raise BadInput(f"{which} than the suite has now; name another folder", file=run.completions)
+                raise UserError(f"{which} than the suite has now; name another folder", file=run.completions)
             yield completion
 
 
@@ -67,8 +67,8 @@ def add_usage(total: Counter[str], usage: Mapping[str, int | None] | None) -> No
 # --- run.json
 
 
-def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: Settings) -> dict[str, Any]:
-    """The content of run.json; raises BadInput where completions are there that were generated otherwise."""
+def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: SamplingSettings) -> dict[str, Any]:
+    """The content of run.json; raises UserError where completions are there that were generated otherwise."""
     fixed = {
         "model": model,
         "settings": {name: value for name, value in asdict(settings).items() if name not in WITHOUT_EFFECT},
@@ -89,13 +89,13 @@ def run_metadata(run: Run, plan: GenerationPlan, model: str, settings: Settings)
     if run.about.exists():
         earlier = load_head(run.about)
         if not isinstance(earlier.get("settings"), dict):
-            raise BadInput("holds imported completions; name another folder", file=run.path)
+            raise UserError("holds imported completions; name another folder", file=run.path)
         _expect_same(earlier, fixed, run.about)
         kept = ("started", "ended", "possibly_paid_twice")
         metadata |= {name: earlier.get(name, metadata[name]) for name in kept}
     elif run.completions.exists() and run.completions.stat().st_size:
         why = "is missing, so that the settings of the completions are unknown"
-        raise BadInput(f"{why}; name another folder", file=run.about)
+        raise UserError(f"{why}; name another folder", file=run.about)
     return metadata
 
 
@@ -106,7 +106,7 @@ def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> 
             what = "prompt template" if name == "template" else name.replace("_", "-")
             which = f"another {what} ({_brief(before.get(name))}, now {_brief(value)})"
             sentence = f"the completions were generated with {which}; name another folder to start over"
-            raise BadInput(sentence, file=file)
+            raise UserError(sentence, file=file)
 
 
 def _brief(value: object) -> str:
@@ -177,5 +177,7 @@ class RequestLog:
                 case {"failed": [str(task), int(prompt), int(index)]}:
                     noted.discard((task, prompt, index))
                 case _:
-                    raise BadInput("this line notes no request; delete the file", file=self.path, line=number)
+                    raise UserError(
+                        "this line notes no request; delete the file", file=self.path, line=number
+                    )
         return lost, noted

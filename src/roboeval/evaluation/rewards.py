@@ -13,7 +13,7 @@ from os import PathLike
 from statistics import fmean
 
 from codebotler.core.arguments import expect_texts
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import warm
@@ -55,7 +55,7 @@ def reward(
         suite: a suite, or the name or folder of one.
 
     Raises:
-        BadInput: there is no such suite, task or prompt, its worlds are written by hand or too many, or
+        UserError: there is no such suite, task or prompt, its worlds are written by hand or too many, or
             a program is no text.
         EngineError: no isolated process could be started.
     """
@@ -64,7 +64,7 @@ def reward(
     if worlds is not None or seed is not None:
         chosen = chosen.with_worlds(worlds, seed)
     if (problem := unknown((task, prompt, 0), chosen)) is not None:
-        raise BadInput(problem)
+        raise UserError(problem)
     return REWARDS.of(chosen, task, programs)
 
 
@@ -130,11 +130,11 @@ class Rewards:
 
 
 def judged(suite: Suite, task: str, program: str) -> float:
-    """The reward of a program, in a thread that has a lane."""
-    lane = warm().here()
+    """The reward of a program, in a thread that has a worker."""
+    worker = warm().here()
     shares = []
     for scenario in suite.tasks[task].scenarios:
-        outcome = lane.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
+        outcome = worker.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
         shares.append(Share.of(outcome, scenario))
     return total(shares)
 

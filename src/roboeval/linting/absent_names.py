@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from codebotler.core.syntaxtree import parse_expression
 from codebotler.core.world import Room
-from codebotler.rtl import Element, Regex
+from codebotler.rtl import EventPattern, Regex
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import patterns
@@ -63,7 +63,7 @@ def _is_among(pattern: str, labels: Iterable[str]) -> bool:
 # --- people
 
 
-def _mentioned(element: Element, task: Task) -> Iterator[str]:
+def _mentioned(element: EventPattern, task: Task) -> Iterator[str]:
     """The names of people of the task that stand in what is said or asked."""
     texts = (text for text in (element.text, element.options) if text is not None)
     found = " | ".join(pattern for text in texts for pattern in patterns(text)).lower()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, TypeAlias
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import World
-from codebotler.simulator.engine import Lanes, digest
+from codebotler.simulator.engine import WorkerPool, digest
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judge
@@ -28,7 +28,7 @@ Watch: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # passes 
 def mutation_score(
     task: Task,
     suite: Suite,
-    lanes: Lanes,
+    pool: WorkerPool,
     *,
     further: Iterable[Original] = (),
     worlds: int | None = None,
@@ -38,12 +38,12 @@ def mutation_score(
 ) -> MutationScore:
     """Run the solutions of a task and further originals, make mutants of the right ones, and try these.
 
-    Raises BadInput if a number of worlds is given, but the suite's are written by hand.
+    Raises UserError if a number of worlds is given, but the suite's are written by hand.
     """
     scenarios = worlds_of(suite, task, worlds, seed)
 
     def run(program: str, world: World) -> Outcome:
-        return lanes.here().run(program, lambda: SimulatedRobot(world, suite.rules))
+        return pool.here().run(program, lambda: SimulatedRobot(world, suite.rules))
 
     def outcomes(original: Original) -> tuple[Outcome, ...]:
         return tuple(run(original.program, scenario.world) for scenario in scenarios)
@@ -56,13 +56,13 @@ def mutation_score(
 
     equivalent = equivalent_mutants(task)
     programs = originals(task, further)
-    ran = lanes.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
+    ran = pool.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
     before = dict(zip(programs, watched(ran, f"running {task.name}", len(programs)), strict=True))
     faults = {original: fault_in(before[original], scenarios) for original in programs}
     right = tuple(original for original in programs if faults[original] is None)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
     made = drawn(mutants(right, context), most, seed)
-    tried = lanes.map_distinct(result, made, name=lambda mutant: digest(mutant.program))
+    tried = pool.map_distinct(result, made, name=lambda mutant: digest(mutant.program))
     results = watched(tried, f"mutating {task.name}", len(made))
     return MutationScore(
         task=task.name,
@@ -78,7 +78,7 @@ def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[S
     if suite.worlds is not None:
         return suite.with_worlds(count or WORLDS, seed + 1 + (suite.seed or 0)).tasks[task.name].scenarios
     if count is not None:
-        raise BadInput(
+        raise UserError(
             f'the worlds of the suite "{suite.name}" are written out, and no further ones can be made; '
             "leave --worlds out"
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.analysis.cost import MILLION, Price, budgets, spent
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resampled
@@ -88,9 +88,9 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
         except (ValueError, TypeError):
             price = Price(-1.0, -1.0)
         if not model or not all(0 <= number < MILLION for number in price):
-            raise BadInput(f'"{text}" is no price; write MODEL=INPUT/OUTPUT, of a million tokens each')
+            raise UserError(f'"{text}" is no price; write MODEL=INPUT/OUTPUT, of a million tokens each')
         if model in prices:
-            raise BadInput(f'--price names "{model}" twice; give one price')
+            raise UserError(f'--price names "{model}" twice; give one price')
         prices[model] = price
     return prices
 
@@ -105,4 +105,4 @@ def expect_known(prices: Mapping[str, Price], runs: Sequence[JudgedRun]) -> None
     for model, price in prices.items():
         if not any(price_of(run, {model: price}) for run in runs):
             names = ", ".join(run.name for run in runs)
-            raise BadInput(f'--price names "{model}", but the runs are {names}')
+            raise UserError(f'--price names "{model}", but the runs are {names}')

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, combinations
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.analysis.compare import compared, told_of, unlike, verdict
 from roboeval.analysis.metrics import by_formula, share_at_least, threshold_curve
 from roboeval.analysis.statistics import FEW, by_bootstrap
@@ -89,7 +89,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
     for first, second in _pairs(runs):
         try:
             found = compared(first.by_prompt, second.by_prompt)
-        except BadInput:  # no prompt in common
+        except UserError:  # no prompt in common
             continue
         if len(said) < MOST_PAIRS:
             said.append(verdict(found, (first.name, second.name)))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.analysis.cost import Price
 from roboeval.evaluation.runs.completions import how_many
@@ -113,7 +113,7 @@ def write_report(title: str, lead: Sequence[str], sections: Sequence[Section], o
         for name in ("figures", "tables"):
             (out / name).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(f"cannot be made ({error.strerror})", file=out) from None
+        raise UserError(f"cannot be made ({error.strerror})", file=out) from None
     if not (out / PAGE).exists():
         write_whole(out / PAGE, page(title, UNFINISHED, [], {}).encode())
     drawn: dict[str, Drawn] = {}
@@ -135,7 +135,7 @@ def expect_no_others(out: Path) -> None:
         return
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
     if others and not _is_report(out / PAGE):
-        raise BadInput(
+        raise UserError(
             f'is no report, but holds other files, such as "{others[0]}"; name a new folder', file=out
         )
 

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 
 
 class InstalledSuite(NamedTuple):
@@ -29,7 +29,7 @@ class InstalledSuite(NamedTuple):
             if (folder / "suite.yaml").is_file():
                 return folder
         missing = f"there is no suite.yaml in {found[0]}" if found else f'there is no package "{top}"'
-        raise BadInput(
+        raise UserError(
             f'the package {self.package} says that its suite "{self.name}" is {self.place}, but {missing}; '
             "install it again, or name a folder with --suite"
         )
@@ -47,19 +47,19 @@ def installed_suites() -> list[InstalledSuite]:
 def installed_folder(name: str) -> Path | None:
     """The folder of a suite that a package brings; None if no package does.
 
-    Raises BadInput if several packages bring one, or a folder here has the same name.
+    Raises UserError if several packages bring one, or a folder here has the same name.
     """
     suites = [suite for suite in installed_suites() if suite.name == name]
     if not suites:
         return None
     if len(suites) > 1:
         packages = " and ".join(f"{suite.package} ({suite.place})" for suite in suites)
-        raise BadInput(
+        raise UserError(
             f'several packages have a suite "{name}": {packages}; uninstall all but one, '
             "or name a folder with --suite"
         )
     if (Path(name) / "suite.yaml").is_file():
-        raise BadInput(
+        raise UserError(
             f'"{name}" is a suite of the package {suites[0].package} and a folder here; '
             f"write ./{name} for the folder, or go elsewhere for the package"
         )

@@ -12,7 +12,7 @@ from os import PathLike
 from pathlib import Path
 
 from codebotler.core.arguments import expect_whole
-from codebotler.core.errors import BadInput, YamlFile
+from codebotler.core.errors import UserError, YamlFile
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.words import counted
 from codebotler.simulator.rules import Rules
@@ -83,10 +83,10 @@ class Suite:
             seed: from which to draw them; the same as now by default.
 
         Raises:
-            BadInput: its worlds are written by hand, or the number of worlds is out of its range.
+            UserError: its worlds are written by hand, or the number of worlds is out of its range.
         """
         if self.worlds is None or self.folder is None:
-            raise BadInput(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
+            raise UserError(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
         if count is not None:
             expect_whole(count, "the number of worlds", least=1, most=MOST_WORLDS)
         return _read_suite(
@@ -103,11 +103,11 @@ class Suite:
         """A task by name.
 
         Raises:
-            BadInput: there is none.
+            UserError: there is none.
         """
         if name not in self.tasks:
             known = ", ".join(self.tasks)
-            raise BadInput(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
+            raise UserError(f'the suite "{self.name}" has no task "{name}"; its tasks are {known}')
         return self.tasks[name]
 
 
@@ -119,7 +119,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
         skills: what can stand in formulas.
 
     Raises:
-        BadInput: there is no such suite, or one of its files is wrong.
+        UserError: there is no such suite, or one of its files is wrong.
     """
     name = str(name)
     folder = suite_folder(name)
@@ -144,7 +144,7 @@ def suite_folder(name: str) -> Path:
     folder = Path(name)
     if not (folder / "suite.yaml").is_file():
         known = ", ".join(dict.fromkeys([*shipped_suites(), *(suite.name for suite in installed_suites())]))
-        raise BadInput(f'there is no suite "{name}": neither one of {known} nor a folder with a suite.yaml')
+        raise UserError(f'there is no suite "{name}": neither one of {known} nor a folder with a suite.yaml')
     return folder.resolve()
 
 
@@ -179,7 +179,7 @@ def _suite_of(
         raise file.wrong(sentence, "name")
     paths = task_files(folder)
     if not paths:
-        raise BadInput("the suite has no tasks; put one file a task there", file=folder / "tasks")
+        raise UserError("the suite has no tasks; put one file a task there", file=folder / "tasks")
     count, seed = count or head.worlds, head.seed if seed is None else seed
     documents = [YamlFile.read(path) for path in paths]
     words = head.rules.words_for_people

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.suites.load import ABLATED, shipped_suites
 
@@ -15,14 +15,14 @@ _TEMPLATE = Path(__file__).parent / "template"
 def new_task(folder: Path, name: str) -> Path:
     """Write the files of a new task, and of the suite if there is none; existing solutions stay."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
-        raise BadInput(
+        raise UserError(
             f'"{name}" is no name for a task; write words together, each with a capital, such as WaterPlants'
         )
     if (folder.resolve().parent / "suite.yaml").exists():
-        raise BadInput("lies within a suite; name the folder around it", file=folder)
+        raise UserError("lies within a suite; name the folder around it", file=folder)
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
-        raise BadInput("is there already; choose another name, or edit it", file=path)
+        raise UserError("is there already; choose another name, or edit it", file=path)
     files = {
         folder / "suite.yaml": ("new-suite.yaml", _suite_name(folder)),
         folder / "solutions" / path.name: ("new-solutions.yaml", ""),
@@ -33,7 +33,7 @@ def new_task(folder: Path, name: str) -> Path:
             if not file.exists():
                 write_whole(file, (_TEMPLATE / template).read_text().replace("NAME", put).encode())
     except OSError as error:
-        raise BadInput(f"cannot be written ({error.strerror})", file=error.filename) from None
+        raise UserError(f"cannot be written ({error.strerror})", file=error.filename) from None
     return path
 
 

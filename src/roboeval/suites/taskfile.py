@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.core.errors import BadInput, Place, YamlFile
+from codebotler.core.errors import Place, UserError, YamlFile
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.syntaxtree import parse_expression
 from codebotler.core.world import expect_regex
@@ -46,7 +46,7 @@ def read_task(
         words: for people; `{people}` in a check of drawn worlds is one of them or the name of somebody there.
 
     Raises:
-        BadInput: it is wrong; the sentence names the line and the mend.
+        UserError: it is wrong; the sentence names the line and the mend.
     """
     data = _borrowed(file, lender)
     drawn = isinstance(data, dict) and isinstance(data.get("worlds"), dict)
@@ -130,7 +130,7 @@ class _Reader:
         self.checks.update((check.name, check) for check in map(self._check, self.form.checks))
 
     def _check(self, head: str) -> Check:
-        def wrong(sentence: str, *place: str) -> BadInput:
+        def wrong(sentence: str, *place: str) -> UserError:
             return self.file.wrong(sentence, "checks", head, *place)
 
         match, body = _HEAD.fullmatch(head), self.form.checks[head]
@@ -198,7 +198,7 @@ class _Reader:
             formula = parse(f"not ({rtl})" if bare != text.strip() else rtl, skills=self.skills)
         except RtlSyntaxError as error:
             sentence = f'the check "{name}" is no valid formula ({error})'
-            raise BadInput(sentence, file=self.file.name, line=check.line) from None
+            raise UserError(sentence, file=self.file.name, line=check.line) from None
         return Requirement(text, name, formula, check.category, self.file.line(at))
 
     def _call(self, text: str, bare: str, at: Place) -> tuple[str, list[str]]:

@@ -10,7 +10,7 @@ from typing import Annotated, TypeAlias
 from fastapi import APIRouter, Depends, HTTPException, Query
 from fastapi.responses import Response
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.completions import name_of
 from roboeval.web.run_store import RunGoneError, RunStore
 from roboeval.web.serializers import RunList, completion_details, entry_data, run_details
@@ -82,5 +82,5 @@ def _refusing() -> Iterator[None]:
         yield
     except RunGoneError as error:
         raise HTTPException(404, error.sentence) from None
-    except BadInput as error:
+    except UserError as error:
         raise HTTPException(422, str(error).encode(errors="replace").decode()) from None

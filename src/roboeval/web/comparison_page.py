@@ -8,7 +8,7 @@ from typing import Any
 
 from nicegui import html, ui
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.web.elements import Words
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
@@ -67,7 +67,7 @@ class _Comparison:
         for name in self._names:
             try:
                 runs.append(self._store.open(name))
-            except BadInput as error:
+            except UserError as error:
                 troubles.append(error.sentence)
         heads = [run.results.head for run in runs if run.judged]
         judged_by = {tuple(str(head.get(part)) for part in ("suite", "digest", "ablation")) for head in heads}

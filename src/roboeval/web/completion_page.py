@@ -10,7 +10,7 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.checking.storyboard import step_text
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.core.world import World
 from codebotler.web.elements import Words
@@ -47,7 +47,7 @@ def _read(store: RunStore, run: str, name: str, evaluation: str | None) -> tuple
     snapshot = store.open(run, evaluation)
     row = snapshot.row(name)
     if row is None:
-        raise BadInput(f'this run has no completion "{shortened(name, MOST_NAME)}"')
+        raise UserError(f'this run has no completion "{shortened(name, MOST_NAME)}"')
     return snapshot, completion_details(snapshot, row)
 
 

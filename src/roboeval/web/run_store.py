@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, shortened
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, read_results
@@ -26,7 +26,7 @@ OUTSIDE = "leads out of the folder of runs, so it is not read"
 Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 
 
-class RunGoneError(BadInput):
+class RunGoneError(UserError):
     """A run that is not there any more."""
 
 
@@ -57,7 +57,7 @@ class RunStore:
             known = {*shipped_suites(), *(brought.name for brought in installed_suites())}
             try:
                 self._suites[name] = load_suite(name) if name in known else None
-            except BadInput as error:
+            except UserError as error:
                 note(f"a suite is left out: {error}")
                 self._suites[name] = None
         return self._suites[name]
@@ -71,19 +71,19 @@ class RunStore:
         except FileNotFoundError:
             return {}
         except OSError as error:
-            raise BadInput(f"cannot be read ({error.strerror})", file=self.folder) from None
+            raise UserError(f"cannot be read ({error.strerror})", file=self.folder) from None
 
     def _reader(self, name: str, key: str | None) -> _Reader:
         path = self._folders().get(name)  # letter by letter, so that no name leads anywhere else
         if path is None or not _is_run(path):
             raise RunGoneError(f'there is no run "{shortened(name)}" in this folder; perhaps it was deleted')
         if not path.resolve().is_relative_to(self.folder.resolve()):
-            raise BadInput(f'"{shortened(name)}" {OUTSIDE}')
+            raise UserError(f'"{shortened(name)}" {OUTSIDE}')
         run = Run(path)
         keys = (path.stem for path in run.rows("").parent.glob("*.jsonl"))
         known = tuple(sorted(keys, key=lambda one: (one.endswith(ABLATED), one)))
         if key is not None and key not in known:
-            raise BadInput(f'"{shortened(name)}" has no evaluation "{shortened(key)}"')
+            raise UserError(f'"{shortened(name)}" has no evaluation "{shortened(key)}"')
         key = key or next(iter(known), None)
         with self._lock:
             reader = self._readers.setdefault((name, key), _Reader(self, run, key))
@@ -139,7 +139,7 @@ class _Reader:
         return tuple(_stamp(path, within) for path in paths)
 
     def _read_files(self) -> Results:
-        faults: list[BadInput] = []
+        faults: list[UserError] = []
         results = read_results(self._run, self._key, keep_failed=False, faults=faults)
         there = tuple(fault for fault in faults if Path(str(fault.file)).exists())  # a new run lacks files
         name = results.head.get("suite") or results.about.get("suite")
@@ -155,9 +155,9 @@ def _stamp(path: Path, within: Path) -> tuple[int, ...] | None:
     except OSError:
         return None
     if not found.is_relative_to(within):
-        raise BadInput(OUTSIDE, file=path.name)
+        raise UserError(OUTSIDE, file=path.name)
     if not stat.S_ISREG(status.st_mode):
-        raise BadInput("is no file", file=path.name)
+        raise UserError("is no file", file=path.name)
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 from nicegui import html, ui
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.pasted import runnable
 from codebotler.core.terminal import shortened
 from codebotler.web.elements import Press, Words
@@ -78,7 +78,7 @@ class _Table:
         """Show the runs as they are now."""
         try:
             data = await asyncio.to_thread(self._runs.data, READ_FOR)
-        except BadInput as error:
+        except UserError as error:
             self._trouble.say(str(error))
         else:
             self._trouble.say("")

@@ -10,7 +10,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import GONE, completion_data
@@ -87,7 +87,7 @@ def _wanted(about: Mapping[str, Any], suite: Suite | None) -> int | None:
 def notes(run: Snapshot) -> list[str]:
     """What is wrong with a run, in sentences."""
     results, stale = run.results, len(run.results.stale)
-    faults = [BadInput(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
+    faults = [UserError(f.sentence, file=Path(str(f.file)).name, line=f.line) for f in results.faults]
     found = [str(fault) for fault in faults[:MOST_FAULTS]]
     if len(faults) > MOST_FAULTS:
         found.append(f"{len(faults) - MOST_FAULTS:,} more lines are damaged.")
@@ -126,7 +126,7 @@ class RunList:
                 run = self._store.open(name)
                 data = run_data(run)
                 self._known[name] = run.version, data
-        except BadInput as error:
+        except UserError as error:
             return {**unread, "state": State.UNREADABLE, "notes": [str(error)]}
         return data
 
@@ -186,9 +186,9 @@ def completion_details(run: Snapshot, row: Mapping[str, Any]) -> dict[str, Any]:
     judged = results.row(key)
     try:
         data = completion_data(judged, completion, run.suite, ablated=results.is_ablated)
-    except (BadInput, KeyError, TypeError, IndexError, AttributeError, ValueError):
+    except (UserError, KeyError, TypeError, IndexError, AttributeError, ValueError):
         what = f"the row of {shortened(name_of(key), MOST_NAME)} is damaged; --redo judges it again"
-        raise BadInput(what, file=results.run.rows(results.key or "").name) from None
+        raise UserError(what, file=results.run.rows(results.key or "").name) from None
     if run.suite is None:
         for world in data["worlds"]:
             for check in world["failed_checks"]:

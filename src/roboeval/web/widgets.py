@@ -11,7 +11,7 @@ from typing import Any
 from nicegui import html, ui
 from nicegui.element import Element
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.web.elements import Words
@@ -32,7 +32,7 @@ def page_of(frame: Frame, title: str) -> Iterator[None]:
     with ui.element("div").classes("benchmark"):
         try:
             yield
-        except BadInput as error:
+        except UserError as error:
             Words("p", error.sentence, "trouble").props("role=alert")
             html.a("All runs", href="/runs")
 

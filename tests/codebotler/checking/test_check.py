@@ -6,29 +6,29 @@ from collections.abc import Iterator
 
 import pytest
 
-from codebotler.checking.check import MORE, Check, Sample, Settings, check, check_on
-from codebotler.core.errors import BadInput
+from codebotler.checking.check import MORE, Check, CheckSettings, Sample, check, check_on
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
-from codebotler.simulator.engine import Lanes
-from codebotler.simulator.fact_sampler import Lot
-from codebotler.simulator.sampled_robot import Plan
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.worker import Worker
 
 ROOMS = ("start_loc", "kitchen", "alice's office", "bob's office")
 START = "def task_program():\n    "
 
 
 @pytest.fixture(scope="module")
-def lanes() -> Iterator[Lanes]:
-    with Lanes(1) as started:
+def pool() -> Iterator[WorkerPool]:
+    with WorkerPool(1) as started:
         yield started
 
 
 class Checks:
-    """Checks bodies of `task_program` on lanes that stay open."""
+    """Checks bodies of `task_program` on pool that stay open."""
 
-    def __init__(self, lanes: Lanes) -> None:
-        self.lanes = lanes
+    def __init__(self, pool: WorkerPool) -> None:
+        self.pool = pool
 
     def __call__(
         self,
@@ -39,15 +39,15 @@ class Checks:
         strict: bool = False,
     ) -> Check:
         source = START + "\n    ".join(lines) + "\n"
-        return check(source, rooms=rooms, samples=samples, seed=seed, strict=strict, lanes=self.lanes)
+        return check(source, rooms=rooms, samples=samples, seed=seed, strict=strict, pool=self.pool)
 
     def kinds(self, *lines: str, strict: bool = False) -> list[tuple[int | None, str]]:
         return [(problem.line, problem.kind) for problem in self(*lines, strict=strict).problems]
 
 
 @pytest.fixture(scope="module")
-def checks(lanes: Lanes) -> Checks:
-    return Checks(lanes)
+def checks(pool: WorkerPool) -> Checks:
+    return Checks(pool)
 
 
 # --- what counts
@@ -157,7 +157,7 @@ def test_what_is_so_in_every_world_is_not_told(checks: Checks) -> None:
     always = next(
         name
         for name in map(str, range(10_000))
-        if all(Lot(0, n).is_there("start_loc", name) for n in range(8))
+        if all(FactSampler(0, n).is_there("start_loc", name) for n in range(8))
     )
     found = checks(
         f"is_in_room('{always}')",
@@ -181,8 +181,8 @@ def test_a_program_that_does_not_parse_is_not_run(checks: Checks) -> None:
     assert checks("say(").samples == ()
 
 
-def test_a_program_without_a_task_is_told_so_once(lanes: Lanes) -> None:
-    (problem,) = check("x = 1\n", rooms=ROOMS, lanes=lanes).problems
+def test_a_program_without_a_task_is_told_so_once(pool: WorkerPool) -> None:
+    (problem,) = check("x = 1\n", rooms=ROOMS, pool=pool).problems
     assert (problem.kind, problem.line) == ("NameError", None)
 
 
@@ -244,13 +244,13 @@ def test_waiting_at_several_lines_is_one_problem(checks: Checks) -> None:
 
 
 def test_what_waits_for_ever_without_a_look_is_run_once() -> None:
-    known: dict[Plan, list[Sample]] = {}
-    plan = Plan(ROOMS, ROOMS[0])
-    lane = Lane()
+    known: dict[RoomMap, list[Sample]] = {}
+    plan = RoomMap(ROOMS, ROOMS[0])
+    worker = Worker()
     try:
-        found = check_on(lane, START + "while True:\n        time.sleep(1)\n", plan, known=known)
+        found = check_on(worker, START + "while True:\n        time.sleep(1)\n", plan, known=known)
     finally:
-        lane.close()
+        worker.close()
     assert len(known[plan]) == 1
     assert len(found.samples) == 5
     assert "imagined worlds" not in found.problems[0].message
@@ -305,11 +305,11 @@ def test_a_program_that_visits_every_room_has_some_to_visit(checks: Checks) -> N
     assert found.rooms == ("lab", "room 1", "room 2", "start_loc")
 
 
-def test_where_the_robot_starts(lanes: Lanes) -> None:
+def test_where_the_robot_starts(pool: WorkerPool) -> None:
     source = START + "say(get_current_location())\n"
 
     def said(rooms: tuple[str, ...], start: str | None = None) -> str:
-        return check(source, rooms=rooms, start=start, lanes=lanes).samples[0].outcome.trace[0].text
+        return check(source, rooms=rooms, start=start, pool=pool).samples[0].outcome.trace[0].text
 
     assert said(ROOMS) == "start_loc"
     assert said(("lab", "start_loc")) == "start_loc"
@@ -317,14 +317,14 @@ def test_where_the_robot_starts(lanes: Lanes) -> None:
     assert said(("lab", "hall"), "hall") == "hall"
     assert said(()) == "start_loc"
     assert said((), "hall") == "hall"
-    assert check(source, start="hall", lanes=lanes).plan.start == "hall"
-    with pytest.raises(BadInput, match=r'"hal".* lab, hall$'):
+    assert check(source, start="hall", pool=pool).plan.start == "hall"
+    with pytest.raises(UserError, match=r'"hal".* lab, hall$'):
         said(("lab", "hall"), "hal")
 
 
-def test_a_room_that_is_no_regex_is_refused(lanes: Lanes) -> None:
-    with pytest.raises(BadInput, match=r'"c\+\+ \("'):
-        check(START + "pass", rooms=["c++ ("], lanes=lanes)
+def test_a_room_that_is_no_regex_is_refused(pool: WorkerPool) -> None:
+    with pytest.raises(UserError, match=r'"c\+\+ \("'):
+        check(START + "pass", rooms=["c++ ("], pool=pool)
 
 
 # --- equal checks
@@ -345,12 +345,12 @@ def test_the_number_of_workers_changes_nothing() -> None:
         json.dumps(check(source, rooms=ROOMS, seed=4, workers=workers).data()) for workers in (1, 2, 3)
     ]
     assert written[0] == written[1] == written[2]
-    lane = Lane()
+    worker = Worker()
     try:
-        settings = Settings(seed=4)
-        assert json.dumps(check_on(lane, source, Plan(ROOMS, ROOMS[0]), settings).data()) == written[0]
+        settings = CheckSettings(seed=4)
+        assert json.dumps(check_on(worker, source, RoomMap(ROOMS, ROOMS[0]), settings).data()) == written[0]
     finally:
-        lane.close()
+        worker.close()
 
 
 def test_other_seeds_draw_other_worlds_and_the_same_seed_the_same(checks: Checks) -> None:
@@ -361,15 +361,15 @@ def test_other_seeds_draw_other_worlds_and_the_same_seed_the_same(checks: Checks
 
 def test_runs_that_are_known_change_nothing() -> None:
     source = START + "\n    ".join(WAITS) + "\n"
-    known: dict[Plan, list[Sample]] = {}
-    plan = Plan(ROOMS, ROOMS[0])
-    lane = Lane()
+    known: dict[RoomMap, list[Sample]] = {}
+    plan = RoomMap(ROOMS, ROOMS[0])
+    worker = Worker()
     try:
         for seed in range(6):
-            alone = check_on(lane, source, plan, Settings(seed=seed))
-            assert check_on(lane, source, plan, Settings(seed=seed), known) == alone
+            alone = check_on(worker, source, plan, CheckSettings(seed=seed))
+            assert check_on(worker, source, plan, CheckSettings(seed=seed), known) == alone
     finally:
-        lane.close()
+        worker.close()
     assert len(known[plan]) == 2
 
 

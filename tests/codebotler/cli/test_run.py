@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.home import home
 from codebotler.models.recorded import recorded_model
 from command_line import Ended, command
@@ -368,7 +368,7 @@ def test_home_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None
     for name in ("CODEBOTLER_HOME", "XDG_STATE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(os, "getuid", lambda: 2**31 - 7)
-    with pytest.raises(BadInput, match="CODEBOTLER_HOME"):
+    with pytest.raises(UserError, match="CODEBOTLER_HOME"):
         home()
 
 

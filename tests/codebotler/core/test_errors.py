@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.errors import MAX_BYTES, BadInput, YamlFile, read_text, text_of
+from codebotler.core.errors import MAX_BYTES, UserError, YamlFile, read_text, text_of
 
 
 class Inner(BaseModel):
@@ -24,17 +24,17 @@ class Outer(BaseModel):
     words: dict[str, str] = {}
 
 
-def error_about(text: str) -> BadInput:
-    with pytest.raises(BadInput) as caught:
+def error_about(text: str) -> UserError:
+    with pytest.raises(UserError) as caught:
         YamlFile(text, "w.yaml").validate(Outer)
     assert caught.value.file == "w.yaml"
     return caught.value
 
 
 def test_error_names_the_file_and_the_line_where_there_are_any() -> None:
-    assert str(BadInput("is wrong")) == "is wrong"
-    assert str(BadInput("is wrong", file="a.yaml")) == "a.yaml: is wrong"
-    assert str(BadInput("is wrong", file=Path("a.yaml"), line=3)) == "a.yaml, line 3: is wrong"
+    assert str(UserError("is wrong")) == "is wrong"
+    assert str(UserError("is wrong", file="a.yaml")) == "a.yaml: is wrong"
+    assert str(UserError("is wrong", file=Path("a.yaml"), line=3)) == "a.yaml, line 3: is wrong"
 
 
 def too_large(first: str, last: str) -> list[str]:
@@ -143,16 +143,16 @@ def test_anchors_that_explode_are_refused_in_a_sentence() -> None:
 
 
 def test_a_sentence_is_short_and_one_line() -> None:
-    error = BadInput("a\nb" + "c" * 10_000, file="a.yaml", line=1)
+    error = UserError("a\nb" + "c" * 10_000, file="a.yaml", line=1)
     assert str(error) == "a.yaml, line 1: a b" + "c" * 297 + " ... " + "c" * 300
 
 
 def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpreter() -> None:
     code = (
-        "from codebotler.core.errors import YamlFile, BadInput\n"
+        "from codebotler.core.errors import YamlFile, UserError\n"
         "try:\n"
         "    YamlFile('[' * 1_000_000, 'w.yaml')\n"
-        "except BadInput as error:\n"
+        "except UserError as error:\n"
         "    print(error)\n"
     )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -181,7 +181,7 @@ def test_part_of_a_file_is_validated_where_it_stands() -> None:
     file = YamlFile("- {name: a}\n- {name: 3}\n", "w.yaml")
     assert isinstance(file.data, list)
     assert file.validate(Inner, file.data[0], at=(0,)) == Inner(name="a")
-    with pytest.raises(BadInput, match='"name"') as error:
+    with pytest.raises(UserError, match='"name"') as error:
         file.validate(Inner, file.data[1], at=(1,))
     assert (error.value.file, error.value.line) == ("w.yaml", 2)
 
@@ -192,7 +192,7 @@ def test_byte_order_mark_is_no_part_of_the_text() -> None:
 
 def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_path: Path) -> None:
     def refused(path: Path, fault: str, line: int | None = None) -> None:
-        with pytest.raises(BadInput, match=re.escape(fault)) as caught:
+        with pytest.raises(UserError, match=re.escape(fault)) as caught:
             YamlFile.read(path)
         assert (caught.value.file, caught.value.line) == (path, line)
 
@@ -208,7 +208,7 @@ def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_pa
 
 
 def test_file_without_an_end_is_too_large_instead_of_being_read_for_ever() -> None:
-    with pytest.raises(BadInput, match=r"/dev/zero: .*\b10 bytes"):
+    with pytest.raises(UserError, match=r"/dev/zero: .*\b10 bytes"):
         read_text(Path("/dev/zero"), limit=10)
 
 
@@ -217,5 +217,5 @@ def test_line_ends_of_every_system_are_read_as_one(tmp_path: Path) -> None:
     path.write_bytes("ä\r\nb\rc\n".encode())
     assert read_text(path) == "ä\nb\nc\n"
     assert read_text(path, limit=8) == "ä\nb\nc\n"
-    with pytest.raises(BadInput, match="7 bytes"):
+    with pytest.raises(UserError, match="7 bytes"):
         read_text(path, limit=7)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.home import make_folder
 
 NOBODY = 65534
@@ -25,7 +25,7 @@ def test_a_folder_in_which_nothing_can_be_written_is_said() -> None:
         user = os.geteuid()
         os.seteuid(user or NOBODY)  # root may write everywhere
         try:
-            with pytest.raises(BadInput, match="CODEBOTLER_HOME") as error:
+            with pytest.raises(UserError, match="CODEBOTLER_HOME") as error:
                 make_folder(folder)
             assert error.value.file == folder
         finally:

@@ -21,7 +21,7 @@ import roboeval
 from codebotler.cli.app import app
 from codebotler.cli.ending import obey
 from codebotler.core import terminal
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.models.base import ModelError
 
 EVIL = "a\x1b]0;owned\x07\x1b[2J\x9b31m\u202eb\tc\x7f"
@@ -78,7 +78,7 @@ WAYS: dict[str, Callable[[str], object]] = {
     "a drawing": lambda text: terminal.print_rich(Text(text)),
     "a line": lambda text: terminal.console(highlight=False).print(text, markup=False),
     "what goes on": busy,
-    "a refusal": lambda text: refuse(BadInput(text)),
+    "a refusal": lambda text: refuse(UserError(text)),
     "a model's error": lambda text: refuse(ModelError(text, may_pass=False)),
     "a file's name": lambda text: refuse(FileNotFoundError(2, "No such file", text)),
     "a log": lambda text: logging.getLogger("anybody").warning(text),

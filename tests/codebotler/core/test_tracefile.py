@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.core.tracefile import outcome_data, outcome_yaml, read_outcome, trace_data, trace_from
 
@@ -91,7 +91,7 @@ def test_a_wrong_file_gets_a_sentence(
     assert old in GOOD
     path = tmp_path / "o.yaml"
     path.write_text(GOOD.replace(old, new))
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(UserError) as caught:
         read_outcome(path)
     assert (caught.value.file, caught.value.line) == (path, line)
     assert all(name in caught.value.sentence for name in named), caught.value
@@ -101,9 +101,9 @@ def test_a_wrong_file_gets_a_sentence(
 def test_events_of_further_skills_are_read_where_they_may_stand() -> None:
     data = [["wave", "kim"], ["smell", "tea", True], ["vote", "q", ["a"], "a"], ["say", "hi"]]
     assert trace_data(trace_from(data, further=True)) == data
-    with pytest.raises(BadInput, match=r'"wave" .*check, goto, ask, say, '):
+    with pytest.raises(UserError, match=r'"wave" .*check, goto, ask, say, '):
         trace_from(data)
-    with pytest.raises(BadInput, match=r"\['wave', 3\]"):
+    with pytest.raises(UserError, match=r"\['wave', 3\]"):
         trace_from([["wave", 3]], further=True)
-    with pytest.raises(BadInput, match=r"\['ask', 'q'\] .*\[ask, question, "):
+    with pytest.raises(UserError, match=r"\['ask', 'q'\] .*\[ask, question, "):
         trace_from([["ask", "q"]], further=True)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.errors import BadInput, YamlFile
+from codebotler.core.errors import UserError, YamlFile
 from codebotler.core.unwarned import unwarned
 from codebotler.core.world import HALLWAY, Person, Room, World, WorldFile, laid_out
 
@@ -57,7 +57,7 @@ def test_a_point_on_a_slanted_edge_is_within(shift: float) -> None:
     ends = shift, shift + 0.7
     assert read(room.format(*ends, shift + 0.7 / 3, 0.1)).rooms[0].stand_at
     assert read(room.format(*ends, shift + 0.7, 0.3)).rooms[0].stand_at
-    with pytest.raises(BadInput, match="outside"):
+    with pytest.raises(UserError, match="outside"):
         read(room.format(*ends, shift + 0.7 / 3 + 0.001, 0.1))
 
 
@@ -175,7 +175,7 @@ def word(name: str, quoted: str) -> list[str]:
 def test_each_fault_of_a_world_file_is_one_sentence_with_file_line_and_mend(
     text: str, line: int | None, named: list[str]
 ) -> None:
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(UserError) as caught:
         read(text)
     assert (caught.value.file, caught.value.line) == ("w.yaml", line)
     assert all(name in caught.value.sentence for name in named), caught.value
@@ -203,14 +203,14 @@ def test_the_robot_stands_within_a_room_of_any_shape(point: tuple[float, float],
     if is_within:
         assert read(text).rooms[0].stand_at == point
     else:
-        with pytest.raises(BadInput, match="outside"):
+        with pytest.raises(UserError, match="outside"):
             read(text)
 
 
 def test_reading_names_the_file_by_its_path(tmp_path: Path) -> None:
     path = tmp_path / "w.yaml"
     path.write_text("robot: attic\nrooms: [hall]\n", encoding="utf-8")
-    with pytest.raises(BadInput, match='"attic"') as error:
+    with pytest.raises(UserError, match='"attic"') as error:
         World.read(path)
     assert (error.value.file, error.value.line) == (path, 1)
 

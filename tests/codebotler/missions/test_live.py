@@ -18,7 +18,7 @@ from codebotler.robots.simulated import Simulated
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError
 from codebotler.simulator.rules import PAPER
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from roboeval.suites.load import Suite
 
@@ -42,16 +42,16 @@ def live(answer: Callable[[str, str], Result] = lambda *_: None) -> tuple[LiveRo
 
 
 @pytest.fixture(scope="module")
-def lane() -> Iterator[Lane]:
-    lane = Lane()
-    yield lane
-    lane.close()
+def worker() -> Iterator[Worker]:
+    worker = Worker()
+    yield worker
+    worker.close()
 
 
 # --- the same as in the simulator
 
 
-def test_reference_programs_leave_the_simulators_traces(paper: Suite, lane: Lane) -> None:
+def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
     as_written = replace(PAPER, literals="as-written")
     model = recorded_model("recorded:careful")
     pairs = [
@@ -63,7 +63,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, lane: Lane
         robot = Simulated(world, speed=None, metres_per_second=math.inf)
         robot.connect()
         adapted = LiveRobot(robot, Notes(), place=world.robot, clock_starts=PAPER.clock_starts)
-        found = lane.run_live(program, adapted)
+        found = worker.run_live(program, adapted)
         assert (found.status, found.error) == (outcome.status, outcome.error)
         assert found.trace == outcome.trace
 
@@ -82,7 +82,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, lane: Lane
 )
 @pytest.mark.parametrize("caught", [False, True])
 def test_errors_reach_the_program_as_in_the_simulator(
-    lane: Lane, call: str, kind: str, *, caught: bool
+    worker: Worker, call: str, kind: str, *, caught: bool
 ) -> None:
     where = "kitchen" if kind in {"AskInvalidOptions", "PickWhileHolding"} else "hall"
     body = f"    go_to('{where}')\n    {call}\n"
@@ -92,7 +92,7 @@ def test_errors_reach_the_program_as_in_the_simulator(
     (expected,) = run([(program, WORLD)], workers=1, rules=replace(PAPER, literals="as-written"))
     robot = Simulated(WORLD, speed=None)
     robot.connect()
-    found = lane.run_live(program, LiveRobot(robot, Notes()))
+    found = worker.run_live(program, LiveRobot(robot, Notes()))
     assert (found.status, found.error, found.line) == (expected.status, expected.error, expected.line)
     assert found.trace == expected.trace
     assert (found.error is None) == caught

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Room, World
 from codebotler.missions import mission as module
@@ -26,7 +26,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator import skill_protocol
 from codebotler.simulator.robot import RobotError
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
 from processes import are_gone, children_of
 
@@ -508,7 +508,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
 ) -> None:
     begun: list[str] = []
 
-    class Slow(Lane):
+    class Slow(Worker):
         def __init__(self) -> None:
             mission.stop("the test")
             super().__init__()
@@ -517,7 +517,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
             begun.append(source)
             return super().run_live(source, robot)
 
-    monkeypatch.setattr(module, "Lane", Slow)
+    monkeypatch.setattr(module, "Worker", Slow)
     with Reservation(Answering(), home) as reserved, ready(home) as mission:
         assert mission.run(reserved) is State.STOPPED
     assert begun == []
@@ -604,7 +604,7 @@ def test_missions_of_one_second_have_names_of_their_own(home: Path) -> None:
 
 @pytest.mark.parametrize("name", ["", "..", "../..", "20260101-000000", "/", "last"])
 def test_mission_that_is_not_there_is_said_so(home: Path, name: str) -> None:
-    with pytest.raises(BadInput, match=f'"{name}"' if name else "no mission"):
+    with pytest.raises(UserError, match=f'"{name}"' if name else "no mission"):
         find(home, name)
 
 

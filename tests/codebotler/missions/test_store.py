@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.missions.log import EVENTS, SUMMARY, Log, Summary, events_of
 from codebotler.missions.mission import Mission, State
 from codebotler.missions.store import missions, recover
@@ -124,7 +124,7 @@ WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
 def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, State.DONE)
     (folder / SUMMARY).write_text(text)
-    with pytest.raises(BadInput, match="no summary") as error:
+    with pytest.raises(UserError, match="no summary") as error:
         missions(tmp_path)
     assert error.value.file == folder / SUMMARY
     assert recover(tmp_path) == [], "a robot can work nevertheless"
@@ -141,7 +141,7 @@ def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, State.DONE, RUNNING)
     with (folder / EVENTS).open("a") as file:
         file.write(f"{text}\n")
-    with pytest.raises(BadInput, match="no event") as error:
+    with pytest.raises(UserError, match="no event") as error:
         events_of(folder)
     assert (error.value.file, error.value.line) == (folder / EVENTS, 2)
 

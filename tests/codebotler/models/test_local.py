@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 import pytest
 
-from codebotler.core.errors import BadInput
-from codebotler.models.base import ModelError, Reply, Settings
+from codebotler.core.errors import UserError
+from codebotler.models.base import ModelError, Reply, SamplingSettings
 from codebotler.models.open import open_model
 from codebotler.prompts import prompt_for
 from codebotler.prompts.rendering import OPENING
@@ -105,7 +105,7 @@ def by_heart(tmp_path: Path, tokenizer: Any) -> Callable[..., str]:  # noqa: ANN
     return make
 
 
-def replies(name: str, settings: Settings, *numbers: int) -> list[Reply]:
+def replies(name: str, settings: SamplingSettings, *numbers: int) -> list[Reply]:
     async def ask() -> list[Reply]:
         model = open_model(name, settings)
         try:
@@ -117,7 +117,7 @@ def replies(name: str, settings: Settings, *numbers: int) -> list[Reply]:
 
 
 def test_reply_ends_where_the_function_ends(by_heart: Callable[..., str]) -> None:
-    (reply,) = replies(by_heart(OPENING, GO, SAY, OTHER), Settings(), 0)
+    (reply,) = replies(by_heart(OPENING, GO, SAY, OTHER), SamplingSettings(), 0)
     assert reply.text == (GO + SAY).rstrip("\n")
     assert reply.program == OPENING + GO + SAY
     assert reply.finish_reason == "stop"
@@ -128,13 +128,13 @@ def test_reply_ends_where_the_function_ends(by_heart: Callable[..., str]) -> Non
 
 
 def test_reply_ends_where_the_model_ends_it(by_heart: Callable[..., str]) -> None:
-    (reply,) = replies(by_heart(OPENING, GO, SAY, END), Settings(), 0)
+    (reply,) = replies(by_heart(OPENING, GO, SAY, END), SamplingSettings(), 0)
     assert (reply.text, reply.finish_reason) == (GO + SAY, "stop")
     assert reply.program == OPENING + GO + SAY
 
 
 def test_reply_ends_at_the_limit(by_heart: Callable[..., str]) -> None:
-    (reply,) = replies(by_heart(OPENING, GO), Settings(max_tokens=5), 0)
+    (reply,) = replies(by_heart(OPENING, GO), SamplingSettings(max_tokens=5), 0)
     assert (reply.text, reply.finish_reason) == (GO * 5, "length")
     assert reply.usage.output_tokens == 5
 
@@ -142,7 +142,7 @@ def test_reply_ends_at_the_limit(by_heart: Callable[..., str]) -> None:
 @pytest.mark.parametrize("template", [TEMPLATE, NO_SYSTEM])
 def test_model_with_a_chat_template_is_given_messages(by_heart: Callable[..., str], template: str) -> None:
     name = by_heart("[assistant]", f"{FENCE}python\n", OPENING, GO, FENCE, END, template=template)
-    (reply,) = replies(name, Settings(), 0)
+    (reply,) = replies(name, SamplingSettings(), 0)
     assert reply.text == f"{FENCE}python\n{OPENING}{GO}{FENCE}"
     assert reply.program == OPENING + GO
     assert reply.finish_reason == "stop"
@@ -153,7 +153,7 @@ def test_pieces_are_heard_in_order_and_are_the_reply(by_heart: Callable[..., str
         heard: list[str] = []
 
         async def ask(name: str, heard: list[str]) -> Reply:
-            model = open_model(name, Settings(max_tokens=60, temperature=1.0, seed=1))
+            model = open_model(name, SamplingSettings(max_tokens=60, temperature=1.0, seed=1))
             return await model.reply(PROMPT, number=0, heard=heard.append)
 
         reply = run(ask(name, heard))
@@ -162,21 +162,21 @@ def test_pieces_are_heard_in_order_and_are_the_reply(by_heart: Callable[..., str
 
 
 def test_with_a_seed_each_number_has_its_own_reply_whatever_it_is_asked_with(babbler: str) -> None:
-    settings = Settings(temperature=1.0, top_p=1.0, max_tokens=12, seed=5)
+    settings = SamplingSettings(temperature=1.0, top_p=1.0, max_tokens=12, seed=5)
     together = replies(babbler, settings, 0, 1, 2, 3)
     assert len({reply.text for reply in together}) == 4
     assert [replies(babbler, settings, number)[0].text for number in (3, 1)] == [
         together[3].text,
         together[1].text,
     ]
-    (later,) = replies(babbler, Settings(temperature=1.0, top_p=1.0, max_tokens=12, seed=7), 1)
+    (later,) = replies(babbler, SamplingSettings(temperature=1.0, top_p=1.0, max_tokens=12, seed=7), 1)
     assert later.text == together[3].text
 
 
 def test_without_a_seed_no_two_replies_are_alike_and_without_temperature_all_are(babbler: str) -> None:
-    drawn = replies(babbler, Settings(temperature=1.0, max_tokens=12), 0, 0, 0)
+    drawn = replies(babbler, SamplingSettings(temperature=1.0, max_tokens=12), 0, 0, 0)
     assert len({reply.text for reply in drawn}) == 3
-    likeliest = replies(babbler, Settings(temperature=0.0, max_tokens=12), 0, 1, 2)
+    likeliest = replies(babbler, SamplingSettings(temperature=0.0, max_tokens=12), 0, 1, 2)
     assert len({reply.text for reply in likeliest}) == 1
 
 
@@ -203,7 +203,7 @@ def test_draws_follow_the_temperature_and_the_share() -> None:
 
 def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_small(babbler: str) -> None:
     async def ask(most: int) -> tuple[list[int], list[Reply]]:
-        model: Any = open_model(babbler, Settings(max_tokens=3, seed=1))
+        model: Any = open_model(babbler, SamplingSettings(max_tokens=3, seed=1))
         generate = model.model.generate
         sizes: list[int] = []
 
@@ -229,7 +229,7 @@ def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_sma
 
 def test_error_of_the_model_reaches_who_waits(babbler: str) -> None:
     async def ask() -> None:
-        model: Any = open_model(babbler, Settings())
+        model: Any = open_model(babbler, SamplingSettings())
         model.model.generate = None
         await model.reply(PROMPT, number=0)
 
@@ -239,7 +239,7 @@ def test_error_of_the_model_reaches_who_waits(babbler: str) -> None:
 
 def test_given_up_requests_end_at_once(babbler: str) -> None:
     async def ask() -> None:
-        model = open_model(babbler, Settings(max_tokens=100_000, temperature=1.0))
+        model = open_model(babbler, SamplingSettings(max_tokens=100_000, temperature=1.0))
         begun = asyncio.Event()
         task = asyncio.create_task(model.reply(PROMPT, number=0, heard=lambda _piece: begun.set()))
         await begun.wait()
@@ -253,7 +253,7 @@ def test_given_up_requests_end_at_once(babbler: str) -> None:
 
 def test_prompt_that_is_too_long_is_told(babbler: str) -> None:
     async def ask() -> None:
-        await open_model(babbler, Settings()).reply(prompt_for("Go. " * 5_000), number=0)
+        await open_model(babbler, SamplingSettings()).reply(prompt_for("Go. " * 5_000), number=0)
 
     with pytest.raises(ModelError, match=r"[\d,]+ tokens.* 4,096"):
         run(ask())
@@ -267,18 +267,18 @@ def test_prompt_that_is_too_long_is_told(babbler: str) -> None:
     ],
 )
 def test_what_is_no_model_is_told_in_a_sentence(tmp_path: Path, path: str, named: list[str]) -> None:
-    with pytest.raises(BadInput) as caught:
-        open_model("hf:" + path.format(empty=tmp_path), Settings())
+    with pytest.raises(UserError) as caught:
+        open_model("hf:" + path.format(empty=tmp_path), SamplingSettings())
     assert all(name.format(empty=tmp_path) in str(caught.value) for name in named), caught.value
 
 
 def test_base_url_means_nothing_here(babbler: str) -> None:
-    with pytest.raises(BadInput, match="--base-url"):
-        open_model(babbler, Settings(base_url="http://localhost:1/v1"))
+    with pytest.raises(UserError, match="--base-url"):
+        open_model(babbler, SamplingSettings(base_url="http://localhost:1/v1"))
 
 
 def test_device_and_numbers_are_what_this_machine_has(babbler: str) -> None:
-    model: Any = open_model(babbler, Settings())
+    model: Any = open_model(babbler, SamplingSettings())
     where = next(model.model.parameters())
     assert where.device.type == model.device
     if torch.cuda.is_available():

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from codebotler.core.errors import BadInput
-from codebotler.models.base import Settings
+from codebotler.core.errors import UserError
+from codebotler.models.base import SamplingSettings
 from codebotler.models.open import open_model
 
 COMMAND = 'pip install "pydantic-ai-slim[groq]"'
@@ -39,16 +39,16 @@ def _without_keys(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_what_is_missing_is_told_in_a_sentence(name: str, url: str | None, named: list[str]) -> None:
-    with pytest.raises(BadInput) as caught:
-        open_model(name, Settings(base_url=url))
+    with pytest.raises(UserError) as caught:
+        open_model(name, SamplingSettings(base_url=url))
     assert all(each in caught.value.sentence for each in named), caught.value
 
 
 def test_missing_extra_is_told_with_the_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "torch", None)
     monkeypatch.delitem(sys.modules, "codebotler.models.local", raising=False)
-    with pytest.raises(BadInput, match="torch and transformers") as caught:
-        open_model("hf:some/model", Settings())
+    with pytest.raises(UserError, match="torch and transformers") as caught:
+        open_model("hf:some/model", SamplingSettings())
     for named in ("hf:some/model", 'pip install "codebotler[transformers]"'):
         assert named in caught.value.sentence
 
@@ -56,7 +56,7 @@ def test_missing_extra_is_told_with_the_command(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize("name", ["openai-chat:m", "vllm:m", "ollama:m", "completions:m", "anthropic:m"])
 def test_models_are_named_as_they_were_asked_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-ant-0123456789")
-    model = open_model(name, Settings(base_url=URL))
+    model = open_model(name, SamplingSettings(base_url=URL))
     assert model.name == name
     asyncio.run(model.close())
 
@@ -65,8 +65,8 @@ def test_nothing_heavy_is_imported_before_it_is_needed() -> None:
     source = (
         "import sys\n"
         "from codebotler.models.open import open_model\n"
-        "from codebotler.models.base import Settings\n"
-        "open_model('recorded', Settings())\n"
+        "from codebotler.models.base import SamplingSettings\n"
+        "open_model('recorded', SamplingSettings())\n"
         "print(*sys.modules)\n"
     )
     done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
@@ -93,8 +93,8 @@ def test_key_that_cannot_be_sent_is_refused(
     monkeypatch: pytest.MonkeyPatch, name: str, variable: str, key: str, url: str | None
 ) -> None:
     monkeypatch.setenv(variable, key)
-    with pytest.raises(BadInput) as caught:
-        open_model(name, Settings(base_url=url))
+    with pytest.raises(UserError) as caught:
+        open_model(name, SamplingSettings(base_url=url))
     sentence = caught.value.sentence
     assert f"key in {variable} " in sentence
     assert key.strip() not in sentence
@@ -103,7 +103,7 @@ def test_key_that_cannot_be_sent_is_refused(
 
 def test_key_of_another_provider_is_no_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ANTHROPIC_API_KEY", "sk-one\nsk-two")
-    asyncio.run(open_model("openai-chat:m", Settings(base_url=URL)).close())
+    asyncio.run(open_model("openai-chat:m", SamplingSettings(base_url=URL)).close())
 
 
 @pytest.mark.parametrize(
@@ -120,8 +120,8 @@ def test_blank_key_is_a_missing_one(
     monkeypatch: pytest.MonkeyPatch, name: str, variable: str, key: str
 ) -> None:
     monkeypatch.setenv(variable, key)
-    with pytest.raises(BadInput) as caught:
-        open_model(name, Settings())
+    with pytest.raises(UserError) as caught:
+        open_model(name, SamplingSettings())
     assert name in caught.value.sentence
     assert variable in caught.value.sentence
 
@@ -146,8 +146,8 @@ def test_blank_key_is_a_missing_one(
     ],
 )
 def test_base_url_that_is_refused_is_not_quoted(url: str) -> None:
-    with pytest.raises(BadInput) as caught:
-        Settings(base_url=url)
+    with pytest.raises(UserError) as caught:
+        SamplingSettings(base_url=url)
     sentence = str(caught.value)
     assert "base URL" in sentence
     assert not any(part in sentence for part in ("topsec", "retpw", "user:", "key="))

@@ -13,10 +13,18 @@ from typing import Any, TypeVar
 
 import pytest
 
-from codebotler.core.errors import BadInput
-from codebotler.models.base import BudgetSpentError, Heard, ModelError, Reply, Settings, Usage, unheard
+from codebotler.core.errors import UserError
+from codebotler.models.base import (
+    BudgetSpentError,
+    Heard,
+    ModelError,
+    Reply,
+    SamplingSettings,
+    Usage,
+    unheard,
+)
 from codebotler.models.open import open_model
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt, prompt_for
 from server import Fault, Request, Server
 
@@ -35,15 +43,15 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[Server]:
 
 def use(
     server: Server,
-    work: Callable[[Paced], Awaitable[T]],
+    work: Callable[[RateLimited], Awaitable[T]],
     *,
     name: str = BASE,
     timeout: float = 30,
     **limits: Any,  # noqa: ANN401 - of several types
-) -> tuple[Paced, T]:
-    async def used() -> tuple[Paced, T]:
-        model = open_model(name, Settings(base_url=server.url, seed=0, timeout=timeout))
-        paced = Paced(model, first_wait=0.01, **limits)
+) -> tuple[RateLimited, T]:
+    async def used() -> tuple[RateLimited, T]:
+        model = open_model(name, SamplingSettings(base_url=server.url, seed=0, timeout=timeout))
+        paced = RateLimited(model, first_wait=0.01, **limits)
         assert paced.name == name
         try:
             return paced, await work(paced)
@@ -53,12 +61,12 @@ def use(
     return asyncio.run(used())
 
 
-async def one(paced: Paced) -> Reply:
+async def one(paced: RateLimited) -> Reply:
     return await paced.reply(PROMPT, number=0)
 
 
-def many(count: int) -> Callable[[Paced], Awaitable[list[Reply]]]:
-    async def ask(paced: Paced) -> list[Reply]:
+def many(count: int) -> Callable[[RateLimited], Awaitable[list[Reply]]]:
+    async def ask(paced: RateLimited) -> list[Reply]:
         return await asyncio.gather(*(paced.reply(PROMPT, number=number) for number in range(count)))
 
     return ask
@@ -102,7 +110,7 @@ def test_that_the_first_request_is_tried_again_is_told_once(
 def test_that_a_later_request_is_tried_again_is_not_told(
     server: Server, caplog: pytest.LogCaptureFixture
 ) -> None:
-    async def two(paced: Paced) -> int:
+    async def two(paced: RateLimited) -> int:
         await paced.reply(prompt_for("x"), number=0)
         server.faults.append(Fault.HUNG_UP)
         await paced.reply(prompt_for("x"), number=1)
@@ -160,7 +168,7 @@ def test_who_asks_for_peace_gets_it_from_all_requests(name: str, server: Server)
     server.faults.append(Fault.TOO_MANY_FOR_A_WHILE)
     server.retry_after = 1
 
-    async def ask(paced: Paced) -> None:
+    async def ask(paced: RateLimited) -> None:
         first = asyncio.create_task(paced.reply(PROMPT, number=0))
         while not paced.retried:  # noqa: ASYNC110 - a counter, which tells nobody
             await asyncio.sleep(0.005)
@@ -205,7 +213,7 @@ def test_counters_add_up(server: Server) -> None:
     assert paced.spent == paced.usage.total
 
 
-def spend(paced: Paced) -> Awaitable[tuple[int, BudgetSpentError]]:
+def spend(paced: RateLimited) -> Awaitable[tuple[int, BudgetSpentError]]:
     async def spending() -> tuple[int, BudgetSpentError]:
         for number in range(100):
             try:
@@ -243,7 +251,7 @@ class HundredTokens:
 
 def test_budget_that_is_used_to_the_last_token_is_spent() -> None:
     async def spending() -> tuple[int, BudgetSpentError]:
-        return await spend(Paced(HundredTokens(), token_budget=200))
+        return await spend(RateLimited(HundredTokens(), token_budget=200))
 
     replies, error = asyncio.run(spending())
     assert (replies, error.used) == (2, 200)
@@ -266,7 +274,7 @@ def test_reply_that_breaks_off_counts_against_the_budget(server: Server) -> None
 
 
 def test_requests_that_wait_find_the_budget_spent(server: Server) -> None:
-    async def ask(paced: Paced) -> list[Any]:
+    async def ask(paced: RateLimited) -> list[Any]:
         asked = (paced.reply(PROMPT, number=number) for number in range(6))
         return await asyncio.gather(*asked, return_exceptions=True)
 
@@ -276,7 +284,7 @@ def test_requests_that_wait_find_the_budget_spent(server: Server) -> None:
 
 
 def test_spent_budget_is_told_without_waiting_for_a_turn(server: Server) -> None:
-    async def ask(paced: Paced) -> float:
+    async def ask(paced: RateLimited) -> float:
         await one(paced)
         start = time.monotonic()
         with pytest.raises(BudgetSpentError):
@@ -288,7 +296,7 @@ def test_spent_budget_is_told_without_waiting_for_a_turn(server: Server) -> None
 
 
 def test_budget_that_is_spent_while_a_request_waits_for_its_turn_stops_it(server: Server) -> None:
-    async def ask(paced: Paced) -> list[Any]:
+    async def ask(paced: RateLimited) -> list[Any]:
         return [*await asyncio.gather(one(paced), one(paced), return_exceptions=True)]
 
     _, ends = use(server, ask, token_budget=10, requests_per_minute=40)
@@ -297,7 +305,7 @@ def test_budget_that_is_spent_while_a_request_waits_for_its_turn_stops_it(server
 
 
 def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
-    async def ask(paced: Paced) -> Reply:
+    async def ask(paced: RateLimited) -> Reply:
         server.faults.extend([Fault.SLOW, Fault.SERVER_ERROR, Fault.SLOW])
         tasks = [asyncio.create_task(paced.reply(PROMPT, number=number)) for number in range(6)]
         while len(server.requests) < 4:  # noqa: ASYNC110 - it counts in another thread
@@ -316,13 +324,13 @@ def test_given_up_requests_leave_nothing_behind(server: Server) -> None:
 
 INTERRUPTED = """
 import asyncio, sys
-from codebotler.models.base import Settings
+from codebotler.models.base import SamplingSettings
 from codebotler.models.open import open_model
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import prompt_for
 
 async def main(name, url):
-    model = Paced(open_model(name, Settings(base_url=url)), concurrency=4)
+    model = RateLimited(open_model(name, SamplingSettings(base_url=url)), concurrency=4)
     prompt = prompt_for("Go to the lobby.")
     try:
         await asyncio.gather(*(model.reply(prompt, number=number) for number in range(20)))
@@ -383,6 +391,6 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
     ],
 )
 def test_limits_out_of_range_are_told(limits: dict[str, Any], named: list[str]) -> None:
-    with pytest.raises(BadInput) as caught:
-        Paced(open_model("recorded", Settings()), **limits)
+    with pytest.raises(UserError) as caught:
+        RateLimited(open_model("recorded", SamplingSettings()), **limits)
     assert all(name in caught.value.sentence for name in named), caught.value

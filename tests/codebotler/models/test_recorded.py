@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
 from codebotler.models import base
-from codebotler.models.base import Settings
+from codebotler.models.base import SamplingSettings
 from codebotler.models.open import expect_server, open_model
 from codebotler.models.recorded import NAMES, _words, recorded_model
 from codebotler.prompts import prompt_for
@@ -28,7 +28,7 @@ def test_careful_model_is_the_one_that_is_meant_by_recorded(name: str) -> None:
 
 
 def test_unknown_recorded_model_is_told_in_a_sentence() -> None:
-    with pytest.raises(BadInput, match=r'"recorded:lazy".* recorded:careful, recorded:hasty'):
+    with pytest.raises(UserError, match=r'"recorded:lazy".* recorded:careful, recorded:hasty'):
         recorded_model("recorded:lazy")
 
 
@@ -75,14 +75,14 @@ def test_careful_model_is_right_more_often_than_the_hasty_one() -> None:
 
 
 def reply_to(instruction: str, number: int = 0, model: str = "recorded") -> base.Reply:
-    return asyncio.run(open_model(model, Settings()).reply(prompt_for(instruction), number=number))
+    return asyncio.run(open_model(model, SamplingSettings()).reply(prompt_for(instruction), number=number))
 
 
 def test_recorded_model_is_asked_like_any_other() -> None:
     recorded = recorded_model("recorded:hasty")
     instruction, replies = max(recorded.replies.items(), key=lambda item: len(item[1]))
     heard: list[str] = []
-    model = open_model("recorded:hasty", Settings())
+    model = open_model("recorded:hasty", SamplingSettings())
     assert model.name == "recorded:hasty"
     reply = asyncio.run(model.reply(prompt_for(instruction), number=1, heard=heard.append))
     asyncio.run(model.close())
@@ -151,8 +151,8 @@ def test_unknown_instruction_is_told_with_the_closest_that_are_known_and_how_to_
 
 @pytest.mark.parametrize("name", ["", "gpt-5.1", ":a", "hf:", "completions: ", "openai-chat:"])
 def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
-    with pytest.raises(BadInput, match=r"no model.* recorded"):
-        open_model(name, Settings())
+    with pytest.raises(UserError, match=r"no model.* recorded"):
+        open_model(name, SamplingSettings())
 
 
 @pytest.mark.parametrize(
@@ -171,23 +171,23 @@ def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
     ],
 )
 def test_settings_out_of_range_are_told(wrong: dict[str, Any], named: list[str]) -> None:
-    with pytest.raises(BadInput) as caught:
-        Settings(**wrong)
+    with pytest.raises(UserError) as caught:
+        SamplingSettings(**wrong)
     assert all(name in caught.value.sentence for name in named), caught.value
     assert "sk-secret" not in str(caught.value)
 
 
 def test_recorded_programs_have_no_base_url() -> None:
-    with pytest.raises(BadInput, match=r"base URL .*recorded"):
-        open_model("recorded", Settings(base_url="http://localhost:8000/v1"))
+    with pytest.raises(UserError, match=r"base URL .*recorded"):
+        open_model("recorded", SamplingSettings(base_url="http://localhost:8000/v1"))
 
 
 def test_of_several_models_one_is_enough_for_a_base_url() -> None:
     expect_server("recorded", "openai-chat:mine")
-    with pytest.raises(BadInput, match="recorded and recorded:hasty"):
+    with pytest.raises(UserError, match="recorded and recorded:hasty"):
         expect_server("recorded", "recorded:hasty")
 
 
 def test_seed_counts_on_with_the_number_of_the_reply() -> None:
-    assert Settings(seed=7).seed_of(3) == 10
-    assert Settings().seed_of(3) is None
+    assert SamplingSettings(seed=7).seed_of(3) == 10
+    assert SamplingSettings().seed_of(3) is None

@@ -24,16 +24,16 @@ from pathlib import Path
 logging.basicConfig(level=logging.DEBUG, stream=sys.stderr)
 logging.getLogger().addHandler(logging.FileHandler("log.txt"))
 
-from codebotler.models.base import ModelError, Settings
+from codebotler.models.base import ModelError, SamplingSettings
 from codebotler.models.open import open_model
-from codebotler.models.rate_limit import Paced
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import prompt_for
 
 async def main(url):
     with Path("completions.jsonl").open("w") as rows:
         for name in ("openai:m", "completions:m", "vllm:m"):
-            settings = Settings(base_url=url)
-            model = Paced(open_model(name, settings), first_wait=0.01)
+            settings = SamplingSettings(base_url=url)
+            model = RateLimited(open_model(name, settings), first_wait=0.01)
             print(model, repr(model.model), settings)
             for number in range(4):
                 try:

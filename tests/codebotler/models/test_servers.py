@@ -12,7 +12,7 @@ import openai
 import pytest
 
 from codebotler.models import reply_limit
-from codebotler.models.base import Model, ModelError, Reply, Settings, Usage
+from codebotler.models.base import Model, ModelError, Reply, SamplingSettings, Usage
 from codebotler.models.open import open_model
 from codebotler.prompts import Message, Prompt, prompt_for
 from server import CHUNK, HUGE, TASK, Fault, Server
@@ -41,7 +41,9 @@ def ask(name: str, server: Server, prompt: Prompt = PROMPT, **settings: Any) -> 
         finally:
             await model.close()
 
-    return asyncio.run(asked(open_model(name, Settings(base_url=server.url, seed=3, **settings)))), heard
+    return asyncio.run(
+        asked(open_model(name, SamplingSettings(base_url=server.url, seed=3, **settings)))
+    ), heard
 
 
 @both
@@ -76,7 +78,7 @@ def test_server_is_told_the_settings(name: str, server: Server) -> None:
 @both
 def test_settings_that_are_none_are_left_to_the_server(name: str, server: Server) -> None:
     async def asked() -> Reply:
-        settings = Settings(base_url=server.url, temperature=None, top_p=None)
+        settings = SamplingSettings(base_url=server.url, temperature=None, top_p=None)
         model = open_model(name, settings)
         reply = await model.reply(PROMPT, number=4)
         await model.close()
@@ -107,7 +109,7 @@ def test_server_that_does_not_stop_is_cut_at_the_functions_end(server: Server) -
 
 
 def test_openai_is_chat_completions_where_a_base_url_is_given(server: Server) -> None:
-    model = open_model("openai:m", Settings(base_url=server.url))
+    model = open_model("openai:m", SamplingSettings(base_url=server.url))
     assert model.name == "openai-chat:m"
     reply, _ = ask("openai:m", server)
     assert reply.program == TASK + PROGRAM
@@ -178,7 +180,7 @@ def test_reply_that_takes_too_long_is_given_up(name: str, server: Server, fault:
 @both
 def test_reply_that_never_ends_is_given_up_though_its_pieces_come_in_time(name: str, server: Server) -> None:
     async def asked() -> None:
-        model = open_model(name, Settings(base_url=server.url, timeout=1.0))
+        model = open_model(name, SamplingSettings(base_url=server.url, timeout=1.0))
         try:
             await asyncio.wait_for(model.reply(PROMPT, number=0, heard=heard.append), 10)
         finally:
@@ -322,7 +324,7 @@ def test_server_that_does_not_count_tokens_leaves_them_unknown(name: str, server
 @both
 def test_given_up_request_ends_at_once_and_the_next_one_is_answered(name: str, server: Server) -> None:
     async def asked() -> Reply:
-        model = open_model(name, Settings(base_url=server.url, seed=7))
+        model = open_model(name, SamplingSettings(base_url=server.url, seed=7))
         begun = asyncio.Event()
         server.faults.append(Fault.STALLED)
         task = asyncio.create_task(model.reply(PROMPT, number=0, heard=lambda _piece: begun.set()))

@@ -12,7 +12,7 @@ from functools import partial
 import pytest
 from PIL import Image
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.models import rate_limit
 from codebotler.perception import Detector, PerceptionError, Sighting, image_of, jpeg_of, open_detector
 from codebotler.perception.chat import LONGEST_REPLY, SYSTEM, TRIES, sighting_in
@@ -91,7 +91,7 @@ def test_name_that_is_an_order_arrives_as_a_text(server: Server, detector: Detec
     ],
 )
 def test_what_is_no_name_is_refused(server: Server, detector: Detector, label: str, named: list[str]) -> None:
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(UserError) as error:
         detector.look(PICTURE, label)
     assert all(name in error.value.sentence for name in named), error.value
     assert not server.requests
@@ -217,7 +217,7 @@ def test_server_that_is_busy_is_asked_again(server: Server, detector: Detector) 
     ],
 )
 def test_model_that_cannot_look_is_refused(name: str, sentence: str) -> None:
-    with pytest.raises(BadInput, match=sentence):
+    with pytest.raises(UserError, match=sentence):
         open_detector(name)
 
 
@@ -225,5 +225,5 @@ def test_detector_without_its_libraries_says_what_to_install() -> None:
     try:
         import transformers  # noqa: F401, PLC0415 - whether it can be
     except ImportError:
-        with pytest.raises(BadInput, match=r'pip install "codebotler\[transformers\]"'):
+        with pytest.raises(UserError, match=r'pip install "codebotler\[transformers\]"'):
             open_detector("hf:owl")

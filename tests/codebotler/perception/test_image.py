@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.perception import Sighting, boxed, image_from_ros, image_of, jpeg_of, read_image
 from codebotler.perception.image import MAX_BYTES
 
@@ -102,7 +102,7 @@ def test_other_modes_become_colour(mode: str) -> None:
     ],
 )
 def test_bad_picture_is_said_in_a_sentence(data: bytes, sentence: str) -> None:
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(UserError) as error:
         image_of(data)
     assert sentence in str(error.value)
 
@@ -112,16 +112,16 @@ def test_every_cut_of_a_picture_is_refused_or_read() -> None:
     for end in range(0, len(whole), 3):
         try:
             image_of(whole[:end])
-        except BadInput:
+        except UserError:
             continue
         assert end > len(whole) - 20  # only what ends the file is missing
 
 
 def test_missing_file_and_folder_are_said(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="no such file") as error:
+    with pytest.raises(UserError, match="no such file") as error:
         read_image(tmp_path / "none.jpg")
     assert error.value.file == tmp_path / "none.jpg"
-    with pytest.raises(BadInput, match="cannot be read"):
+    with pytest.raises(UserError, match="cannot be read"):
         read_image(tmp_path)
 
 
@@ -183,7 +183,7 @@ def test_compressed_picture_of_a_camera() -> None:
     ],
 )
 def test_bad_message_is_said_in_a_sentence(said: dict[str, object], sentence: str) -> None:
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(UserError) as error:
         image_from_ros(said, "the picture on /camera")
     assert str(error.value).startswith("the picture on /camera")
     assert sentence in str(error.value)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.perception import Detector, PerceptionError, open_detector
 
 REASON = "torch and transformers are not installed; `make test-transformers` has them"
@@ -87,9 +87,9 @@ def test_what_is_less_sure_than_wanted_is_not_found(folder: Path, detector: Dete
 
 def test_label_of_too_many_words_is_refused(detector: Detector) -> None:
     detector.look(PICTURE, "x" * (TOKENS - 2))
-    with pytest.raises(BadInput, match=rf"{TOKENS + 1} tokens, .*hf:.* {TOKENS}\b"):
+    with pytest.raises(UserError, match=rf"{TOKENS + 1} tokens, .*hf:.* {TOKENS}\b"):
         detector.look(PICTURE, "x" * (TOKENS - 1))
-    with pytest.raises(BadInput, match="nothing"):
+    with pytest.raises(UserError, match="nothing"):
         detector.look(PICTURE, " ")
 
 
@@ -107,21 +107,21 @@ def test_broken_weights_are_refused(tmp_path: Path, folder: Path) -> None:
     model = transformers.OwlViTForObjectDetection.from_pretrained(folder)
     model.class_head.dense0.weight.data[0, 0] = math.nan
     model.save_pretrained(broken)
-    with pytest.raises(BadInput, match="weights"):
+    with pytest.raises(UserError, match="weights"):
         open_detector(f"hf:{broken}")
 
 
 def test_what_is_no_detector_is_refused(tmp_path: Path, folder: Path) -> None:
-    with pytest.raises(BadInput, match="no such folder"):
+    with pytest.raises(UserError, match="no such folder"):
         open_detector(f"hf:{tmp_path / 'none'}")
-    with pytest.raises(BadInput, match="detector"):
+    with pytest.raises(UserError, match="detector"):
         open_detector(f"hf:{tmp_path}")
     for score in (0.0, 1.5, math.nan):
-        with pytest.raises(BadInput, match="above 0 and at most 1"):
+        with pytest.raises(UserError, match="above 0 and at most 1"):
             open_detector(f"hf:{folder}", least_score=score)
     config = transformers.LlamaConfig(vocab_size=8, **SMALL)
     transformers.LlamaForCausalLM(config).save_pretrained(tmp_path)
-    with pytest.raises(BadInput, match="detector"):
+    with pytest.raises(UserError, match="detector"):
         open_detector(f"hf:{tmp_path}")
 
 

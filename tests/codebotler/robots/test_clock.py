@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.robots.clock import Clock
 
 
@@ -40,5 +40,5 @@ def test_stop_ends_all_waiting_until_the_restart(speed: float | None) -> None:
 
 @pytest.mark.parametrize("speed", [0, -1, 1e-308, 1e308, float("inf"), float("nan")])
 def test_speed_out_of_its_range_is_refused(speed: float) -> None:
-    with pytest.raises(BadInput, match=r"0\.000001 to 1,000,000"):
+    with pytest.raises(UserError, match=r"0\.000001 to 1,000,000"):
         Clock(speed)

@@ -28,7 +28,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from roboeval.suites.load import Suite
 
 REASON = "pyrobosim is not installed; `make test-pyrobosim` has it"
@@ -81,16 +81,16 @@ def lying(robot: Pyrobosim) -> dict[str, list[str]]:
 
 
 @pytest.fixture(scope="module")
-def lane() -> Iterator[Lane]:
-    lane = Lane()
-    yield lane
-    lane.close()
+def worker() -> Iterator[Worker]:
+    worker = Worker()
+    yield worker
+    worker.close()
 
 
 # --- the same as in the simulator
 
 
-def test_reference_programs_leave_the_simulators_traces(paper: Suite, lane: Lane) -> None:
+def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
     model = recorded_model("recorded:careful")
     tasks = [
         (task.name, model.reply(task.prompts[0], 0).program, scenario.world)
@@ -103,7 +103,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, lane: Lane
     manipulating = set()
     for (name, program, world), outcome in zip(tasks, expected, strict=True):
         robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=AS_WRITTEN.clock_starts)
-        found = lane.run_live(program, robot)
+        found = worker.run_live(program, robot)
         assert (found.status, found.error) == (outcome.status, outcome.error), name
         assert found.trace == outcome.trace, name
         manipulating |= (

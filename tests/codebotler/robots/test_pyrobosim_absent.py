@@ -8,7 +8,7 @@ from importlib import metadata
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
 from codebotler.robots.base import NotReadyError, Options, Robot
 from codebotler.robots.open import all_readiness, open_robot
@@ -43,9 +43,9 @@ def test_old_version_is_missing_too(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
     robot: Robot = open_robot("pyrobosim", Options(world=WORLD, speed=3))
     assert (robot.name, robot.address, robot.clock.speed) == ("pyrobosim", "", 3)
-    with pytest.raises(BadInput, match="--world FILE"):
+    with pytest.raises(UserError, match="--world FILE"):
         open_robot("pyrobosim")
-    with pytest.raises(BadInput, match=r"0\.000001 to 1,000,000"):
+    with pytest.raises(UserError, match=r"0\.000001 to 1,000,000"):
         open_robot("pyrobosim", Options(world=WORLD, speed=-1))
 
 

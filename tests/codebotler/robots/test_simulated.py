@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.world import Person, Room, World
 from codebotler.robots import ros1
 from codebotler.robots.base import CancelledError, Options, Picture, Robot
@@ -128,9 +128,9 @@ def test_world_is_as_at_the_start_after_connecting_again() -> None:
 def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
     robot: Robot = open_robot("sim", Options(world=WORLD, speed=3))
     assert (robot.name, robot.clock.speed) == ("simulated", 3)
-    with pytest.raises(BadInput, match="--world FILE"):
+    with pytest.raises(UserError, match="--world FILE"):
         open_robot("sim")
-    with pytest.raises(BadInput, match=r'"simm".* sim, pyrobosim, ros1, rosbridge, ros2'):
+    with pytest.raises(UserError, match=r'"simm".* sim, pyrobosim, ros1, rosbridge, ros2'):
         open_robot("simm")
 
 

@@ -14,14 +14,14 @@ from codebotler.rtl import (
     AtLeast,
     Claim,
     Count,
-    Cut,
-    Element,
+    EventPattern,
     Exists,
     Formula,
     Not,
     Number,
     Or,
     Regex,
+    Scope,
     Test,
     Text,
     Time,
@@ -43,12 +43,12 @@ def texts_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
     )
 
 
-def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[Element]:
+def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[EventPattern]:
     texts = texts_from(patterns) | claims_from(patterns)
-    plain = st.builds(Element, st.sampled_from(PLAIN), texts)
-    asked = st.builds(Element, st.just("ask"), texts, texts)
-    mentioned = st.builds(Element, st.just("ask"), texts, st.none(), st.just(value=True))
-    answered = st.builds(lambda text: Element("ask", Regex(".*"), answer=text), texts)
+    plain = st.builds(EventPattern, st.sampled_from(PLAIN), texts)
+    asked = st.builds(EventPattern, st.just("ask"), texts, texts)
+    mentioned = st.builds(EventPattern, st.just("ask"), texts, st.none(), st.just(value=True))
+    answered = st.builds(lambda text: EventPattern("ask", Regex(".*"), answer=text), texts)
     anywhere = plain | asked | mentioned | answered
     return anywhere | st.builds(lambda element, p: replace(element, place=p), anywhere, patterns)
 
@@ -67,7 +67,7 @@ def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
 def tests_from(patterns: SearchStrategy[str]) -> SearchStrategy[Test]:
     elements = elements_from(patterns)
     names = st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"])
-    cuts = st.lists(st.builds(Cut, names, elements), max_size=3).map(tuple)
+    cuts = st.lists(st.builds(Scope, names, elements), max_size=3).map(tuple)
     numbers = st.integers(0, 3)
     return st.one_of(
         st.builds(Exists, elements, cuts),
@@ -97,7 +97,7 @@ def traces_from(options: SearchStrategy[Option]) -> SearchStrategy[Trace]:
 
 
 @pytest.fixture(scope="session")
-def elements() -> SearchStrategy[Element]:
+def elements() -> SearchStrategy[EventPattern]:
     return elements_from(PATTERNS)
 
 

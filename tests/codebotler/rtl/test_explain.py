@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 from codebotler.core.trace import Event, Option, Trace
-from codebotler.rtl import And, CannotJudge, Formula, Not, Or, explain, holds, parse
+from codebotler.rtl import And, Formula, Inconclusive, Not, Or, explain, holds, parse
 
 VERBS = {
     "going": "goto",
@@ -71,7 +71,7 @@ def subformulas(formula: Formula) -> list[Formula]:
 def judged(formula: Formula, trace: Trace) -> bool:
     try:
         return holds(formula, trace)
-    except CannotJudge:
+    except Inconclusive:
         return False
 
 

@@ -16,17 +16,17 @@ from codebotler.rtl import (
     ActAtSome,
     And,
     AtLeast,
-    CannotJudge,
     Claim,
     Count,
-    Cut,
-    Element,
+    EventPattern,
     Exists,
     Formula,
+    Inconclusive,
     Not,
     Number,
     Or,
     Regex,
+    Scope,
     Test,
     Text,
     Time,
@@ -76,7 +76,7 @@ def found(text: Text, actual: str) -> bool:
     return re.search(pattern(text), actual, re.IGNORECASE | re.DOTALL) is not None
 
 
-def same(element: Element, placed: tuple[int, Event]) -> bool:
+def same(element: EventPattern, placed: tuple[int, Event]) -> bool:
     at, event = placed
     if event.kind != element.kind:
         return False
@@ -95,54 +95,54 @@ def same(element: Element, placed: tuple[int, Event]) -> bool:
     offered = False
     for number, option in enumerate(event.options):
         if not option.is_text:
-            raise CannotJudge(at, number, option)
+            raise Inconclusive(at, number, option)
         if found(element.options, option.text):
             offered = True
             break
     return found(element.text, event.text) and offered
 
 
-def exists(tr: Placed, e: Element) -> bool:
+def exists(tr: Placed, e: EventPattern) -> bool:
     return any(same(e, event) for event in tr)
 
 
-def after_first(tr: Placed, e: Element) -> Placed:
+def after_first(tr: Placed, e: EventPattern) -> Placed:
     return next((tr[i + 1 :] for i, event in enumerate(tr) if same(e, event)), tr)
 
 
-def before_first(tr: Placed, e: Element) -> Placed:
+def before_first(tr: Placed, e: EventPattern) -> Placed:
     return next((tr[:i] for i, event in enumerate(tr) if same(e, event)), tr)
 
 
-def after_last(tr: Placed, e: Element) -> Placed:
+def after_last(tr: Placed, e: EventPattern) -> Placed:
     hits = [i for i, event in enumerate(tr) if same(e, event)]
     return tr[hits[-1] + 1 :] if hits else tr
 
 
-def before_last(tr: Placed, e: Element) -> Placed:
+def before_last(tr: Placed, e: EventPattern) -> Placed:
     hits = [i for i, event in enumerate(tr) if same(e, event)]
     return tr[: hits[-1]] if hits else tr
 
 
-def act_at_first(tr: Placed, p: str, e: Element) -> bool:
-    there, away = Element("goto", Regex(p)), Element("goto", Without(p))
+def act_at_first(tr: Placed, p: str, e: EventPattern) -> bool:
+    there, away = EventPattern("goto", Regex(p)), EventPattern("goto", Without(p))
     return exists(tr, there) and exists(before_first(after_first(tr, there), away), e)
 
 
-def act_at_some(tr: Placed, p: str, e: Element) -> bool:
-    there = Element("goto", Regex(p))
+def act_at_some(tr: Placed, p: str, e: EventPattern) -> bool:
+    there = EventPattern("goto", Regex(p))
     return exists(tr, there) and (act_at_first(tr, p, e) or act_at_some(after_first(tr, there), p, e))
 
 
-def at_least(tr: Placed, e: Element, n: int) -> bool:
+def at_least(tr: Placed, e: EventPattern, n: int) -> bool:
     return n == 0 or (exists(tr, e) and at_least(after_first(tr, e), e, n - 1))
 
 
-def count(tr: Placed, e: Element, n: int) -> bool:
+def count(tr: Placed, e: EventPattern, n: int) -> bool:
     return at_least(tr, e, n) and not at_least(tr, e, n + 1)
 
 
-CUTS: dict[str, Callable[[Placed, Element], Placed]] = {
+CUTS: dict[str, Callable[[Placed, EventPattern], Placed]] = {
     "BeforeFirst": before_first,
     "BeforeLast": before_last,
     "AfterFirst": after_first,
@@ -185,7 +185,7 @@ Verdict = bool | tuple[int, int, Option]
 def verdict(judge: Callable[[Formula, Trace], bool], formula: Formula, trace: Trace) -> Verdict:
     try:
         return judge(formula, trace)
-    except CannotJudge as error:
+    except Inconclusive as error:
         return error.event, error.number, error.option
 
 
@@ -214,7 +214,7 @@ def test_stays_mean_their_definition(data: DataObject) -> None:
     trace = tuple(data.draw(st.lists(moves | st.just(say("x")), max_size=9)))
     for test in (ActAtSome, ActAtFirst):
         for kind in ("say", "goto"):
-            formula = test(data.draw(st.sampled_from(["a", "b"])), Element(kind, Regex("x|b")))
+            formula = test(data.draw(st.sampled_from(["a", "b"])), EventPattern(kind, Regex("x|b")))
             assert holds(formula, trace) == defined(formula, trace)
 
 
@@ -229,7 +229,7 @@ def test_negation(
 
 @given(st.data())
 def test_count_is_the_largest_at_least(
-    elements: SearchStrategy[Element], traces: SearchStrategy[Trace], data: DataObject
+    elements: SearchStrategy[EventPattern], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
     element, trace = data.draw(elements), data.draw(traces)
     numbers = [n for n in range(len(trace) + 2) if holds(Count(element, n), trace)]
@@ -238,7 +238,7 @@ def test_count_is_the_largest_at_least(
 
 @given(st.data())
 def test_the_parts_before_and_after_make_up_the_trace(
-    elements: SearchStrategy[Element], traces: SearchStrategy[Trace], data: DataObject
+    elements: SearchStrategy[EventPattern], traces: SearchStrategy[Trace], data: DataObject
 ) -> None:
     element, trace = data.draw(elements), data.draw(traces)
     hits = [at for at in range(len(trace)) if same(element, (at, trace[at]))]
@@ -251,7 +251,7 @@ def test_the_parts_before_and_after_make_up_the_trace(
             assert after == (at[0] + 1, len(trace))
 
 
-def parse_cut(name: str, element: Element) -> tuple[Cut, ...]:
+def parse_cut(name: str, element: EventPattern) -> tuple[Scope, ...]:
     formula = parse(f"tr.{name}({element}).Exists(say('x'))")
     assert isinstance(formula, Exists)
     return formula.cuts
@@ -314,7 +314,7 @@ def test_an_option_that_is_no_text_cannot_be_judged_whether_or_not_the_question_
         'tr.Exists(ask("dinner", "no"))',
         'not tr.Exists(ask("x", "no"))',
     ):
-        with pytest.raises(CannotJudge) as caught:
+        with pytest.raises(Inconclusive) as caught:
             holds(parse(text), trace)
         assert (caught.value.event, caught.value.number, caught.value.option) == (0, 1, THREE)
 
@@ -328,7 +328,7 @@ def test_counting_stops_at_the_event_that_settles_it() -> None:
     good, bad = ask("lunch", YES), ask("lunch", THREE)
     assert not holds(parse('tr.Count(ask(".*", "yes"), 0)'), (good, bad))
     assert not holds(parse('tr.Count(ask(".*", "yes"), 1)'), (good, good, bad))
-    with pytest.raises(CannotJudge):
+    with pytest.raises(Inconclusive):
         holds(parse('tr.Count(ask(".*", "yes"), 1)'), (good, bad))
 
 
@@ -387,6 +387,6 @@ def test_the_example_of_the_paper(events: list[Event], when_yes: bool, when_no: 
 
 
 def test_what_cannot_be_judged_travels_between_processes() -> None:
-    error = pickle.loads(pickle.dumps(CannotJudge(4, 1, THREE)))
+    error = pickle.loads(pickle.dumps(Inconclusive(4, 1, THREE)))
     assert (error.event, error.number, error.option) == (4, 1, THREE)
     assert str(error) == "option 2 of the question at step 5 is no text: 3"

@@ -15,14 +15,14 @@ from codebotler.rtl import (
     And,
     AtLeast,
     Count,
-    Cut,
-    Element,
+    EventPattern,
     Exists,
     Formula,
     Not,
     Or,
     Regex,
     RtlSyntaxError,
+    Scope,
     Without,
     Words,
     holds,
@@ -30,8 +30,8 @@ from codebotler.rtl import (
 )
 from codebotler.rtl.syntax import DEEPEST
 
-LOBBY = Exists(Element("goto", Regex("lobby")))
-ASK = Element("ask", Regex("lunch"), Regex(".*"))
+LOBBY = Exists(EventPattern("goto", Regex("lobby")))
+ASK = EventPattern("ask", Regex("lunch"), Regex(".*"))
 
 
 @pytest.mark.parametrize(
@@ -47,12 +47,12 @@ ASK = Element("ask", Regex("lunch"), Regex(".*"))
             AtLeast(
                 LOBBY.element,
                 2,
-                (Cut("AfterFirst", Element("goto", Without("x"))), Cut("BeforeLast", ASK)),
+                (Scope("AfterFirst", EventPattern("goto", Without("x"))), Scope("BeforeLast", ASK)),
             ),
         ),
         (
             r'tr.Exists(say(words("5|five", without("no"), r"^(?!not\b)")))',
-            Exists(Element("say", Words((Regex("5|five"), Without("no"), Regex(r"^(?!not\b)"))))),
+            Exists(EventPattern("say", Words((Regex("5|five"), Without("no"), Regex(r"^(?!not\b)"))))),
         ),
     ],
 )
@@ -108,7 +108,7 @@ def test_round_trip_of_raw_patterns(pattern: str) -> None:
         re.compile(pattern)
     except re.error:
         assume(condition=False)
-    formula = Exists(Element("say", Regex(pattern)))
+    formula = Exists(EventPattern("say", Regex(pattern)))
     assert parse(str(formula)) == formula
 
 
@@ -224,7 +224,7 @@ def test_escapes_that_python_does_not_know_mean_what_they_look_like() -> None:
 def test_a_further_skill_is_a_further_element() -> None:
     wave = Skill("wave", (Parameter("person"),), "None", "Wave at a person.", Recording("wave", "person"))
     formula = parse('tr.Exists(wave("alice"))', skills=SKILLS.with_skill(wave))
-    assert formula == Exists(Element("wave", Regex("alice")))
+    assert formula == Exists(EventPattern("wave", Regex("alice")))
     assert holds(formula, (Event("wave", "Alice"),))
     with pytest.raises(RtlSyntaxError, match="unknown element wave"):
         parse('tr.Exists(wave("alice"))')

@@ -42,6 +42,6 @@ def are_gone(pids: set[int]) -> bool:
     return False
 
 
-def zygotes() -> set[int]:
+def fork_servers() -> set[int]:
     """The processes directly below this one, which fork those of the runs."""
     return {pid for pid, parent in parents().items() if parent == os.getpid()}

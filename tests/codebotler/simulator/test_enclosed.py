@@ -14,13 +14,13 @@ import pytest
 from codebotler.core.world import Room, World
 from codebotler.simulator.robot import BEHAVIOURS, SimulatedRobot
 from codebotler.simulator.sandbox.isolation import NOBODY
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from processes import children_of, lives
 
 WORLD = World((Room("start_loc"),), "start_loc")
 ROOT = os.geteuid() == 0
 USER = NOBODY if ROOT else os.geteuid()
-ROLES = ("preparer", "zygote", "library-zygote", "child", "child with the library")
+ROLES = ("preparer", "fork-server", "library-fork-server", "child", "child with the library")
 CLOSED = ("preparer", "child", "child with the library")
 MEGABYTES = 512 * 1024**2
 NEVER = {"Max core file size": "0", "Max file size": "0", "Max locked memory": "0", "Max msgqueue size": "0"}
@@ -64,28 +64,28 @@ class Enclosed:
 
 @pytest.fixture(scope="module")
 def enclosed() -> Iterator[dict[str, Enclosed]]:
-    """The processes of a lane by role, looked at while a program speaks."""
+    """The processes of a worker by role, looked at while a program speaks."""
     found: dict[str, Enclosed] = {}
     os.environ["A_SECRET"] = "hush"
-    lane = Lane()
+    worker = Worker()
 
     def say(_robot: SimulatedRobot, message: str) -> None:
-        preparer = lane._preparer._child
+        preparer = worker._preparer._child
         assert preparer is not None
         found["preparer"] = Enclosed.of(preparer.pid)
-        for role, zygote in lane._zygotes.items():
-            found[role] = Enclosed.of(zygote.pid)
-            for pid in filter(lives, children_of(zygote.pid)):
+        for role, fork_server in worker._fork_servers.items():
+            found[role] = Enclosed.of(fork_server.pid)
+            for pid in filter(lives, children_of(fork_server.pid)):
                 found[message] = Enclosed.of(pid)
 
     def new_robot() -> SimulatedRobot:
         return SimulatedRobot(WORLD, behaviours={**BEHAVIOURS, "say": say})
 
     program = "def task_program():\n    say('child')\n"
-    lane.run(program, new_robot)
-    lane.run("import json\n" + program.replace("'child'", "'child with the library'"), new_robot)
+    worker.run(program, new_robot)
+    worker.run("import json\n" + program.replace("'child'", "'child with the library'"), new_robot)
     yield found
-    lane.close()
+    worker.close()
     del os.environ["A_SECRET"]
 
 

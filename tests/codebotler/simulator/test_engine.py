@@ -21,14 +21,14 @@ from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
 from codebotler.simulator import isolated
 from codebotler.simulator.child import Child
-from codebotler.simulator.engine import EngineError, Lanes, digest, run
-from codebotler.simulator.fork_server import Zygote
+from codebotler.simulator.engine import EngineError, WorkerPool, digest, run
+from codebotler.simulator.fork_server import ForkServer
 from codebotler.simulator.isolated import codes
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.simulator.skill_protocol import OVERRUN, Answer, Conversation
-from codebotler.simulator.worker import Lane
-from processes import are_gone, children_of, zygotes
+from codebotler.simulator.skill_protocol import OVERRUN, Answer, SkillProtocol
+from codebotler.simulator.worker import Worker
+from processes import are_gone, children_of, fork_servers
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
 OTHER = World((Room("elsewhere"),), "elsewhere")
@@ -123,8 +123,8 @@ def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
             return number
         return sum(1 for _ in takewhile(lambda _: others_done.acquire(timeout=20), range(500)))
 
-    with Lanes(2) as lanes:
-        results = lanes.map_distinct(work, range(600), name=lambda number: number.to_bytes(2))
+    with WorkerPool(2) as pool:
+        results = pool.map_distinct(work, range(600), name=lambda number: number.to_bytes(2))
         assert list(results) == [500, *range(1, 600)]
 
 
@@ -133,10 +133,8 @@ def test_what_was_read_before_the_keys_failed_has_results() -> None:
         yield from range(20)
         raise ValueError("no more")
 
-    with Lanes(2) as lanes:
-        results = lanes.map_distinct(
-            lambda number: number * 2, keys(), name=lambda number: number.to_bytes(2)
-        )
+    with WorkerPool(2) as pool:
+        results = pool.map_distinct(lambda number: number * 2, keys(), name=lambda number: number.to_bytes(2))
         assert [next(results) for _ in range(20)] == list(range(0, 40, 2))
         with pytest.raises(ValueError, match="no more"):
             next(results)
@@ -173,22 +171,22 @@ def task_program():
 def test_identities_depend_neither_on_what_the_engine_holds_nor_on_waiting() -> None:
     hall, kitchen = str(b"hall", "ascii"), str(b"kitchen", "ascii")
     worlds = [World((Room("hall"), Room("kitchen")), "hall"), World((Room(hall), Room(kitchen)), hall)]
-    lane = Lane()
+    worker = Worker()
     outcomes = []
     for world in worlds:
         for surely in (SimulatedRobot(world).surely, ()):
             robot = SimulatedRobot(world)
             robot.surely = surely
-            outcomes.append(lane.run(TELLS_WHAT_IS_THE_SAME, lambda robot=robot: robot))  # type: ignore[misc]  # bound
-    lane.close()
+            outcomes.append(worker.run(TELLS_WHAT_IS_THE_SAME, lambda robot=robot: robot))  # type: ignore[misc]  # bound
+    worker.close()
     assert outcomes == outcomes[:1] * 4
 
 
 def test_a_room_that_is_no_regex_harms_no_program_that_drives_nowhere() -> None:
     world = World((Room("hall"), Room("[")), "hall")
-    lane = Lane()
-    assert said(lane.run(saying("a"), lambda: SimulatedRobot(world))) == ["a"]
-    lane.close()
+    worker = Worker()
+    assert said(worker.run(saying("a"), lambda: SimulatedRobot(world))) == ["a"]
+    worker.close()
 
 
 def test_a_smaller_table_of_skills_leaves_no_other_skill() -> None:
@@ -206,12 +204,12 @@ def test_drives_to_rooms_by_their_names_are_not_waited_for(monkeypatch: pytest.M
         answers.append(message[0])
         send(child, message)
 
-    lane = Lane()
+    worker = Worker()
     monkeypatch.setattr(Child, "send", send_and_note)
     world = World((Room("start_loc"), Room("lab+"), Room("é'\"\n"), Room("hall \\d")), "start_loc")
     program = "def task_program():\n    for room in get_all_rooms() * 3:\n        go_to(room)\n"
-    outcome = lane.run(program, lambda: SimulatedRobot(world, AS_WRITTEN))
-    lane.close()
+    outcome = worker.run(program, lambda: SimulatedRobot(world, AS_WRITTEN))
+    worker.close()
     assert outcome.error is not None
     assert (outcome.error.kind, outcome.line) == ("GoToInvalidLocation", 3)
     assert [event.text for event in outcome.trace] == ["start_loc", "lab+", "é'\"", "hall \\d"]
@@ -298,7 +296,7 @@ LONG_RUNS = [
 def test_nothing_is_waited_for_when_the_consumer_stops_during_long_runs() -> None:
     outcomes = run(LONG_RUNS, workers=2)
     next(outcomes)
-    while sum(bool(children_of(zygote)) for zygote in zygotes()) < 2:
+    while sum(bool(children_of(fork_server)) for fork_server in fork_servers()) < 2:
         time.sleep(0.05)
     time.sleep(0.5)
     start = time.monotonic()
@@ -307,7 +305,7 @@ def test_nothing_is_waited_for_when_the_consumer_stops_during_long_runs() -> Non
 
 
 @pytest.mark.usefixtures("nothing_is_left")
-def test_nothing_is_waited_for_when_the_consumer_stops_while_a_zygote_is_starting() -> None:
+def test_nothing_is_waited_for_when_the_consumer_stops_while_a_fork_server_is_starting() -> None:
     outcomes = run(LONG_RUNS, workers=2)
     next(outcomes)
     start = time.monotonic()
@@ -367,20 +365,20 @@ def test_script_that_is_stopped_leaves_no_process_behind(number: signal.Signals)
 
 
 @pytest.mark.usefixtures("nothing_is_left")
-def test_engine_survives_a_zygote_that_was_killed_between_runs() -> None:
+def test_engine_survives_a_fork_server_that_was_killed_between_runs() -> None:
     outcomes = run(((saying(str(number)), WORLD) for number in range(60)), workers=1)
     assert said(next(outcomes)) == ["0"]
-    for pid in zygotes():
+    for pid in fork_servers():
         os.kill(pid, signal.SIGKILL)
     assert [said(outcome) for outcome in outcomes] == [[str(number)] for number in range(1, 60)]
 
 
 @pytest.mark.usefixtures("nothing_is_left")
-def test_zygote_that_was_killed_while_idle_is_replaced_and_no_socket_is_lost() -> None:
+def test_fork_server_that_was_killed_while_idle_is_replaced_and_no_socket_is_lost() -> None:
     def pairs() -> Iterator[tuple[str, World]]:
         yield saying("a"), WORLD
         time.sleep(0.5)
-        idle = zygotes()
+        idle = fork_servers()
         for pid in idle:
             os.kill(pid, signal.SIGKILL)
         assert are_gone(idle)
@@ -391,13 +389,13 @@ def test_zygote_that_was_killed_while_idle_is_replaced_and_no_socket_is_lost() -
 
 
 def killing(times: int) -> Behaviour:
-    """A way to speak that kills the zygote in the middle of a run, the first few times."""
+    """A way to speak that kills the fork server in the middle of a run, the first few times."""
     left = iter(range(times))
 
     def say(robot: SimulatedRobot, message: str) -> None:
         if next(left, None) is not None:
             family = children_of(os.getpid())
-            for pid in zygotes():
+            for pid in fork_servers():
                 os.kill(pid, signal.SIGKILL)
             assert are_gone(family)
         robot.record("say", message)
@@ -406,14 +404,14 @@ def killing(times: int) -> Behaviour:
 
 
 @pytest.mark.usefixtures("nothing_is_left")
-def test_run_whose_zygote_is_killed_is_run_again() -> None:
+def test_run_whose_fork_server_is_killed_is_run_again() -> None:
     program = "def task_program():\n    say('a')\n    say('b')\n"
     outcomes = list(run([(program, WORLD), (saying("c"), WORLD)], workers=1, behaviours=doing(killing(1))))
     assert [said(outcome) for outcome in outcomes] == [["a", "b"], ["c"]]
 
 
 @pytest.mark.usefixtures("nothing_is_left")
-def test_zygote_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
+def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_and_no_verdict() -> None:
     with pytest.raises(EngineError, match="lost twice"):
         list(run([(saying("a"), WORLD)], workers=1, behaviours=doing(killing(99))))
 
@@ -437,16 +435,18 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
         assert may_go_on.wait(30)
         robot.record("say", message)
 
-    lane = Lane()
+    worker = Worker()
     with ThreadPoolExecutor(1) as thread:
-        running = thread.submit(lane.run, saying("a"), lambda: SimulatedRobot(WORLD, behaviours=doing(busy)))
+        running = thread.submit(
+            worker.run, saying("a"), lambda: SimulatedRobot(WORLD, behaviours=doing(busy))
+        )
         assert is_busy.wait(30)
         family = children_of(os.getpid())
-        lane.stop()
+        worker.stop()
         assert are_gone(family)
         may_go_on.set()
         assert isinstance(running.exception(30), EngineError)
-    lane.close()
+    worker.close()
 
 
 COMPUTING_TWICE = """
@@ -467,12 +467,12 @@ def task_program():
 
 
 def test_program_that_is_run_again_is_not_waited_for_as_long_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    lane = Lane()
+    worker = Worker()
     for warming in ("pass", "import json"):
-        lane.run(f"def task_program():\n    {warming}\n", lambda: SimulatedRobot(WORLD))
+        worker.run(f"def task_program():\n    {warming}\n", lambda: SimulatedRobot(WORLD))
     monkeypatch.setattr("codebotler.simulator.child.LONGEST", 0.6)
-    outcome = lane.run(COMPUTING_TWICE, lambda: SimulatedRobot(WORLD))
-    lane.close()
+    outcome = worker.run(COMPUTING_TWICE, lambda: SimulatedRobot(WORLD))
+    worker.close()
     assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
 
 
@@ -501,13 +501,13 @@ def test_program_that_waits_a_little_at_a_time_ends_the_same_way_in_each_of_many
 
 def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     answered: list[list[object]] = []
-    answer = Conversation._answer
+    answer = SkillProtocol._answer
 
-    def counted(self: Conversation, name: str, values: list[object], now: float) -> Answer:
+    def counted(self: SkillProtocol, name: str, values: list[object], now: float) -> Answer:
         answered.append(values)
         return answer(self, name, values, now)
 
-    monkeypatch.setattr(Conversation, "_answer", counted)
+    monkeypatch.setattr(SkillProtocol, "_answer", counted)
     frame = b'["say",["!"],0.0,0]'
     program = (
         "import os\n"
@@ -522,7 +522,7 @@ def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.Monke
 def test_child_that_is_killed_from_outside_is_told_so() -> None:
     def say(robot: SimulatedRobot, message: str) -> None:
         robot.record("say", message)
-        for pid in zygotes():
+        for pid in fork_servers():
             for child in children_of(pid):
                 os.kill(child, signal.SIGKILL)
 
@@ -588,7 +588,7 @@ def test_windows_is_refused_with_the_platform_patched(monkeypatch: pytest.Monkey
 def test_macos_is_less_isolated_and_says_so_with_the_platform_patched(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(Lane, "has_seccomp", property(lambda _: False, lambda *_: None), raising=False)
+    monkeypatch.setattr(Worker, "has_seccomp", property(lambda _: False, lambda *_: None), raising=False)
     monkeypatch.setattr(sys, "platform", "darwin")
     assert said(next(run([(saying("a"), WORLD)], workers=1))) == ["a"]
     (record,) = caplog.records
@@ -649,14 +649,14 @@ def test_large_programs_say_the_same_addresses_every_time() -> None:
 
 def test_few_characters_of_much_code_are_refused_and_not_kept() -> None:
     methods = "".join(f" def f{j}(): 0\n" for j in range(1500))
-    lane = Lane()
+    worker = Worker()
     for number in range(3):
         source = f"class {'q' * 60_000}{number}:\n{methods}\ndef task_program(): pass\n"
-        error = lane.run(source, lambda: SimulatedRobot(WORLD)).error
+        error = worker.run(source, lambda: SimulatedRobot(WORLD)).error
         assert error is not None
         assert error.kind == "MemoryError"
-    assert sum(len(repr(kept)) for kept in lane._preparer._kept.values()) < 1_000_000
-    lane.close()
+    assert sum(len(repr(kept)) for kept in worker._preparer._kept.values()) < 1_000_000
+    worker.close()
 
 
 SIZES = 15_000, 20_000, 21_400  # which fit into a fresh process only; under Python 3.11, the last at most
@@ -675,16 +675,16 @@ def test_what_was_prepared_before_changes_no_outcome() -> None:
 
 
 def test_a_preparer_that_is_killed_from_outside_is_no_verdict() -> None:
-    lane = Lane()
+    worker = Worker()
 
     def robot() -> SimulatedRobot:
         return SimulatedRobot(WORLD)
 
-    assert said(lane.run(saying("a"), robot)) == ["a"]
-    assert lane._preparer._child is not None
-    os.kill(lane._preparer._child.pid, signal.SIGKILL)
-    assert said(lane.run(saying("b"), robot)) == ["b"]
-    lane.close()
+    assert said(worker.run(saying("a"), robot)) == ["a"]
+    assert worker._preparer._child is not None
+    os.kill(worker._preparer._child.pid, signal.SIGKILL)
+    assert said(worker.run(saying("b"), robot)) == ["b"]
+    worker.close()
 
 
 FROM_A_SHELL = """
@@ -722,13 +722,13 @@ def test_what_a_shell_has_set_changes_no_outcome() -> None:
 
 
 def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(_: Zygote) -> None:
+    def interrupted(_: ForkServer) -> None:
         raise KeyboardInterrupt
 
     codes()  # a file that stays open
-    before, processes = set(Path("/proc/self/fd").iterdir()), zygotes()
-    monkeypatch.setattr(Zygote, "_rehearse", interrupted)
+    before, processes = set(Path("/proc/self/fd").iterdir()), fork_servers()
+    monkeypatch.setattr(ForkServer, "_rehearse", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        Lanes(1)
-    assert zygotes() <= processes
+        WorkerPool(1)
+    assert fork_servers() <= processes
     assert set(Path("/proc/self/fd").iterdir()) == before

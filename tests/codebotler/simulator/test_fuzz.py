@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from codebotler.core.program import Problem, Program
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.engine import Lanes, run
+from codebotler.simulator.engine import WorkerPool, run
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from in_process import OrdinaryProcess, without_addresses
@@ -91,15 +91,15 @@ WORLDS = (
 
 
 @pytest.fixture(scope="module")
-def lanes() -> Iterator[Lanes]:
-    with Lanes(1) as lanes:
-        yield lanes
+def pool() -> Iterator[WorkerPool]:
+    with WorkerPool(1) as pool:
+        yield pool
 
 
 @pytest.fixture(scope="module")
-def other_lanes() -> Iterator[Lanes]:
-    with Lanes(1) as lanes:
-        yield lanes
+def other_pool() -> Iterator[WorkerPool]:
+    with WorkerPool(1) as pool:
+        yield pool
 
 
 @pytest.fixture(scope="module")
@@ -108,8 +108,8 @@ def ordinary() -> Iterator[OrdinaryProcess]:
         yield process
 
 
-def outcome_of(lanes: Lanes, source: str, world: World) -> Outcome:
-    return lanes.here().run(source, lambda: SimulatedRobot(world, RULES))
+def outcome_of(pool: WorkerPool, source: str, world: World) -> Outcome:
+    return pool.here().run(source, lambda: SimulatedRobot(world, RULES))
 
 
 def all_of(outcome: Outcome) -> str:
@@ -143,7 +143,7 @@ def check_problems(source: str, problems: tuple[Problem, ...], outcome: Outcome)
 
 
 def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
-    lanes: Lanes, other_lanes: Lanes, ordinary: OrdinaryProcess
+    pool: WorkerPool, other_pool: WorkerPool, ordinary: OrdinaryProcess
 ) -> None:
     seen: dict[tuple[str, World], Outcome] = {}
 
@@ -154,9 +154,9 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     @example(CLOSED_BY_AN_ERROR, WORLDS[0])
     def check(source: str, world: World) -> None:
         note(source)
-        outcome = seen[source, world] = outcome_of(lanes, source, world)
+        outcome = seen[source, world] = outcome_of(pool, source, world)
         assert outcome.status is not Status.KILLED
-        assert all_of(outcome_of(other_lanes, source, world)) == all_of(outcome)
+        assert all_of(outcome_of(other_pool, source, world)) == all_of(outcome)
         assert without_addresses(ordinary.outcome(source, world)) == without_addresses(outcome)
         check_problems(source, Program(source).problems(), outcome)
 
@@ -169,30 +169,32 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     assert sum(map(len, (outcome.trace for outcome in seen.values()))) >= 2 * len(seen)
 
 
-def test_recursion_through_anything_ends_alike_in_every_run(lanes: Lanes, other_lanes: Lanes) -> None:
+def test_recursion_through_anything_ends_alike_in_every_run(pool: WorkerPool, other_pool: WorkerPool) -> None:
     """How deep it goes is Python's own, and differs by where the interpreter has started."""
 
     @settings(FUZZ, max_examples=EXAMPLES // 4)
     @given(programs(), st.sampled_from(WORLDS))
     def check(source: str, world: World) -> None:
         note(source)
-        outcome = outcome_of(lanes, source, world)
+        outcome = outcome_of(pool, source, world)
         assert outcome.status is not Status.KILLED
-        assert all_of(outcome_of(other_lanes, source, world)) == all_of(outcome)
+        assert all_of(outcome_of(other_pool, source, world)) == all_of(outcome)
 
     check()
 
 
 @pytest.mark.slow
-def test_broken_texts_end_alike_in_every_run_and_break_nothing(lanes: Lanes, other_lanes: Lanes) -> None:
+def test_broken_texts_end_alike_in_every_run_and_break_nothing(
+    pool: WorkerPool, other_pool: WorkerPool
+) -> None:
     @FUZZ
     @given(broken_programs(), st.sampled_from(WORLDS))
     @example("def task_program():\n    \0\n", WORLDS[0])
     def check(source: str, world: World) -> None:
         note(source)
-        outcome = outcome_of(lanes, source, world)
+        outcome = outcome_of(pool, source, world)
         assert outcome.status is not Status.KILLED
-        assert all_of(outcome_of(other_lanes, source, world)) == all_of(outcome)
+        assert all_of(outcome_of(other_pool, source, world)) == all_of(outcome)
         problems = Program(source).problems()
         check_problems(source, problems, outcome)
         if len(problems) == 1 and problems[0].kind in {"SyntaxError", "IndentationError", "TabError"}:

@@ -37,7 +37,7 @@ from codebotler.rtl import parse
 from codebotler.simulator.child import PROCESSOR_TIME
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
-from codebotler.simulator.worker import Lane
+from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import judge
 from roboeval.suites.load import Requirement, Scenario
 
@@ -176,7 +176,7 @@ class Reach:
     """Real things around the engine, and how to see whether one of them was touched."""
 
     folder: Path
-    lane: Lane
+    worker: Worker
     bystander: subprocess.Popen[bytes]
     listeners: dict[str, socket.socket]
     signals: list[int] = field(default_factory=list)
@@ -199,7 +199,7 @@ class Reach:
             "ABSTRACT_SOCKET": MARKER,
             "MARKER": MARKER,
             "PARENT_PID": str(os.getpid()),
-            "ZYGOTE_PID": str(self.zygotes()[-1]),
+            "FORK_SERVER_PID": str(self.fork_servers()[-1]),
             "BYSTANDER_PID": str(self.bystander.pid),
         }
 
@@ -208,14 +208,14 @@ class Reach:
             source = source.replace(f"@{name}@", value)
         return source
 
-    def zygotes(self) -> list[int]:
+    def fork_servers(self) -> list[int]:
         """The processes that fork those of the runs."""
-        return [zygote._process.pid for zygote in self.lane._zygotes.values()]
+        return [fork_server._process.pid for fork_server in self.worker._fork_servers.values()]
 
     def run(self, source: str) -> Outcome:
-        outcome = self.lane.run(source, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
+        outcome = self.worker.run(source, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
         until = time.monotonic() + 1  # the child was killed, which takes the kernel a moment
-        while time.monotonic() < until and living_below(*self.zygotes()):
+        while time.monotonic() < until and living_below(*self.fork_servers()):
             select.select([], [], [], 0.001)
         return outcome
 
@@ -239,9 +239,9 @@ class Reach:
             "signals": list(self.signals),
             "living processes": living_below(os.getpid()),
             "processes with the marker": carry_the_marker(),
-            "zygotes": self.zygotes(),
+            "fork_servers": self.fork_servers(),
             "descriptors": descriptors(os.getpid()),
-            "descriptors of the zygotes": list(map(descriptors, self.zygotes())),
+            "descriptors of the fork servers": list(map(descriptors, self.fork_servers())),
         }
 
 
@@ -300,7 +300,7 @@ def reach(
     """All of it; orphans below this process become its children, so that none can hide."""
     libc = ctypes.CDLL(None)
     os.environ["SECRET_OF_THE_ENGINE"] = SECRET
-    reach = Reach(folder, Lane(), bystander, listeners)
+    reach = Reach(folder, Worker(), bystander, listeners)
     reach.run(HONEST)  # by now all processes are there
     before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
@@ -310,18 +310,18 @@ def reach(
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0) == 0
     for number, handler in before.items():
         signal.signal(number, handler)
-    reach.lane.close()
+    reach.worker.close()
     del os.environ["SECRET_OF_THE_ENGINE"]
 
 
 @pytest.fixture(scope="module")
 def honest(reach: Reach) -> Outcome:
-    """What an honest program does before any hostile one has run, in a lane of its own."""
-    lane = Lane()
+    """What an honest program does before any hostile one has run, in a worker of its own."""
+    worker = Worker()
     try:
-        outcome = lane.run(HONEST, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
+        outcome = worker.run(HONEST, lambda: SimulatedRobot(WORLD, AS_WRITTEN))
     finally:
-        lane.close()
+        worker.close()
     assert outcome.status is Status.FINISHED, outcome
     assert done(outcome)[:2] == ("goto vault", f"say {PHRASE}")
     assert judge(outcome, ASKED).satisfied
@@ -437,11 +437,11 @@ def test_a_signal_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -
     assert changed() == set()
 
 
-def test_a_stopped_zygote_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
-    os.kill(reach.zygotes()[-1], signal.SIGSTOP)
-    os.waitid(os.P_PID, reach.zygotes()[-1], os.WSTOPPED | os.WNOWAIT)
+def test_a_stopped_fork_server_would_be_seen(reach: Reach, changed: Callable[[], set[str]]) -> None:
+    os.kill(reach.fork_servers()[-1], signal.SIGSTOP)
+    os.waitid(os.P_PID, reach.fork_servers()[-1], os.WSTOPPED | os.WNOWAIT)
     assert changed() == {"living processes"}
-    os.kill(reach.zygotes()[-1], signal.SIGCONT)
+    os.kill(reach.fork_servers()[-1], signal.SIGCONT)
     while changed():
         select.select([], [], [], 0.01)
 

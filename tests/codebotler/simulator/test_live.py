@@ -16,8 +16,8 @@ from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.engine import EngineError
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, PAPER
-from codebotler.simulator.worker import Lane
-from processes import are_gone, children_of, zygotes
+from codebotler.simulator.worker import Worker
+from processes import are_gone, children_of, fork_servers
 
 LIVE = replace(PAPER, literals="as-written", limits=ENDLESS)
 
@@ -51,19 +51,19 @@ class Machine:
 
 
 @pytest.fixture
-def lane() -> Iterator[Lane]:
-    lane = Lane()
-    yield lane
-    lane.close()
+def worker() -> Iterator[Worker]:
+    worker = Worker()
+    yield worker
+    worker.close()
 
 
-def done(lane: Lane, program: str) -> tuple[list[str], Outcome]:
+def done(worker: Worker, program: str) -> tuple[list[str], Outcome]:
     machine = Machine()
-    outcome = lane.run_live(program, machine)
+    outcome = worker.run_live(program, machine)
     return machine.done, outcome
 
 
-def test_clock_is_the_robots_and_sleeping_is_asked_of_it(lane: Lane) -> None:
+def test_clock_is_the_robots_and_sleeping_is_asked_of_it(worker: Worker) -> None:
     program = (
         "def task_program():\n"
         "    say('Hello')\n"
@@ -71,28 +71,28 @@ def test_clock_is_the_robots_and_sleeping_is_asked_of_it(lane: Lane) -> None:
         "    time.sleep(30)\n"
         "    say(time.strftime('%H:%M:%S'))\n"
     )
-    happened, outcome = done(lane, program)
+    happened, outcome = done(worker, program)
     assert happened == ["Hello", "2.0", "sleeps 30 s", "12:00:34"]
     assert outcome == Outcome(Status.FINISHED, tuple(Event("say", text) for text in happened))
 
 
-def test_ticks_are_counted_anew_after_each_skill_and_sleep(lane: Lane) -> None:
+def test_ticks_are_counted_anew_after_each_skill_and_sleep(worker: Worker) -> None:
     turns = "    for _ in range(150_000): pass\n"
     both = f"def task_program():\n{turns}    say('a')\n{turns}    time.sleep(1)\n{turns}"
-    assert done(lane, both)[1].status == Status.FINISHED
-    happened, outcome = done(lane, f"def task_program():\n    say('a')\n{turns}{turns}")
+    assert done(worker, both)[1].status == Status.FINISHED
+    happened, outcome = done(worker, f"def task_program():\n    say('a')\n{turns}{turns}")
     assert (happened, outcome.status) == (["a"], Status.TIMEOUT)
 
 
-def test_there_is_no_limit_of_skill_calls_or_of_time(lane: Lane) -> None:
+def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
     program = "def task_program():\n    for i in range(1500): say(str(i)); time.sleep(60)\n"
-    happened, outcome = done(lane, program)
+    happened, outcome = done(worker, program)
     assert outcome.status == Status.FINISHED
     assert len(happened) == 3000
 
 
 def test_program_may_compute_for_long_if_it_acts_in_between(
-    lane: Lane, monkeypatch: pytest.MonkeyPatch
+    worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("codebotler.simulator.child.LONGEST", 5.0)
     program = (
@@ -101,11 +101,11 @@ def test_program_may_compute_for_long_if_it_acts_in_between(
         "        for _ in range(40): sum(range(1_200_000))\n"
         "        say(str(i))\n"
     )
-    assert done(lane, program)[0] == list("0123456789")
+    assert done(worker, program)[0] == list("0123456789")
 
 
 @pytest.mark.parametrize("seconds", ["-1.0", "NaN", "Infinity", "true", '"1"', "[]"])
-def test_request_to_sleep_that_no_child_makes_ends_the_run(lane: Lane, seconds: str) -> None:
+def test_request_to_sleep_that_no_child_makes_ends_the_run(worker: Worker, seconds: str) -> None:
     frame = f'["sleep",[{seconds}],0.0,1]'.encode()
     program = (
         "import os\n"
@@ -113,23 +113,23 @@ def test_request_to_sleep_that_no_child_makes_ends_the_run(lane: Lane, seconds: 
         "    say('a')\n"
     )
     machine = Machine()
-    assert lane.run_live(program, machine).status == Status.KILLED
+    assert worker.run_live(program, machine).status == Status.KILLED
     assert machine.done == []
 
 
-def test_programs_that_import_run_once_only(lane: Lane) -> None:
+def test_programs_that_import_run_once_only(worker: Worker) -> None:
     happened, outcome = done(
-        lane, "def task_program():\n    say('a')\n    exec('import random')\n    say('b')\n"
+        worker, "def task_program():\n    say('a')\n    exec('import random')\n    say('b')\n"
     )
     assert (happened, outcome.status) == (["a", "b"], Status.FINISHED)
 
 
-def test_robots_errors_reach_the_program_in_its_own_words(lane: Lane) -> None:
+def test_robots_errors_reach_the_program_in_its_own_words(worker: Worker) -> None:
     def does(_: str) -> Result:
         raise RobotError("GoToInvalidLocation", "the door is shut")
 
     program = "def task_program():\n    go_to('Hall')\n"
-    outcome = lane.run_live(program, Machine(does))
+    outcome = worker.run_live(program, Machine(does))
     assert outcome.error is not None
     assert (outcome.error.kind, outcome.error.message, outcome.line) == (
         "GoToInvalidLocation",
@@ -142,7 +142,7 @@ class StoppedError(Exception):
     """Somebody has stopped the robot."""
 
 
-def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(lane: Lane) -> None:
+def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: Worker) -> None:
     def does(text: str) -> Result:
         if text == "b":
             raise StoppedError
@@ -157,28 +157,28 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(lane: La
     )
     machine = Machine(does)
     with pytest.raises(StoppedError):
-        lane.run_live(stubborn, machine)
+        worker.run_live(stubborn, machine)
     assert machine.done == ["a"]
-    assert are_gone({child for pid in zygotes() for child in children_of(pid)})
-    assert done(lane, "def task_program(): say('next')")[0] == ["next"]
+    assert are_gone({child for pid in fork_servers() for child in children_of(pid)})
+    assert done(worker, "def task_program(): say('next')")[0] == ["next"]
 
 
-def test_run_whose_process_is_lost_is_not_run_again(lane: Lane) -> None:
+def test_run_whose_process_is_lost_is_not_run_again(worker: Worker) -> None:
     def does(_: str) -> Result:
         family = children_of(os.getpid())
-        for pid in zygotes():
+        for pid in fork_servers():
             os.kill(pid, signal.SIGKILL)
         assert are_gone(family)
         return None
 
     machine = Machine(does)
     with pytest.raises(EngineError, match="lost"):
-        lane.run_live("def task_program():\n    say('a')\n    say('b')\n", machine)
+        worker.run_live("def task_program():\n    say('a')\n    say('b')\n", machine)
     assert machine.done == ["a"]
-    assert done(lane, "def task_program(): say('next')")[0] == ["next"]
+    assert done(worker, "def task_program(): say('next')")[0] == ["next"]
 
 
-def test_stop_ends_a_run_that_sleeps(lane: Lane) -> None:
+def test_stop_ends_a_run_that_sleeps(worker: Worker) -> None:
     sleeps, may_go_on = threading.Event(), threading.Event()
 
     class Sleeper(Machine):
@@ -190,18 +190,18 @@ def test_stop_ends_a_run_that_sleeps(lane: Lane) -> None:
     machine = Sleeper()
     with ThreadPoolExecutor(1) as thread:
         program = "def task_program():\n    time.sleep(3600)\n    say('a')\n"
-        running = thread.submit(lane.run_live, program, machine)
+        running = thread.submit(worker.run_live, program, machine)
         assert sleeps.wait(30)
         family = children_of(os.getpid())
-        lane.stop()
+        worker.stop()
         assert are_gone(family)
         may_go_on.set()
         assert isinstance(running.exception(30), EngineError)
     assert machine.done == ["sleeps 3600 s"]
 
 
-def test_program_that_does_not_parse_is_told_as_in_simulation(lane: Lane) -> None:
-    happened, outcome = done(lane, "def task_program(:\n")
+def test_program_that_does_not_parse_is_told_as_in_simulation(worker: Worker) -> None:
+    happened, outcome = done(worker, "def task_program(:\n")
     assert (happened, outcome.status, outcome.error and outcome.error.kind) == (
         [],
         Status.PYTHON_ERROR,

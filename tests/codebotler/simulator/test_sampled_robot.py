@@ -12,31 +12,31 @@ import pytest
 
 from codebotler.core.trace import Option
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.fact_sampler import Lot
+from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import Argument, Result, RobotError
-from codebotler.simulator.sampled_robot import Fact, ImaginedRobot, Plan, Whereabouts, meant
+from codebotler.simulator.sampled_robot import Fact, RoomMap, SampledRobot, Whereabouts, meant
 
-PLAN = Plan(("start_loc", "kitchen", "lab"), "start_loc")
+PLAN = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")
 YES_NO = (Option("Yes"), Option("No"))
 
 
-def robot_in(room: str = "kitchen", sample: int = 0, *, seed: int = 0, strict: bool = False) -> ImaginedRobot:
-    robot = ImaginedRobot(PLAN, Lot(seed, sample, strict))
+def robot_in(room: str = "kitchen", sample: int = 0, *, seed: int = 0, strict: bool = False) -> SampledRobot:
+    robot = SampledRobot(PLAN, FactSampler(seed, sample, strict))
     robot.perform("go_to", [room])
     return robot
 
 
-def look(robot: ImaginedRobot, what: str) -> Result:
+def look(robot: SampledRobot, what: str) -> Result:
     return robot.perform("is_in_room", [what])
 
 
-def where(what: str, *, there: bool) -> ImaginedRobot:
+def where(what: str, *, there: bool) -> SampledRobot:
     """A robot in a kitchen in which it has looked for something and found it, or not."""
     robots = (robot_in(sample=number) for number in range(100))
     return next(robot for robot in robots if look(robot, what) is there)
 
 
-def failure(robot: ImaginedRobot, skill: str, *arguments: Any) -> str:  # noqa: ANN401 - of any skill
+def failure(robot: SampledRobot, skill: str, *arguments: Any) -> str:  # noqa: ANN401 - of any skill
     with pytest.raises(RobotError) as caught:
         robot.perform(skill, arguments)
     return caught.value.kind
@@ -46,7 +46,7 @@ def failure(robot: ImaginedRobot, skill: str, *arguments: Any) -> str:  # noqa: 
 
 
 def test_rooms_are_those_of_the_plan_and_found_as_in_the_simulator() -> None:
-    robot = ImaginedRobot(PLAN, Lot())
+    robot = SampledRobot(PLAN, FactSampler())
     assert robot.perform("get_all_rooms", ()) == ["start_loc", "kitchen", "lab"]
     assert robot.perform("get_current_location", ()) == "start_loc"
     robot.perform("go_to", ["the Kitchen, please"])
@@ -61,7 +61,7 @@ def test_rooms_are_those_of_the_plan_and_found_as_in_the_simulator() -> None:
 
 def test_rooms_of_a_world_keep_their_regexes_and_their_start() -> None:
     world = World((Room("lab [12]", people=(Person("amy"),)), Room("hall")), "hall")
-    robot = ImaginedRobot(Plan.of(world), Lot())
+    robot = SampledRobot(RoomMap.of(world), FactSampler())
     assert robot.perform("get_current_location", ()) == "hall"
     robot.perform("go_to", ["lab 2"])
     assert robot.room == "lab [12]"
@@ -69,7 +69,7 @@ def test_rooms_of_a_world_keep_their_regexes_and_their_start() -> None:
 
 
 def test_guessed_rooms_are_plain_texts_and_any_other_is_found_too() -> None:
-    robot = ImaginedRobot(Plan(("c++ lab", "hall"), "hall", guessed=True), Lot())
+    robot = SampledRobot(RoomMap(("c++ lab", "hall"), "hall", guessed=True), FactSampler())
     robot.perform("go_to", ["C++ lab"])
     assert robot.room == "c++ lab"
     robot.perform("go_to", [" attic "])
@@ -80,7 +80,7 @@ def test_guessed_rooms_are_plain_texts_and_any_other_is_found_too() -> None:
 
 
 def test_a_room_is_preferred_to_one_that_its_name_contains() -> None:
-    plan = Plan(("lab", "lab 2", "hall"), "hall", guessed=True)
+    plan = RoomMap(("lab", "lab 2", "hall"), "hall", guessed=True)
     assert (plan.room("Lab 2"), plan.room("the lab"), plan.room("")) == ("lab 2", "lab", None)
 
 
@@ -107,7 +107,7 @@ def test_what_is_looked_for_is_there_in_about_every_second_world_and_differs_by_
 
 
 def test_a_lucky_world_has_most_of_what_is_looked_for() -> None:
-    seen = [Lot(sample=number, lucky=True).is_there("kitchen", "mug") for number in range(200)]
+    seen = [FactSampler(sample=number, lucky=True).is_there("kitchen", "mug") for number in range(200)]
     assert 155 < sum(seen) < 195
 
 
@@ -271,7 +271,7 @@ def test_an_answer_that_is_no_longer_offered_is_drawn_again() -> None:
 # --- what is owed to the lots
 
 
-def searched(what: str, in_kitchen: bool, in_lab: bool, seed: int = 0) -> ImaginedRobot:  # noqa: FBT001 - a table
+def searched(what: str, in_kitchen: bool, in_lab: bool, seed: int = 0) -> SampledRobot:  # noqa: FBT001 - a table
     for number in itertools.count():
         robot = robot_in(sample=number, seed=seed)
         if look(robot, what) is not in_kitchen:
@@ -334,10 +334,10 @@ def test_waiting_in_vain_does_not_excuse_asking() -> None:
 
 def test_who_has_a_name_is_somebody() -> None:
     for sample in range(20):
-        robot = ImaginedRobot(PLAN, Lot(sample=sample))
+        robot = SampledRobot(PLAN, FactSampler(sample=sample))
         if look(robot, "Bob"):
             assert look(robot, "person")
-        robot = ImaginedRobot(PLAN, Lot(sample=sample))
+        robot = SampledRobot(PLAN, FactSampler(sample=sample))
         if not look(robot, "person"):
             assert not look(robot, "Bob")
 
@@ -351,7 +351,7 @@ def test_what_was_taken_is_gone_also_if_it_has_a_name() -> None:
 @pytest.mark.parametrize("options", [("No", "Yes"), ("Yes", "No")])
 def test_who_is_lucky_meets_people_who_mostly_agree(options: tuple[str, ...]) -> None:
     def says_yes(sample: int, *, lucky: bool) -> bool:
-        robot = ImaginedRobot(PLAN, Lot(sample=sample, lucky=lucky))
+        robot = SampledRobot(PLAN, FactSampler(sample=sample, lucky=lucky))
         chosen = robot.perform("ask", ["Bob", "Tea?", tuple(map(Option, options))])
         return isinstance(chosen, int) and options[chosen] == "Yes"
 
@@ -370,7 +370,7 @@ def test_finding_two_of_what_it_searches_excuses_picking_both() -> None:
 
 def test_strict_excuses_nothing() -> None:
     robot = searched("mug", in_kitchen=False, in_lab=False)
-    robot.lot = Lot(robot.lot.seed, robot.lot.sample, strict=True)
+    robot.lot = FactSampler(robot.lot.seed, robot.lot.sample, strict=True)
     assert failure(robot, "place", "mug") == "PlaceNoObject"
     assert robot.excuses == set()
 
@@ -379,18 +379,26 @@ def test_strict_excuses_nothing() -> None:
 
 
 def test_lots_depend_on_seed_sample_and_fact_alone() -> None:
-    def drawn(lot: Lot) -> list[int]:
+    def drawn(lot: FactSampler) -> list[int]:
         return [lot.draw(1_000, "a fact", str(number)) for number in range(20)]
 
-    assert drawn(Lot(7, 3)) == drawn(Lot(7, 3))
-    assert len({tuple(drawn(lot)) for lot in (Lot(7, 3), Lot(7, 4), Lot(8, 3), Lot(73, 0))}) == 4
-    assert Lot(1).draw(1_000, "ab", "c") != Lot(1).draw(1_000, "a", "bc")
+    assert drawn(FactSampler(7, 3)) == drawn(FactSampler(7, 3))
+    assert (
+        len(
+            {
+                tuple(drawn(lot))
+                for lot in (FactSampler(7, 3), FactSampler(7, 4), FactSampler(8, 3), FactSampler(73, 0))
+            }
+        )
+        == 4
+    )
+    assert FactSampler(1).draw(1_000, "ab", "c") != FactSampler(1).draw(1_000, "a", "bc")
 
 
 def test_lots_are_the_same_whatever_hashing_does() -> None:
     told = (
-        "from codebotler.simulator.fact_sampler import Lot\n"
-        "print([Lot(5).draw(99, 'x', str(n)) for n in range(9)])\n"
+        "from codebotler.simulator.fact_sampler import FactSampler\n"
+        "print([FactSampler(5).draw(99, 'x', str(n)) for n in range(9)])\n"
     )
     printed = {
         subprocess.run(
@@ -401,7 +409,7 @@ def test_lots_are_the_same_whatever_hashing_does() -> None:
         ).stdout
         for seed in ("1", "2")
     }
-    assert printed == {f"{[Lot(5).draw(99, 'x', str(n)) for n in range(9)]}\n".encode()}
+    assert printed == {f"{[FactSampler(5).draw(99, 'x', str(n)) for n in range(9)]}\n".encode()}
 
 
 def test_a_draw_knows_in_which_worlds_it_would_be_the_same() -> None:

@@ -279,7 +279,7 @@ WORKS: dict[str, tuple[str, object]] = {
         "async def task_program(): say('a')\ntry: task_program().send(None)\nexcept StopIteration: pass\n",
         ["a"],
     ),
-    "nothing is left of what ran before in the zygote": (
+    "nothing is left of what ran before in the fork_server": (
         task(
             "say(' '.join(name for name in sorted(globals()) if name[0] != '_'))\nsay(str(time.monotonic()))"
         ),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Option, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
@@ -215,6 +215,6 @@ def test_world_files_say_so_and_are_written_so(tmp_path: Path) -> None:
 def test_mistakes_in_world_files_are_told(tmp_path: Path, good: str, bad: str, problem: str) -> None:
     path = tmp_path / "world.yaml"
     path.write_text(FILE.replace(good, bad))
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(UserError) as error:
         World.read(path)
     assert problem in str(error.value)

@@ -18,8 +18,8 @@ from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unhea
 from codebotler.prompts import Prompt
 from codebotler.robots.base import Result, Robot
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator.sampled_robot import Plan
-from codebotler.web.console import MOST_PROGRAM, Desk
+from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.view import Order, View, digest
 from doubles import Answering
 
@@ -54,21 +54,21 @@ class Author:
         self.is_closed = True
 
 
-def desk_of(home: Path, robot: Robot | None = None, author: Author | None = None) -> Desk:
+def desk_of(home: Path, robot: Robot | None = None, author: Author | None = None) -> Console:
     def model(_name: str) -> Model:
         assert author is not None
         return author
 
-    return Desk(robot or Simulated(WORLD, speed=None), home, model, models=("author",), world=WORLD)
+    return Console(robot or Simulated(WORLD, speed=None), home, model, models=("author",), world=WORLD)
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Iterator[Desk]:
+def desk(tmp_path: Path) -> Iterator[Console]:
     with desk_of(tmp_path) as desk:
         yield desk
 
 
-def until(desk: Desk, holds: Callable[[View], bool], seconds: float = 10.0) -> View:
+def until(desk: Console, holds: Callable[[View], bool], seconds: float = 10.0) -> View:
     """The first view of which something holds."""
     ends = time.monotonic() + seconds
     while not holds(desk.view):
@@ -77,12 +77,12 @@ def until(desk: Desk, holds: Callable[[View], bool], seconds: float = 10.0) -> V
     return desk.view
 
 
-def checked(desk: Desk, program: str = HELLO) -> View:
+def checked(desk: Console, program: str = HELLO) -> View:
     desk.begin(Order(program=program))
     return until(desk, lambda view: view.found is not None)
 
 
-def approved(desk: Desk, program: str = HELLO) -> None:
+def approved(desk: Console, program: str = HELLO) -> None:
     view = checked(desk, program)
     turn = desk.turn
     assert turn is not None
@@ -122,7 +122,7 @@ def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Pa
         assert (desk.view.state, author.is_closed) == (State.STOPPED, True)
 
 
-def test_problems_need_a_word_about_them(desk: Desk) -> None:
+def test_problems_need_a_word_about_them(desk: Console) -> None:
     view = checked(desk, BAD)
     turn = desk.turn
     assert turn is not None
@@ -134,7 +134,7 @@ def test_problems_need_a_word_about_them(desk: Desk) -> None:
     assert until(desk, lambda view: view.is_over).state is State.FAILED
 
 
-def test_only_the_program_that_was_seen_can_be_approved(desk: Desk) -> None:
+def test_only_the_program_that_was_seen_can_be_approved(desk: Console) -> None:
     seen = checked(desk)
     desk.edit(HELLO.replace("hello", "bye"))
     turn = desk.turn
@@ -147,7 +147,7 @@ def test_only_the_program_that_was_seen_can_be_approved(desk: Desk) -> None:
     assert desk.view.state is State.CHECKED
 
 
-def test_an_edited_program_is_checked_again_and_the_last_one_counts(desk: Desk) -> None:
+def test_an_edited_program_is_checked_again_and_the_last_one_counts(desk: Console) -> None:
     checked(desk)
     for number in range(5):
         desk.edit(HELLO + f"    say('{number}')\n")
@@ -253,7 +253,7 @@ def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
         assert not desk.stop("a test")
 
 
-def test_another_instruction_takes_the_place_of_one_that_waits(desk: Desk) -> None:
+def test_another_instruction_takes_the_place_of_one_that_waits(desk: Console) -> None:
     first = checked(desk)
     desk.begin(Order(program=BAD))
     until(desk, lambda view: view.found is not None and view.number > first.number)
@@ -269,13 +269,13 @@ def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
 
 
 def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    go_on, check = threading.Event(), Desk.check
+    go_on, check = threading.Event(), Console.check
 
-    def slow(desk: Desk, program: str, plan: Plan | None = None) -> Check:
+    def slow(desk: Console, program: str, plan: RoomMap | None = None) -> Check:
         go_on.wait(20)
         return check(desk, program, plan)
 
-    monkeypatch.setattr(Desk, "check", slow)
+    monkeypatch.setattr(Console, "check", slow)
     with desk_of(tmp_path) as desk:
         turn = desk.begin(Order(program=HELLO))
         until(desk, lambda view: view.busy == "checking" and bool(view.id))
@@ -310,7 +310,7 @@ def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
         (Order(program="#" * (MOST_PROGRAM + 1)), "too many"),
     ],
 )
-def test_what_cannot_be_begun_is_refused(desk: Desk, order: Order, told: str) -> None:
+def test_what_cannot_be_begun_is_refused(desk: Console, order: Order, told: str) -> None:
     with pytest.raises(MissionError, match=told):
         desk.begin(order)
     assert missions(desk.home) == []
@@ -325,7 +325,7 @@ def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> Non
         assert view.id == ""
 
 
-def test_viewers_are_woken_at_each_change(desk: Desk) -> None:
+def test_viewers_are_woken_at_each_change(desk: Console) -> None:
     async def watch() -> bool:
         turn = desk.begin(Order(program=HELLO))
         return await desk.board.until(lambda: turn.view.found is not None, 10.0)

@@ -22,7 +22,7 @@ from codebotler.missions.store import missions
 from codebotler.robots.face import Face, Question
 from codebotler.robots.simulated import Simulated
 from codebotler.web.access import SHORTEST_TOKEN
-from codebotler.web.console import Desk
+from codebotler.web.console import Console
 from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
 from codebotler.web.guard import MOST_BYTES
 from codebotler.web.view import View
@@ -146,7 +146,9 @@ def test_the_face_tells_what_the_robot_does_and_nothing_of_its_program(server: P
 def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path: Path) -> None:
     """It concerns whoever stands beside it."""
     face = Face()
-    desk = Desk(Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face)
+    desk = Console(
+        Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face
+    )
     desk._turn = type("Ended", (), {"view": View(1, "m", State.FAILED, reason=UNCONFIRMED)})()
     assert face_data(desk, face)["reason"] == UNCONFIRMED
 

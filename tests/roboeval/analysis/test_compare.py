@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from command_line import refused, roboeval
 from roboeval.analysis.compare import (
     compared,
@@ -43,7 +43,7 @@ def test_the_other_way_round() -> None:
 
 
 def test_no_prompt_in_common() -> None:
-    with pytest.raises(BadInput, match="no prompt"):
+    with pytest.raises(UserError, match="no prompt"):
         compared({("A", 0): 1.0}, {("A", 1): 1.0})
 
 
@@ -106,7 +106,7 @@ def test_what_is_unlike() -> None:
 def test_other_suites_are_refused() -> None:
     again = {"a": "roboeval evaluate a", "b": "roboeval evaluate b --suite mine"}
     expect_same_suite({"a": {"digest": "1"}, "b": {"digest": "1"}}, SUITE, again)
-    with pytest.raises(BadInput, match=r"\bb and a\b.* \(1 and 0\)") as e:
+    with pytest.raises(UserError, match=r"\bb and a\b.* \(1 and 0\)") as e:
         expect_same_suite({"a": {"digest": SUITE.digest}, "b": {"digest": "1"}}, SUITE, again)
     assert "`roboeval evaluate b --suite mine --redo`" in str(e.value)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from made_results import table_of
 from roboeval.analysis.summary import ALL, Summary, kinds_in_order, summary_data
 from roboeval.analysis.summary import causes as causes_of
@@ -74,13 +74,13 @@ def test_tasks_stand_in_the_order_of_the_suite() -> None:
 
 
 def test_nothing_to_count_is_said() -> None:
-    with pytest.raises(BadInput, match=r"^0 of 0 completions "):
+    with pytest.raises(UserError, match=r"^0 of 0 completions "):
         summary([], SUITE)
 
 
 @pytest.mark.parametrize("k", [0, 3])
 def test_a_k_that_cannot_be_estimated_is_refused(k: int) -> None:
-    with pytest.raises(BadInput, match=r"\bk from 1 to 2$"):
+    with pytest.raises(UserError, match=r"\bk from 1 to 2$"):
         summary(ROWS, SUITE, k=(k,))
 
 
@@ -131,7 +131,7 @@ def test_tasks_without_a_score_are_told_apart() -> None:
     text = printed(summary_view(counted, title="x"))
     assert text.startswith("x\n4 of 11 completions judged\n")
     assert re.search(r"no completions .*A\nnot judged.* B\nnot selected.* C\n", text)
-    with pytest.raises(BadInput, match=r"^0 of 11 completions "):
+    with pytest.raises(UserError, match=r"^0 of 11 completions "):
         summary([], suite, scope=scope)
 
 
@@ -147,7 +147,7 @@ def test_a_finished_evaluation_does_not_count_what_it_judged() -> None:
 def test_one_is_one() -> None:
     one = row(0, 0, ("PythonError", "NameError"))
     assert "1 of 1 completion failed" in printed(summary_view(summary([one], SUITE), title="x"))
-    with pytest.raises(BadInput, match=r"^0 of 1 completion "):
+    with pytest.raises(UserError, match=r"^0 of 1 completion "):
         summary([], SUITE, scope=Scope({"Visit": 1}))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from made_results import results_of, table_of
 from roboeval.analysis.summary import summary
@@ -90,7 +90,7 @@ def test_a_selection_is_read() -> None:
     ],
 )
 def test_a_wrong_selection_is_explained(text: str, named: list[str]) -> None:
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(UserError) as error:
         parse_selection(text, SUITE)
     assert all(name in error.value.sentence for name in named), error.value
 
@@ -103,5 +103,5 @@ def test_a_wrong_selection_is_explained(text: str, named: list[str]) -> None:
     ],
 )
 def test_a_selection_without_rows_is_an_error(selection: Selection, named: str) -> None:
-    with pytest.raises(BadInput, match=named):
+    with pytest.raises(UserError, match=named):
         selection.expect_judged(results_of(ROWS))

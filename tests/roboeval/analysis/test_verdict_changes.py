@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from command_line import Ended, refused, roboeval
 from made_results import results_of
 from roboeval.analysis.verdict_changes import (
@@ -108,7 +108,7 @@ def test_what_one_suite_has_not_judged_is_left_out() -> None:
     found = changed({"Visit": (3,), "FindBook": (1,)}, {"Visit": (2,), "BringTea": (9, 9)})
     assert (found.completions, found.left_out) == (10, 30)
     assert [task.task for task in found.tasks] == ["Visit"]
-    with pytest.raises(BadInput, match="both suites") as error:
+    with pytest.raises(UserError, match="both suites") as error:
         changed({"Visit": (3,)}, {"FindBook": (3,)})
     assert error.value.file == "a"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from check import CAUGHT, LOST, LOST_IN_A_TASK, Source, rates, real, rejections, truths
-from codebotler.simulator.engine import Lanes
+from codebotler.simulator.engine import WorkerPool
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import Suite
 
@@ -14,18 +14,18 @@ EVERY = 8
 
 
 @pytest.fixture(scope="module")
-def lanes() -> Iterator[Lanes]:
-    with Lanes(1) as started:
+def pool() -> Iterator[WorkerPool]:
+    with WorkerPool(1) as started:
         yield started
 
 
 @pytest.mark.slow
 def test_rates_on_real_programs(
-    corpus: Path, paper: Suite, lanes: Lanes, monkeypatch: pytest.MonkeyPatch
+    corpus: Path, paper: Suite, pool: WorkerPool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("CODEBOTLER_CORPUS", str(corpus))
     sources = list(dict.fromkeys(real(paper)))[::EVERY]
-    found = rates(sources, truths(sources, paper, 1), rejections(sources, paper, [0], lanes))
+    found = rates(sources, truths(sources, paper, 1), rejections(sources, paper, [0], pool))
     assert found.certain.checks > 20
     assert found.right.checks > 40
     assert found.certain.share >= CAUGHT
@@ -35,12 +35,12 @@ def test_rates_on_real_programs(
 
 
 def test_right_ones_of_the_careful_programs_are_accepted_and_wrong_ones_for_their_error(
-    paper: Suite, lanes: Lanes
+    paper: Suite, pool: WorkerPool
 ) -> None:
     rows = [(c.task, c.program) for c in recorded_completions("recorded:careful", paper)]
     sources: list[Source] = list(dict.fromkeys(rows))
     true = truths(sources, paper, 1)
-    said = rejections(sources, paper, [0, 1], lanes)
+    said = rejections(sources, paper, [0, 1], pool)
     right = [each for truth, each in zip(true, said, strict=True) if truth.passed]
     ends = {"IndexError", "PlaceNoObject"}
     wrong = [each for truth, each in zip(true, said, strict=True) if truth.kinds & ends]

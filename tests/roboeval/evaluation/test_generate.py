@@ -15,9 +15,9 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line
-from codebotler.models.base import ModelError, Settings
+from codebotler.models.base import ModelError, SamplingSettings
 from roboeval.evaluation.generate import Pace, Progress, generate_run
 from roboeval.evaluation.requests import GenerationPlan, RequestLog
 from roboeval.evaluation.runs.completions import read_completions
@@ -36,12 +36,14 @@ def generated(
     model: Scripted,
     *,
     count: int = 3,
-    settings: Settings | None = None,
+    settings: SamplingSettings | None = None,
     pace: Pace | None = None,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Progress:
     plan = GenerationPlan(suite, SMALL, count)
-    return generate_run(run, plan, model, settings or Settings(), pace or Pace(), on_progress=on_progress)
+    return generate_run(
+        run, plan, model, settings or SamplingSettings(), pace or Pace(), on_progress=on_progress
+    )
 
 
 def rows(run: Run) -> list[dict[str, Any]]:
@@ -65,7 +67,7 @@ def test_a_run_has_the_files_and_rows_of_the_design(tmp_path: Path, paper: Suite
     run = Run(tmp_path / "runs" / "one")
     model = Scripted()
     progress = generated(
-        run, paper, model, settings=Settings(temperature=0.7, seed=5, base_url="http://a/v1")
+        run, paper, model, settings=SamplingSettings(temperature=0.7, seed=5, base_url="http://a/v1")
     )
     assert (progress.done, progress.total, progress.missing, progress.interrupted) == (30, 30, None, 0)
     assert model.closed
@@ -165,17 +167,19 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
 @pytest.mark.parametrize(
     ("settings", "what"),
     [
-        (Settings(temperature=0.7), "temperature (0.2, now 0.7)"),
-        (Settings(top_p=0.5), "top-p (0.95, now 0.5)"),
-        (Settings(max_tokens=100), "max-tokens (512, now 100)"),
-        (Settings(seed=1), "seed (none, now 1)"),
+        (SamplingSettings(temperature=0.7), "temperature (0.2, now 0.7)"),
+        (SamplingSettings(top_p=0.5), "top-p (0.95, now 0.5)"),
+        (SamplingSettings(max_tokens=100), "max-tokens (512, now 100)"),
+        (SamplingSettings(seed=1), "seed (none, now 1)"),
     ],
 )
-def test_other_settings_are_refused(tmp_path: Path, paper: Suite, settings: Settings, what: str) -> None:
+def test_other_settings_are_refused(
+    tmp_path: Path, paper: Suite, settings: SamplingSettings, what: str
+) -> None:
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted())
     before = run.completions.read_bytes(), run.about.read_bytes()
-    with pytest.raises(BadInput, match=re.escape(what)) as error:
+    with pytest.raises(UserError, match=re.escape(what)) as error:
         generated(run, paper, Scripted(), settings=settings)
     assert error.value.file == run.about
     assert (run.completions.read_bytes(), run.about.read_bytes()) == before
@@ -184,17 +188,17 @@ def test_other_settings_are_refused(tmp_path: Path, paper: Suite, settings: Sett
 def test_another_model_or_template_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted())
-    with pytest.raises(BadInput, match=r"\(scripted:one, now scripted:two\)"):
+    with pytest.raises(UserError, match=r"\(scripted:one, now scripted:two\)"):
         generated(run, paper, Scripted(name="scripted:two"))
     run.about.write_text(json.dumps(about(run) | {"template": "0" * 64}))
-    with pytest.raises(BadInput, match=r"template \(000000000000\.\.\., now "):
+    with pytest.raises(UserError, match=r"template \(000000000000\.\.\., now "):
         generated(run, paper, Scripted())
 
 
 def test_another_timeout_or_address_is_no_matter(tmp_path: Path, paper: Suite) -> None:
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted(), count=1)
-    moved = Settings(timeout=5, base_url="http://other/v1")
+    moved = SamplingSettings(timeout=5, base_url="http://other/v1")
     generated(run, paper, Scripted(), count=2, settings=moved)
     assert keys(run) == expected(2)
 
@@ -203,11 +207,11 @@ def test_completions_from_elsewhere_are_left_alone(tmp_path: Path, paper: Suite)
     run = Run(tmp_path / "run")
     run.path.mkdir()
     run.completions.write_bytes(to_line({"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}))
-    with pytest.raises(BadInput, match="missing") as error:
+    with pytest.raises(UserError, match="missing") as error:
         generated(run, paper, Scripted())
     assert error.value.file == run.about
     run.about.write_text('{"model": null}')
-    with pytest.raises(BadInput, match="imported"):
+    with pytest.raises(UserError, match="imported"):
         generated(run, paper, Scripted())
 
 
@@ -217,13 +221,13 @@ def test_completions_of_another_instruction_are_refused(tmp_path: Path, paper: S
     first, *others = rows(run)
     changed = [first | {"instruction": "Do something else."}, *others]
     run.completions.write_bytes(b"".join(map(to_line, changed)))
-    with pytest.raises(BadInput, match=r"/0/0 .* instruction"):
+    with pytest.raises(UserError, match=r"/0/0 .* instruction"):
         generated(run, paper, Scripted())
 
 
 def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Suite) -> None:
     run = Run(tmp_path / "run")
-    with run.writing(), pytest.raises(BadInput, match="another process"):
+    with run.writing(), pytest.raises(UserError, match="another process"):
         generated(run, paper, Scripted())
 
 
@@ -316,7 +320,7 @@ def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, pape
     chance = random.Random(3)
     run = Run(tmp_path / "run")
     model = Scripted(fails=lambda _: CUT if chance.random() < 0.1 else None)
-    progress = generate_run(run, GenerationPlan(paper), model, Settings(), Pace(concurrency=100))
+    progress = generate_run(run, GenerationPlan(paper), model, SamplingSettings(), Pace(concurrency=100))
     assert (progress.done, progress.missing) == (4000, None)
     prompts = [(task.name, number) for task in paper.tasks.values() for number in range(len(task.prompts))]
     assert keys(run) == sorted((*prompt, index) for prompt in prompts for index in range(50))
@@ -327,7 +331,7 @@ def test_4000_completions_of_which_one_request_in_ten_fails(tmp_path: Path, pape
 SCRIPT = """
 import pathlib, sys
 sys.path.insert(0, {tests!r})
-from codebotler.models.base import Settings
+from codebotler.models.base import SamplingSettings
 from roboeval.evaluation.generate import Pace, generate_run
 from roboeval.evaluation.requests import GenerationPlan
 from roboeval.evaluation.runs.folder import Run
@@ -337,7 +341,7 @@ print("on", flush=True)
 {before}
 generate_run(
     Run(pathlib.Path({run!r})), GenerationPlan(load_suite(), {tasks!r}, {count}),
-    Scripted(seconds={seconds}, log=pathlib.Path({log!r})), Settings(), Pace(concurrency=5),
+    Scripted(seconds={seconds}, log=pathlib.Path({log!r})), SamplingSettings(), Pace(concurrency=5),
 )
 """
 
@@ -444,7 +448,7 @@ def test_an_interruption_counts_what_waits_for_the_disk(
     monkeypatch.setattr(Appender, "sync", interrupted)
     plan = GenerationPlan(paper, SMALL, 100)  # so many that it cannot be over by then
     with pytest.raises(KeyboardInterrupt):
-        generate_run(run, plan, Scripted(seconds=0.01), Settings(), Pace(), on_progress=seen.append)
+        generate_run(run, plan, Scripted(seconds=0.01), SamplingSettings(), Pace(), on_progress=seen.append)
     progress = seen[0]
     assert progress.done == len(rows(run)) > 10
     assert progress.under_way > 0
@@ -474,6 +478,6 @@ def test_a_note_that_somebody_broke_is_refused(tmp_path: Path, paper: Suite, lin
     run = Run(tmp_path / "run")
     generated(run, paper, Scripted())
     run.in_flight.write_text(f'{{"lost": 0}}\n{line}\n')
-    with pytest.raises(BadInput, match="request") as error:
+    with pytest.raises(UserError, match="request") as error:
         generated(run, paper, Scripted())
     assert (error.value.file, error.value.line) == (run.in_flight, 2)

@@ -27,7 +27,7 @@ from inspect_ai.model import ModelOutput, ModelUsage, get_model
 from inspect_ai.scorer import CORRECT, Target
 from playwright.sync_api import expect, sync_playwright
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.prompts import prompt_for
 from roboeval.evaluation import inspect as inspecting
 from roboeval.evaluation.judge import evaluate
@@ -127,9 +127,9 @@ def test_a_sample_is_a_prompt_with_what_our_command_asks(paper: Suite) -> None:
     ours = prompt_for(instruction).messages
     assert [(said.role, said.text) for said in told] == [(said.role, said.text) for said in ours]
     assert (made.config.temperature, made.config.top_p, made.config.max_tokens) == (0.2, 0.95, 512)
-    with pytest.raises(BadInput, match='"Sing"'):
+    with pytest.raises(UserError, match='"Sing"'):
         inspecting.roboeval(tasks=["Sing"])
-    with pytest.raises(BadInput, match="written by hand"):
+    with pytest.raises(UserError, match="written by hand"):
         inspecting.roboeval(worlds=3)
 
 

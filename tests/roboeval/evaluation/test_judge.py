@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.core.world import Room, World
 from roboeval.evaluation.failures import Verdict, failure
@@ -200,14 +200,14 @@ def test_what_is_no_completion_of_the_suite_is_refused(paper: Suite, wrong: obje
     if isinstance(wrong, Completion) and wrong.task == OURS.task:
         wrong = replace(wrong, task=task)
     completion: Any = wrong
-    with pytest.raises(BadInput, match=named):
+    with pytest.raises(UserError, match=named):
         list(evaluate([completion], paper))
 
 
 def test_evaluating_takes_workers_and_an_ablation(paper: Suite) -> None:
-    with pytest.raises(BadInput, match=r"workers is 0, .* 1"):
+    with pytest.raises(UserError, match=r"workers is 0, .* 1"):
         evaluate([], paper, workers=0)
     task = next(task.name for task in paper.tasks.values() if task.ablation is None)
     completion = replace(OURS, task=task)
-    with pytest.raises(BadInput, match=f'"{task}" .*ablation'):
+    with pytest.raises(UserError, match=f'"{task}" .*ablation'):
         list(evaluate([completion], paper, ablated=True))

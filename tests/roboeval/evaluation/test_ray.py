@@ -78,8 +78,8 @@ def test_another_version_does_not_judge() -> None:
 def test_missing_isolation_is_warned_of_once_or_refused(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(rayengine, "Lane", lambda: SimpleNamespace(has_seccomp=False, close=lambda: None))
-    monkeypatch.setattr(rayengine, "own_lane", rayengine.own_lane.__wrapped__)
+    monkeypatch.setattr(rayengine, "Worker", lambda: SimpleNamespace(has_seccomp=False, close=lambda: None))
+    monkeypatch.setattr(rayengine, "own_worker", rayengine.own_worker.__wrapped__)
     functions, works = (lambda _, work: int(work[1]), abs), list(numbered(range(2)))
     with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
         run_shard(functions, works, VERSIONS, require_isolation=True)
@@ -97,7 +97,7 @@ with RayCluster() as cluster:
     import ray
     import psutil  # which comes with it
     works = [("", "1"), ("", "2"), ("", "1")]
-    print(list(cluster.map_distinct(lambda lane, work: int(work[1]), works, abs)))
+    print(list(cluster.map_distinct(lambda worker, work: int(work[1]), works, abs)))
     print([node["NodeManagerAddress"] for node in ray.nodes()])
     ours = {process.pid for process in psutil.Process().children(recursive=True)}
     sockets = [one for one in psutil.net_connections("tcp") if one.pid in ours and one.status == "LISTEN"]

@@ -17,11 +17,11 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Outcome, RunError, Status
 from codebotler.simulator.isolated import ONE_AT_A_TIME
 from codebotler.simulator.pool import warm
-from codebotler.simulator.worker import EVENTS, Lane
+from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.rewards import Share, reward, total
@@ -129,16 +129,16 @@ def uncollected() -> Iterator[None]:
 @pytest.mark.usefixtures("uncollected")
 def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # in the place of polars' own
-    lanes, gate, patience = warm(), threading.Event(), 60
-    here, submit = lanes.here, lanes.submit
-    monkeypatch.setattr(lanes, "here", lambda: gate.wait(patience) and here())
+    pool, gate, patience = warm(), threading.Event(), 60
+    here, submit = pool.here, pool.submit
+    monkeypatch.setattr(pool, "here", lambda: gate.wait(patience) and here())
     futures: list[Future[object]] = []
 
     def noted(*call: Any) -> Future[object]:  # noqa: ANN401 - passed on
         futures.append(submit(*call))
         return futures[-1]
 
-    monkeypatch.setattr(lanes, "submit", noted)
+    monkeypatch.setattr(pool, "submit", noted)
     waited_for, given_up = distinct(8, "interrupted"), distinct(1_000, "given up")
 
     def interrupt() -> None:
@@ -160,17 +160,17 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
 
 
 def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
-    with pytest.raises(BadInput, match="a list"):
+    with pytest.raises(UserError, match="a list"):
         reward("SayGoodDay", 0, RIGHT)
-    with pytest.raises(BadInput, match='"Sing"'):
+    with pytest.raises(UserError, match='"Sing"'):
         reward("Sing", 0, [RIGHT], suite=paper)
-    with pytest.raises(BadInput, match="prompts 0 to 4"):
+    with pytest.raises(UserError, match="prompts 0 to 4"):
         reward("SayGoodDay", 5, [RIGHT])
-    with pytest.raises(BadInput, match="written by hand"):
+    with pytest.raises(UserError, match="written by hand"):
         reward("SayGoodDay", 0, [RIGHT], worlds=3)
-    with pytest.raises(BadInput, match=r"worlds is 0, .* 1"):
+    with pytest.raises(UserError, match=r"worlds is 0, .* 1"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=0)
-    with pytest.raises(BadInput, match=r"worlds is 1000000000, .* 10,000"):
+    with pytest.raises(UserError, match=r"worlds is 1000000000, .* 10,000"):
         reward("SayGoodDay", 0, [RIGHT], suite="plus", worlds=10**9)
     assert reward("SayGoodDay", 0, []) == []
 
@@ -190,7 +190,7 @@ def test_arguments_of_another_kind_are_refused(
     task: object, prompt: object, programs: object, named: list[str]
 ) -> None:
     wrong: Any = (task, prompt, programs)
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(UserError) as error:
         reward(*wrong)
     assert all(name in error.value.sentence for name in named), error.value
 
@@ -275,15 +275,15 @@ def test_nobody_forks_in_the_middle_of_a_start() -> None:
 def test_a_forked_process_does_not_wait_for_threads_of_the_one_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    lanes, gate, patience = warm(), threading.Event(), 60
-    here, began = lanes.here, threading.Event()
+    pool, gate, patience = warm(), threading.Event(), 60
+    here, began = pool.here, threading.Event()
 
-    def held() -> Lane:
+    def held() -> Worker:
         began.set()
         gate.wait(patience)
         return here()
 
-    monkeypatch.setattr(lanes, "here", held)
+    monkeypatch.setattr(pool, "here", held)
     (program,) = distinct(1, "under way")
     with ThreadPoolExecutor(1) as beside:
         other = beside.submit(reward, "SayGoodDay", 0, [program])

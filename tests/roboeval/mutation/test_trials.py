@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
-from codebotler.simulator.engine import Lanes
+from codebotler.core.errors import UserError
+from codebotler.simulator.engine import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.report import to_yaml
@@ -45,9 +45,9 @@ RIGHT = Original(
 
 
 @pytest.fixture(scope="module")
-def lanes() -> Iterator[Lanes]:
-    with Lanes(1) as lanes:
-        yield lanes
+def pool() -> Iterator[WorkerPool]:
+    with WorkerPool(1) as pool:
+        yield pool
 
 
 @pytest.fixture
@@ -64,8 +64,8 @@ def program(body: str) -> str:
     return "def task_program():\n" + "".join(f"    {line}\n" for line in body.split("; "))
 
 
-def runner(suite: Suite, lanes: Lanes) -> Run:
-    return lambda source, world: lanes.here().run(source, lambda: SimulatedRobot(world, suite.rules))
+def runner(suite: Suite, pool: WorkerPool) -> Run:
+    return lambda source, world: pool.here().run(source, lambda: SimulatedRobot(world, suite.rules))
 
 
 @pytest.mark.parametrize(
@@ -83,15 +83,15 @@ def runner(suite: Suite, lanes: Lanes) -> Run:
         ("go_to('kitchen'); say('hi'); [say('bye') for _ in [1] if is_in_room('x')]", Result(SURVIVED)),
     ],
 )
-def test_what_becomes_of_a_mutant(body: str, result: Result, suite: Suite, lanes: Lanes) -> None:
-    scenarios, run = suite.task("T").scenarios, runner(suite, lanes)
+def test_what_becomes_of_a_mutant(body: str, result: Result, suite: Suite, pool: WorkerPool) -> None:
+    scenarios, run = suite.task("T").scenarios, runner(suite, pool)
     before = [run(RIGHT.program, scenario.world) for scenario in scenarios]
     assert result_of(program(body), before, scenarios, run) == result
 
 
-def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, lanes: Lanes) -> None:
+def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, pool: WorkerPool) -> None:
     wrong = Original("wrong", program("go_to('kitchen')")), Original("broken", "def (")
-    score = mutation_score(task, suite, lanes, further=[RIGHT, *wrong])
+    score = mutation_score(task, suite, pool, further=[RIGHT, *wrong])
     assert score.right == (RIGHT,)
     assert score.wrong == (
         (wrong[0], Result(KILLED, "ann is in", "says")),
@@ -131,8 +131,8 @@ def filled(*mutants: Mutant) -> str:
     return to_yaml(mutants).replace("because: ''", "because: It does no harm.")
 
 
-def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, lanes: Lanes) -> None:
-    before = mutation_score(task, suite, lanes, further=[RIGHT])
+def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, pool: WorkerPool) -> None:
+    before = mutation_score(task, suite, pool, further=[RIGHT])
     survivor, *_ = before.survivors
     killed = next(one.mutant for one in before.mutants if one.result.status is KILLED)
     other = replace(survivor, operator="and-or")
@@ -144,7 +144,7 @@ def test_a_survivor_on_the_list_is_equivalent(suite: Suite, task: Task, lanes: L
         (filled(other), 0),
     ):
         path.write_text(listed)
-        found = mutation_score(task, suite, lanes, further=[RIGHT])
+        found = mutation_score(task, suite, pool, further=[RIGHT])
         results = {one.mutant: one.result for one in found.mutants}
         assert found.count(EQUIVALENT) == equivalent
         assert results[killed].status is KILLED
@@ -165,7 +165,7 @@ def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> N
     path = task.path.parents[1] / "solutions" / "T.yaml"
     path.parent.mkdir()
     path.write_text(text)
-    with pytest.raises(BadInput, match=named) as error:
+    with pytest.raises(UserError, match=named) as error:
         equivalent_mutants(task)
     assert (error.value.file, error.value.line) == (path, line)
 
@@ -175,7 +175,7 @@ def test_a_list_that_is_wrong(task: Task, text: str, line: int, named: str) -> N
 
 def test_worlds_that_are_written_out(suite: Suite, task: Task) -> None:
     assert worlds_of(suite, task, None, 1) == task.scenarios
-    with pytest.raises(BadInput, match=r'"mine".* written out'):
+    with pytest.raises(UserError, match=r'"mine".* written out'):
         worlds_of(suite, task, 200, 1)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from made_up_runs import SUITE, made_up, usual
 from roboeval.analysis.cost import Price
 from roboeval.report.breakdown import (
@@ -126,11 +126,11 @@ def test_prices() -> None:
     prices = read_prices(["openai-chat:gpt=1.5/6", "b=0/0"])
     assert prices == {"openai-chat:gpt": Price(1.5, 6.0), "b": Price(0.0, 0.0)}
     for wrong in ("gpt", "gpt=1", "=1/2", "gpt=a/b", "gpt=-1/2", "gpt=nan/1", "gpt=1/2/3"):
-        with pytest.raises(BadInput, match="MODEL=INPUT/OUTPUT"):
+        with pytest.raises(UserError, match="MODEL=INPUT/OUTPUT"):
             read_prices([wrong])
-    with pytest.raises(BadInput, match=r'--price .*"a" twice'):
+    with pytest.raises(UserError, match=r'--price .*"a" twice'):
         read_prices(["a=1/1", "a=2/2"])
-    with pytest.raises(BadInput, match=r'--price .*"x".*\ba$'):
+    with pytest.raises(UserError, match=r'--price .*"x".*\ba$'):
         expect_known({"x": Price(1, 1)}, [made_up("a", {"Visit": (1,)})])
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from command_line import ENVIRONMENT, roboeval
 from roboeval.cli.tasks import other_suites
 from roboeval.suites.installed import installed_suites
@@ -92,14 +92,14 @@ def test_the_pages_show_runs_that_were_judged_by_it(
 def test_two_packages_with_one_name(install: Install) -> None:
     install()
     install("other-suite")
-    with pytest.raises(BadInput, match=r'"garden": garden-suite 1\.0 \(garden_suite\) and other-suite 1\.0'):
+    with pytest.raises(UserError, match=r'"garden": garden-suite 1\.0 \(garden_suite\) and other-suite 1\.0'):
         load_suite("garden")
 
 
 def test_a_folder_here_with_the_name_of_a_package(install: Install) -> None:
     install()
     new_task(Path("garden"), "WaterPlants")
-    with pytest.raises(BadInput, match=r"garden-suite 1\.0 and .* \./garden "):
+    with pytest.raises(UserError, match=r"garden-suite 1\.0 and .* \./garden "):
         load_suite("garden")
     assert load_suite("./garden").folder == Path("garden").resolve()
 
@@ -122,7 +122,7 @@ def test_a_package_cannot_take_the_name_of_a_suite_that_ships(install: Install) 
 def test_a_broken_package(install: Install, changed: dict[str, str], named: str) -> None:
     install(**changed)
     asked = changed.get("point", "garden")
-    with pytest.raises(BadInput, match=named):
+    with pytest.raises(UserError, match=named):
         load_suite(asked)
     ended = roboeval("tasks", "--suite", asked, environment=ENVIRONMENT | dict(os.environ))
     assert (ended.status, ended.err.count("\n"), "Traceback" in ended.err) == (2, 1, False)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.rtl import parse
 from roboeval.suites.load import load_suite
 from roboeval.suites.new_task import new_task
@@ -79,7 +79,7 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
 )
 def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, line: int, named: str) -> None:
     assert old in TASK
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(UserError) as caught:
         load_suite(a_suite(tmp_path, TASK.replace(old, new, 1)))
     assert (caught.value.file, caught.value.line) == (tmp_path / "tasks" / "T.yaml", line)
     assert named in caught.value.sentence
@@ -136,7 +136,7 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, l
 def test_a_rule_that_is_not_known_gets_a_sentence(
     tmp_path: Path, suite: str, line: int | None, named: list[str]
 ) -> None:
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(UserError) as caught:
         load_suite(a_suite(tmp_path, suite=suite))
     assert (caught.value.file, caught.value.line) == (tmp_path / "suite.yaml", line)
     assert all(name in caught.value.sentence for name in named), caught.value
@@ -148,7 +148,7 @@ def test_a_clock_may_start_at_any_offset(tmp_path: Path) -> None:
 
 
 def test_an_unknown_suite_gets_a_sentence() -> None:
-    with pytest.raises(BadInput, match=r'"nonsense": .*paper, plus'):
+    with pytest.raises(UserError, match=r'"nonsense": .*paper, plus'):
         load_suite("nonsense")
 
 
@@ -171,14 +171,14 @@ def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) 
     required = [[r.text for r in scenario.require] for scenario in suite.task("MakeTea").scenarios]
     assert required == [["announces_tea"], ['visits("kitchen")', "not announces_tea"]]
     (folder / "tasks" / "MakeTea.yaml").write_text("mine")
-    with pytest.raises(BadInput, match="already"):
+    with pytest.raises(UserError, match="already"):
         new_task(folder, "MakeTea")
     assert (folder / "tasks" / "MakeTea.yaml").read_text() == "mine"
 
 
 @pytest.mark.parametrize("name", ["../x", "", "makeTea", "Make Tea", "Make-Tea", "Tee\n", "T\u00e4ufer"])
 def test_a_bad_name_for_a_task(tmp_path: Path, name: str) -> None:
-    with pytest.raises(BadInput, match="name for a task"):
+    with pytest.raises(UserError, match="name for a task"):
         new_task(tmp_path, name)
     assert not [*tmp_path.iterdir()]
 
@@ -196,7 +196,7 @@ def test_a_new_suite_is_named_after_its_folder_as_far_as_that_can_be(
 
 def test_a_suite_is_not_started_within_another(tmp_path: Path) -> None:
     new_task(tmp_path / "lab", "MakeTea")
-    with pytest.raises(BadInput, match="within a suite") as error:
+    with pytest.raises(UserError, match="within a suite") as error:
         new_task(tmp_path / "lab" / "tasks", "MakeCoffee")
     assert error.value.file == tmp_path / "lab" / "tasks"
     assert [path.name for path in (tmp_path / "lab" / "tasks").iterdir()] == ["MakeTea.yaml"]

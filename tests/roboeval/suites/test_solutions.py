@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.models.recorded import recorded_model
 from roboeval.suites.load import Suite, Task
 from roboeval.suites.solutions import equivalent_mutants, solutions
@@ -57,6 +57,6 @@ def test_a_suite_need_not_have_any(tmp_path: Path, paper: Suite) -> None:
 
 def test_a_program_is_missing(tmp_path: Path, paper: Suite) -> None:
     task = own(paper.task("LunchTime"), tmp_path, "programs:\n  - about: a\n    program: b\n  - about: c\n")
-    with pytest.raises(BadInput, match='"program"') as caught:
+    with pytest.raises(UserError, match='"program"') as caught:
         solutions(task)
     assert (caught.value.file, caught.value.line) == (tmp_path / "solutions" / "LunchTime.yaml", 4)

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.suites.expression import ExpressionError, each_of, parsed, value
 from roboeval.suites.load import _suite_of, load_suite
 from roboeval.suites.pairwise import covering, met, pairs, spread
@@ -109,12 +109,12 @@ def test_worlds_of_other_seeds_are_not_held_for_ever(tmp_path: Path) -> None:
 
 def test_more_worlds_than_fit_into_memory_are_not_drawn(tmp_path: Path) -> None:
     mine, most = load_suite(suite(tmp_path)), MOST_WORLDS
-    with pytest.raises(BadInput, match=f"{most + 1}.* {most:,}"):
+    with pytest.raises(UserError, match=f"{most + 1}.* {most:,}"):
         mine.with_worlds(most + 1)
 
 
 def test_worlds_that_are_written_by_hand_are_all_there_is() -> None:
-    with pytest.raises(BadInput, match="written by hand"):
+    with pytest.raises(UserError, match="written by hand"):
         load_suite("paper").with_worlds(200)
 
 
@@ -142,7 +142,7 @@ def test_checks_name_phrases(tmp_path: Path) -> None:
 )
 def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list[str]) -> None:
     assert good in PHRASES
-    with pytest.raises(BadInput) as error:
+    with pytest.raises(UserError) as error:
         load_suite(str(suite(tmp_path, PHRASES.replace(good, bad))))
     assert all(name in error.value.sentence for name in named), error.value
     assert error.value.line is not None
@@ -168,7 +168,7 @@ def test_mistakes_are_told_with_their_line(
 ) -> None:
     assert good in TASK
     folder = suite(tmp_path, TASK.replace(good, bad))
-    with pytest.raises(BadInput, match=re.escape(named)) as error:
+    with pytest.raises(UserError, match=re.escape(named)) as error:
         load_suite(str(folder))
     assert (error.value.file, error.value.line) == (folder / "tasks" / "Tea.yaml", line)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.folder import Run
 from roboeval.suites.load import load_suite
 from roboeval.web import run_store
@@ -42,7 +42,7 @@ def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytes
         assert store.names() == ["hasty"]
         assert store.open("hasty").name == "hasty"
         for name in ("other", "..", "../other"):
-            with pytest.raises(BadInput, match="no run"):
+            with pytest.raises(UserError, match="no run"):
                 store.open(name)
 
 
@@ -52,7 +52,7 @@ def test_a_folder_that_is_a_run_holds_only_itself(runs: Path, monkeypatch: pytes
 )
 def test_no_name_leads_out(runs: Path, name: str) -> None:
     shutil.copytree(runs / "hasty", runs.parent / "secret")
-    with pytest.raises(BadInput, match="no run"):
+    with pytest.raises(UserError, match="no run"):
         RunStore(runs).open(name)
 
 
@@ -67,7 +67,7 @@ def test_no_link_leads_out(runs: Path, path: str) -> None:
         shutil.rmtree(link)
     link.unlink(missing_ok=True)
     link.symlink_to(secret / path)
-    with pytest.raises(BadInput, match="leads out"):
+    with pytest.raises(UserError, match="leads out"):
         RunStore(runs).open("hasty")
 
 
@@ -86,7 +86,7 @@ def test_a_pipe_in_the_place_of_a_file_holds_nobody_up(runs: Path) -> None:
     rows = Run(runs / "hasty").rows("paper")
     rows.unlink()
     os.mkfifo(rows)
-    with pytest.raises(BadInput, match="no file") as error:
+    with pytest.raises(UserError, match="no file") as error:
         RunStore(runs).open("hasty")
     assert error.value.file == "paper.jsonl"
 
@@ -100,7 +100,7 @@ def test_evaluations_are_found_by_name(runs: Path) -> None:
     assert store.open("hasty").results.key == "another"
     assert store.open("hasty", "paper-ablation").results.key == "paper-ablation"
     for key in ("../../secret", "none", ""):
-        with pytest.raises(BadInput, match="has no evaluation"):
+        with pytest.raises(UserError, match="has no evaluation"):
             store.open("hasty", key)
 
 
@@ -140,7 +140,7 @@ def test_a_row_that_was_written_anew_is_not_shown_for_another(runs: Path) -> Non
     run, rows = RunStore(runs).open("hasty"), Run(runs / "hasty").rows("paper")
     assert run.results.row(("LunchBreak", 2, 1))["index"] == 1
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[1:]))
-    with pytest.raises(BadInput, match="anew"):
+    with pytest.raises(UserError, match="anew"):
         run.results.row(("LunchBreak", 2, 1))
 
 

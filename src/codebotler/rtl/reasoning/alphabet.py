@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from codebotler.core.trace import Event, Option
-from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, Element, Formula, Not, Or, Regex, Text
+from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 
 
-def elements(formula: Formula) -> Iterator[Element]:
+def elements(formula: Formula) -> Iterator[EventPattern]:
     """All elements of a formula in the order of its text; for a stay, the moves that bound it."""
     match formula:
         case And(parts) | Or(parts):
@@ -24,14 +24,14 @@ def elements(formula: Formula) -> Iterator[Element]:
             yield formula.element
 
 
-def alphabet(wanted: Iterable[Element], rooms: Sequence[str] | None = None) -> list[Event]:
+def alphabet(wanted: Iterable[EventPattern], rooms: Sequence[str] | None = None) -> list[Event]:
     """Events that match elements in all combinations for which strings were found.
 
     Args:
         wanted: what the events are to tell apart.
         rooms: where they may happen; anywhere by default. If no element names a place, all happen in none.
     """
-    kinds: dict[str, list[Element]] = {}
+    kinds: dict[str, list[EventPattern]] = {}
     for element in dict.fromkeys(wanted):
         kinds.setdefault(element.kind, []).append(element)
     places = _places([element for alike in kinds.values() for element in alike], rooms)
@@ -49,7 +49,7 @@ def _distinct(texts: Iterable[Text | None]) -> tuple[Text, ...]:
     return tuple(dict.fromkeys(text for text in texts if text is not None))
 
 
-def _places(wanted: Sequence[Element], rooms: Sequence[str] | None) -> Sequence[str]:
+def _places(wanted: Sequence[EventPattern], rooms: Sequence[str] | None) -> Sequence[str]:
     """Rooms that match the elements' places in all combinations."""
     regexes = _distinct(Regex(e.is_place.pattern) for e in wanted if e.is_place is not None)
     if not regexes:
@@ -57,12 +57,12 @@ def _places(wanted: Sequence[Element], rooms: Sequence[str] | None) -> Sequence[
     return distinct_strings(regexes) if rooms is None else rooms
 
 
-def _answers(wanted: Sequence[Element]) -> list[str | None]:
+def _answers(wanted: Sequence[EventPattern]) -> list[str | None]:
     answers = _distinct(element.answer for element in wanted)
     return [None, *(distinct_strings(answers, outer=True) if answers else ())]
 
 
-def _choices(wanted: Sequence[Element]) -> Iterable[tuple[Option, ...]]:
+def _choices(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
     """Options that match in all combinations; one option may match what another cannot match as well."""
     texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
     found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}

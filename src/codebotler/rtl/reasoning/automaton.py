@@ -14,19 +14,19 @@ from codebotler.rtl.formula import (
     And,
     AtLeast,
     Count,
-    Cut,
-    Element,
+    EventPattern,
     Exists,
     Formula,
     Not,
     Or,
+    Scope,
 )
 
 MOST_STATES = 1_000
 """States that an automaton may have before it is made as small as possible."""
 
 State: TypeAlias = Hashable
-Letter: TypeAlias = frozenset[Element]
+Letter: TypeAlias = frozenset[EventPattern]
 """The elements of a formula that match an event."""
 
 
@@ -111,7 +111,7 @@ def _machine(formula: Formula) -> _Machine:
             return _Machine(start, step, lambda state: not accepts(state))
         case ActAtFirst():
             arrival, departure = formula.stay.arrival, formula.stay.departure
-            stay = (*formula.cuts, Cut("AfterFirst", arrival), Cut("BeforeFirst", departure))
+            stay = (*formula.cuts, Scope("AfterFirst", arrival), Scope("BeforeFirst", departure))
             return _machine(And((Exists(arrival, formula.cuts), Exists(formula.element, stay))))
         case ActAtSome():
             machine = _during_stays(formula)
@@ -136,7 +136,7 @@ def _together(machines: Sequence[_Machine], join: Callable[[list[bool]], bool]) 
     )
 
 
-def _counter(element: Element, number: int, most: int) -> _Machine:
+def _counter(element: EventPattern, number: int, most: int) -> _Machine:
     return _Machine(0, lambda n, letter: min(n + (element in letter), most), lambda n: n == number)
 
 
@@ -152,7 +152,7 @@ def _during_stays(test: ActAtSome) -> _Machine:
     return _Machine("away", step, lambda state: state == "done")
 
 
-def _behind(cut: Cut, inner: _Machine) -> _Machine:
+def _behind(cut: Scope, inner: _Machine) -> _Machine:
     """The machine that lets an inner one read only what a cut leaves: everything where it finds nothing."""
     at, (start, step, accepts) = cut.element, inner
     match cut.name:

@@ -29,7 +29,12 @@ LIVE_CPU_SECONDS = 3600
 WITHOUT_REFERENCES = 2
 """The version of marshal's format: later ones write what depends on what else the writing process holds."""
 
-PREPARER, ZYGOTE, LIBRARY_ZYGOTE, LIVE_ZYGOTE = "preparer", "zygote", "library-zygote", "live-zygote"
+PREPARER, FORK_SERVER, LIBRARY_SERVER, LIVE_SERVER = (
+    "preparer",
+    "fork-server",
+    "library-fork-server",
+    "live-fork-server",
+)
 """The roles: who compiles programs; who forks runs, those that import something, and those on a robot."""
 
 PROGRAM = "<program>"

@@ -35,7 +35,7 @@ UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not as
 class Run:
     """One run of one program: its budget, its clock and its line to the engine.
 
-    All that can be is made before the fork, in the zygote.
+    All that can be is made before the fork, in the fork server.
     """
 
     def __init__(self) -> None:

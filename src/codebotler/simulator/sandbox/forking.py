@@ -1,4 +1,4 @@
-"""The zygote: forks one child a run, each from the same heap, and reports how it ended."""
+"""The fork server: forks one child a run, each from the same heap, and reports how it ended."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from _socket import CMSG_SPACE, socket
 from marshal import loads
 from posix import getpid, getppid
 
-from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_ZYGOTE, ZYGOTE
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, FORK_SERVER, LIVE_CPU_SECONDS, LIVE_SERVER
 from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.execution import Run
 from codebotler.simulator.sandbox.isolation import die_with_parent, enclose, give_up_rights, usable_filter
@@ -30,9 +30,9 @@ def serve(role: str) -> None:
     """Serve runs, one at a time, until the engine closes its end.
 
     Args:
-        role: of the three kinds of zygotes; programs find the standard library in all but the first.
+        role: of the three kinds of fork servers; programs find the standard library in all but the first.
     """
-    library, seconds = role != ZYGOTE, LIVE_CPU_SECONDS if role == LIVE_ZYGOTE else CPU_SECONDS
+    library, seconds = role != FORK_SERVER, LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
     door = socket(fileno=DOOR)
     run = Run()
     simulate_surroundings(run)

@@ -27,7 +27,9 @@ def main(role: str, descriptors: list[str]) -> None:
     """
     if descriptors:
         start_again(list(map(int, descriptors)))
-    if role != "preparer":  # bytecode, there in one start and not in the next, would move a zygote's heap
+    if (
+        role != "preparer"
+    ):  # bytecode, there in one start and not in the next, would move a fork_server's heap
         sys.pycache_prefix = os.devnull
     sys.meta_path.insert(0, Given(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
     os.close(CODES)
@@ -42,7 +44,7 @@ def main(role: str, descriptors: list[str]) -> None:
 
 
 class Given:
-    """Finds modules whose code the engine has compiled: a compiler would leave a zygote twice as large.
+    """Finds modules whose code the engine has compiled: a compiler would leave a fork server twice as large.
 
     Args:
         codes: marshalled code, by the name of the module.

@@ -83,8 +83,8 @@ def simulate_chance() -> None:
 def forget_forks() -> None:
     """Let no module do anything around a fork, which a program knows nothing of.
 
-    Whatever runs in the zygote once for each run is adapted by the interpreter after some dozens of them, and
-    from then on leaves another heap behind.
+    Whatever runs in the fork server once for each run is adapted by the interpreter after some dozens of
+    them, and from then on leaves another heap behind.
     """
     os.register_at_fork = posix.register_at_fork = lambda **_: None
 

@@ -7,7 +7,7 @@ import asyncio
 from nicegui import html, ui
 
 from codebotler.checking.room_names import named_rooms
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.program import called_skills
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.log import Summary
@@ -15,8 +15,8 @@ from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import unknown_rooms
 from codebotler.missions.store import missions
 from codebotler.models.recorded import recorded_model
-from codebotler.simulator.sampled_robot import Plan
-from codebotler.web.console import Desk
+from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.web.console import Console
 from codebotler.web.elements import Press, Words, scroll_up, warn
 from codebotler.web.view import Order, View
 
@@ -35,7 +35,7 @@ class Instruct:
         desk: on which it is put.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Console) -> None:
         self._desk = desk
         self._number = -1
         self._asked = ""
@@ -110,9 +110,9 @@ class Instruct:
         scroll_up()
 
 
-def _examples(desk: Desk) -> list[str]:
+def _examples(desk: Console) -> list[str]:
     """Short instructions that the recorded model knows, of different kinds, for rooms that are there."""
-    plan = None if desk.world is None else Plan.of(desk.world)
+    plan = None if desk.world is None else RoomMap.of(desk.world)
     found: dict[frozenset[str], str] = {}
     for instruction, replies in sorted(
         recorded_model("recorded").replies.items(), key=lambda known: len(known[0])
@@ -123,11 +123,11 @@ def _examples(desk: Desk) -> list[str]:
     return list(found.values())[:MOST_EXAMPLES]
 
 
-def _before(desk: Desk) -> list[Summary]:
+def _before(desk: Console) -> list[Summary]:
     """The last different instructions."""
     try:
         known = missions(desk.home)
-    except (BadInput, OSError):
+    except (UserError, OSError):
         return []
     last = {summary.instruction: summary for summary in known if summary.instruction}
     return sorted(last.values(), key=lambda summary: -summary.created)[:MOST_BEFORE]

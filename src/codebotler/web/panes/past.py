@@ -8,13 +8,13 @@ from datetime import datetime
 
 from nicegui import html, ui
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.log import Line, Summary, events_of
 from codebotler.missions.mission import State
 from codebotler.missions.store import find, missions, summary_of
 from codebotler.missions.view import told
-from codebotler.web.console import Desk
+from codebotler.web.console import Console
 from codebotler.web.elements import Words
 from codebotler.web.frame import Frame
 
@@ -33,7 +33,7 @@ STEPS: Mapping[str, str] = {
 """What it means that a mission comes to a state."""
 
 
-def add(desk: Desk, frame: Frame) -> None:
+def add(desk: Console, frame: Frame) -> None:
     """Put the pages at their addresses.
 
     Args:
@@ -48,7 +48,7 @@ def add(desk: Desk, frame: Frame) -> None:
             Words("h1", "Missions")
             try:
                 known = await asyncio.to_thread(missions, desk.home)
-            except BadInput as error:
+            except UserError as error:
                 Words("p", str(error), "trouble")
                 return
             if not known:
@@ -63,7 +63,7 @@ def add(desk: Desk, frame: Frame) -> None:
         with ui.element("div").classes("past"):
             try:
                 summary, events = await asyncio.to_thread(_read, desk, mission)
-            except BadInput as error:
+            except UserError as error:
                 Words("p", error.sentence, "trouble")
                 return
             _show(summary, events)
@@ -85,7 +85,7 @@ def in_words(line: Line, *, is_first: bool) -> str:
     return "" if words is None else words.plain[:1].upper() + words.plain[1:]
 
 
-def _read(desk: Desk, mission: str) -> tuple[Summary, list[Line]]:
+def _read(desk: Console, mission: str) -> tuple[Summary, list[Line]]:
     folder = find(desk.home, mission)
     return summary_of(folder), events_of(folder)
 

@@ -16,7 +16,7 @@ from codebotler.checking.problems import Check
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError, State
-from codebotler.web.console import MOST_PROGRAM, Desk
+from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.elements import Press, Words, scroll_up, warn
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import Strip, strips
@@ -35,7 +35,7 @@ class ProgramPane:
         desk: on which it lies.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Console) -> None:
         self._desk = desk
         self._heard = 0  # texts from this browser
         self._told: dict[str, object] = {}

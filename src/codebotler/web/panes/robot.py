@@ -6,7 +6,7 @@ from nicegui import ui
 
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.mission import State
-from codebotler.web.console import Desk
+from codebotler.web.console import Console
 from codebotler.web.elements import Press, Words
 from codebotler.web.floorplan import floorplan
 from codebotler.web.panes.question import Asking
@@ -36,7 +36,7 @@ class Status:
         desk: whose mission.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Console) -> None:
         self._desk = desk
         self._drawn: tuple[Moment, ...] = ()
         self._mapped: object = None

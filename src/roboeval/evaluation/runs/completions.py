@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, SupportsIndex, TypeAlias
 
 from codebotler.core.arguments import expect_text, expect_whole
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.core.words import counted
 from codebotler.models.recorded import recorded_model
@@ -43,7 +43,7 @@ class Completion:
         more: what else its row says, such as `usage`.
 
     Raises:
-        BadInput: one of them is not of its kind or range.
+        UserError: one of them is not of its kind or range.
     """
 
     task: str
@@ -59,7 +59,7 @@ class Completion:
         for name, number in (("prompt", self.prompt), ("index", self.index)):
             expect_whole(number, f"the {name}", least=0)
             if number >= MOST:
-                raise BadInput(f"the {name} is {number}, but it must be below {MOST:,}")
+                raise UserError(f"the {name} is {number}, but it must be below {MOST:,}")
             if type(number) is not int:  # but of a library's kind, which JSON cannot write
                 object.__setattr__(self, name, int(number))
         expect_text(self.program, "the program")
@@ -73,13 +73,13 @@ class Completion:
         """The completion that a row of completions.jsonl says.
 
         Raises:
-            BadInput: something is missing in it, or not of its kind or range.
+            UserError: something is missing in it, or not of its kind or range.
         """
         more = dict(row)
         known = {name: more.pop(name) for name in FIELDS if name in more}
         for name in REQUIRED:
             if name not in known:
-                raise BadInput(f'"{name}" is missing')
+                raise UserError(f'"{name}" is missing')
         return cls(**known, more=more)
 
     @property
@@ -105,7 +105,7 @@ def read_completions(
     *,
     growing: bool = False,
     name: Path | str | None = None,
-    faults: list[BadInput] | None = None,
+    faults: list[UserError] | None = None,
 ) -> Iterator[Completion]:
     """Read completions from a file of JSON lines.
 
@@ -117,7 +117,7 @@ def read_completions(
         faults: gets what is wrong with lines, which are then left out, rather than that it is raised.
 
     Raises:
-        BadInput: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
+        UserError: the file is missing or empty, or a row is wrong, unknown to the suite, or repeats another.
     """
     path = Path(path)
     name = name or path
@@ -128,12 +128,12 @@ def read_completions(
                 if line.strip() and (completion := _completion(line, suite, growing=growing)) is not None:
                     _expect_new(completion.key, seen, number)
                     yield completion
-            except BadInput as error:
-                add_or_raise(BadInput(error.sentence, file=name, line=number), faults)
-    except BadInput as error:
+            except UserError as error:
+                add_or_raise(UserError(error.sentence, file=name, line=number), faults)
+    except UserError as error:
         add_or_raise(error, faults)
     if not seen and faults is None:
-        raise BadInput("there is no completion in it", file=name)
+        raise UserError("there is no completion in it", file=name)
 
 
 def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completion | None:
@@ -142,12 +142,12 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
     if row is None:
         if growing and not line.endswith(b"\n"):
             return None
-        raise BadInput(f"this line is no JSON; a row looks like {EXAMPLE}")
+        raise UserError(f"this line is no JSON; a row looks like {EXAMPLE}")
     completion = Completion.of(row)
     if 2 * len(line) > MAX_ROW:  # else it stays short enough, however it is written
         check_length(row, None)
     if suite is not None and (problem := unknown(completion.key, suite)):
-        raise BadInput(problem)
+        raise UserError(problem)
     return completion
 
 
@@ -155,14 +155,14 @@ def _expect_new(key: Key, seen: dict[tuple[str, int], dict[int, int]], number: i
     task, prompt, index = key
     first_line = seen[sys.intern(task), prompt].setdefault(index, number)
     if first_line != number:
-        raise BadInput(f"{name_of(key)} stands here again; it stood in line {first_line} already")
+        raise UserError(f"{name_of(key)} stands here again; it stood in line {first_line} already")
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
-    """Raise BadInput if a row would be too long to be read again once it is copied into a run."""
+    """Raise UserError if a row would be too long to be read again once it is copied into a run."""
     if len(to_line(row)) > MAX_ROW:
         sentence = f"as a row this is longer than {MAX_ROW:,} bytes; shorten the program"
-        raise BadInput(sentence, file=str(file), line=line)
+        raise UserError(sentence, file=str(file), line=line)
 
 
 def unknown(key: Key, suite: Suite) -> str | None:
@@ -191,7 +191,7 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
     """Every reply that a recorded model has for a suite's prompts, as completions.
 
     Raises:
-        BadInput: there is no such model or suite, or the model knows none of its instructions.
+        UserError: there is no such model or suite, or the model knows none of its instructions.
     """
     model = recorded_model(name)
     found = False
@@ -208,4 +208,4 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
                     program=reply.program,
                 )
     if not found:
-        raise BadInput(f'{name} knows no instruction of the suite "{suite.name}"')
+        raise UserError(f'{name} knows no instruction of the suite "{suite.name}"')

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from codebotler import __version__
-from codebotler.core.errors import BadInput, read_text
+from codebotler.core.errors import UserError, read_text
 from codebotler.core.files import sync_folder, to_line, to_text, write_whole, written_whole
 from roboeval.evaluation.runs.completions import (
     COMPLETIONS,
@@ -42,12 +42,12 @@ class Source:
 def open_source(text: str, suite: Suite) -> Source:
     """Read a run folder, a .jsonl file or pipe, a folder or zip of published .py, or `recorded:NAME`."""
     if not text:
-        raise BadInput("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
+        raise UserError("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
     if text.partition(":")[0] == "recorded" and not path.exists():
         return Source([*recorded_completions(text, suite)])
     if not path.exists():
-        raise BadInput(
+        raise UserError(
             "there is no such file or folder; name a run, a .jsonl, or a folder or zip of .py", file=path
         )
     if (path / COMPLETIONS).is_file():
@@ -55,7 +55,7 @@ def open_source(text: str, suite: Suite) -> Source:
     if path.is_dir() or path.suffix == ".zip":
         return Source([*published_completions(path, suite)], left_aside=passed_over(path))
     if path.suffix == ".py":
-        raise BadInput(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
+        raise UserError(f"is one program; write it as a row of a .jsonl: {EXAMPLE}", file=path)
     return Source([*read_completions(path, suite)])
 
 
@@ -107,7 +107,7 @@ class Run:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Keep other processes from writing this run; raises BadInput if one is writing it."""
+        """Keep other processes from writing this run; raises UserError if one is writing it."""
         self._expect_no_others()
         made = [folder for folder in (self.path, *self.path.parents) if not folder.exists()]
         lock = self.path / ".lock"
@@ -115,12 +115,12 @@ class Run:
             self.path.mkdir(parents=True, exist_ok=True)
             descriptor = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         except FileExistsError:
-            raise BadInput("is a file, but a run is a folder; name another", file=self.path) from None
+            raise UserError("is a file, but a run is a folder; name another", file=self.path) from None
         except OSError as error:
-            raise BadInput(f"cannot be written ({error.strerror})", file=self.path) from None
+            raise UserError(f"cannot be written ({error.strerror})", file=self.path) from None
         if not _locked(descriptor):
             os.close(descriptor)
-            raise BadInput("another process is writing this run; wait until it has ended", file=self.path)
+            raise UserError("another process is writing this run; wait until it has ended", file=self.path)
         try:
             for folder in made:
                 sync_folder(folder.parent)
@@ -157,12 +157,12 @@ class Run:
             return
         others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
         if others:
-            raise BadInput(
+            raise UserError(
                 f'is no run, but holds other files, such as "{others[0]}"; name a new folder', file=self.path
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
-        """Copy completions into this run; raises BadInput if it holds others. An error changes nothing."""
+        """Copy completions into this run; raises UserError if it holds others. An error changes nothing."""
         models = {completion.model for completion in completions}
         lines = (to_line(completion.row) for completion in completions)
         with self.writing():
@@ -171,7 +171,7 @@ class Run:
                     same = all(file.read(len(line)) == line for line in lines)
                     if not same or file.read(1):
                         other = "this run holds other completions; name another folder"
-                        raise BadInput(other, file=self.path)
+                        raise UserError(other, file=self.path)
                 return
             about = {"model": models.pop() if len(models) == 1 else None, "codebotler": __version__}
             write_whole(self.about, to_text(about))
@@ -207,7 +207,7 @@ def load_head(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):
-        raise BadInput("is no JSON object", file=path)
+        raise UserError("is no JSON object", file=path)
     return data
 
 
@@ -226,7 +226,7 @@ def tasks_to_judge(
     left = tuple(name for name in wanted if suite.tasks[name].ablation is None)
     kept = frozenset(wanted) - frozenset(left)
     if not kept:
-        raise BadInput(f"none of {', '.join(wanted)} has an ablation")
+        raise UserError(f"none of {', '.join(wanted)} has an ablation")
     return kept, left
 
 

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
-from codebotler.core.errors import BadInput, read_text, text_of
+from codebotler.core.errors import UserError, read_text, text_of
 from codebotler.core.files import MAX_ROW
 from codebotler.core.syntaxtree import parse
 from roboeval.evaluation.runs.completions import Completion, Key, check_length, name_of, unknown
@@ -29,13 +29,13 @@ File: TypeAlias = tuple[str, Callable[[], str]]  # its name, and what reads its 
 def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Completion]:
     """The completions in a folder or zip of `TASK_PROMPT_INDEX.py`, of prompts that a suite knows.
 
-    The files assign texts to `prompt` and `completion`; they are parsed and never imported. Raises BadInput
+    The files assign texts to `prompt` and `completion`; they are parsed and never imported. Raises UserError
     if there is none, one is wrong or unknown to the suite, or a zip is damaged, encrypted or too large.
     """
     with _files(path) as files:
         for key, (name, read) in sorted(_by_key(files, path).items()):
             if suite is not None and (problem := unknown(key, suite)):
-                raise BadInput(problem, file=name)
+                raise UserError(problem, file=name)
             texts = _assigned(read(), name)
             row = dict(zip(("task", "prompt", "index"), key, strict=True))
             row |= {"program": texts["completion"], "instruction": texts.get("prompt")}
@@ -66,10 +66,10 @@ def _by_key(files: Iterator[File], path: Path) -> dict[Key, File]:
             key = match["task"], int(match["prompt"]), int(match["index"])
             if key in by_key:
                 sentence = f"{name_of(key)} stands here again; {by_key[key][0]} holds it already"
-                raise BadInput(sentence, file=file[0])
+                raise UserError(sentence, file=file[0])
             by_key[key] = file
     if not by_key:
-        raise BadInput(f"there is no file named {NAMED}, in it", file=path)
+        raise UserError(f"there is no file named {NAMED}, in it", file=path)
     return by_key
 
 
@@ -82,7 +82,7 @@ def _files(path: Path) -> Iterator[Iterator[File]]:
     try:
         archive = zipfile.ZipFile(path)
     except UNREADABLE as error:
-        raise BadInput(f"is no readable zip ({error})", file=path) from None
+        raise UserError(f"is no readable zip ({error})", file=path) from None
     with archive:
         yield _members(path, archive)
 
@@ -95,15 +95,15 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
         nonlocal unpacked
         if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
             # Others are unpacked in pieces that may be of any size.
-            raise BadInput('is packed in an unusual way; pack it with "deflate"', file=name)
+            raise UserError('is packed in an unusual way; pack it with "deflate"', file=name)
         try:
             with archive.open(member) as file:
                 data = file.read(MAX_ROW + 1)
         except UNREADABLE as error:
-            raise BadInput(f"is no readable zip ({error})", file=path) from None
+            raise UserError(f"is no readable zip ({error})", file=path) from None
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:
-            raise BadInput(f"unpacks to more than {MAX_UNPACKED:,} bytes", file=path)
+            raise UserError(f"unpacks to more than {MAX_UNPACKED:,} bytes", file=path)
         return text_of(data, name, limit=MAX_ROW)
 
     for member in archive.infolist():
@@ -117,9 +117,9 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     try:
         statements = parse(text).body
     except SyntaxError as error:
-        raise BadInput(f"is no Python ({error.msg})", file=name, line=error.lineno) from None
+        raise UserError(f"is no Python ({error.msg})", file=name, line=error.lineno) from None
     except (ValueError, RecursionError, MemoryError):
-        raise BadInput("is no readable Python; write plain assignments", file=name) from None
+        raise UserError("is no readable Python; write plain assignments", file=name) from None
     values = {
         target.id: _value(statement.value, target.id, name)
         for statement in statements
@@ -129,7 +129,7 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     }
     texts = {key: _joined(value) for key, value in values.items() if isinstance(value, str)}
     if "completion" not in texts:
-        raise BadInput("does not assign a text to `completion`", file=name)
+        raise UserError("does not assign a text to `completion`", file=name)
     return texts
 
 
@@ -143,4 +143,4 @@ def _value(written: ast.expr, what: str, name: str) -> object:
         return ast.literal_eval(written)
     except (ValueError, TypeError, RecursionError, MemoryError):
         sentence = f"`{what}` is no plain text; write the text out"
-        raise BadInput(sentence, file=name, line=written.lineno) from None
+        raise UserError(sentence, file=name, line=written.lineno) from None

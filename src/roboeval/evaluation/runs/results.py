@@ -14,7 +14,7 @@ from typing import Any
 import msgspec
 import polars as pl
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.completions import Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import (
@@ -56,7 +56,7 @@ def load_results(
         world. Numbers count from 0.
 
     Raises:
-        BadInput: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
+        UserError: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
     """
     known, folder = load_suite(suite), Run(Path(run))
     key = evaluation_key(known, ablated=ablation)
@@ -71,12 +71,12 @@ def load_results(
 
 
 def expect_judged(run: Run, key: str) -> None:
-    """Raise BadInput if a folder is no run, or lacks an evaluation."""
+    """Raise UserError if a folder is no run, or lacks an evaluation."""
     if not run.completions.is_file():
-        raise BadInput("is no run: it holds no completions.jsonl", file=run.path)
+        raise UserError("is no run: it holds no completions.jsonl", file=run.path)
     if not run.rows(key).is_file():
         there = ", ".join(run.judged_by()) or "nothing"
-        raise BadInput(
+        raise UserError(
             f'has no evaluation "{key}" (there is {there}); `roboeval evaluate` makes it', file=run.path
         )
 
@@ -123,7 +123,7 @@ class Results:
     table: pl.DataFrame  # as `load_results` gives it
     failed: Mapping[Key, RowData] = field(repr=False)  # without traces of worlds that did not decide
     places: Mapping[Key, tuple[int, int]] = field(repr=False)  # first byte and size of each row in the file
-    faults: tuple[BadInput, ...] = ()
+    faults: tuple[UserError, ...] = ()
 
     @property
     def tasks(self) -> frozenset[str] | None:
@@ -161,7 +161,7 @@ class Results:
         return {key: c.program for key, c in self.completions.items() if key not in stale}
 
     def row(self, key: Key) -> Row:
-        """Read a row again, with all its traces; raises BadInput if the file was written anew."""
+        """Read a row again, with all its traces; raises UserError if the file was written anew."""
         at, size = self.places[key]
         path = self.run.rows(self.key or "")
         try:
@@ -172,14 +172,14 @@ class Results:
                 return row
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
             pass
-        raise BadInput("was written anew meanwhile; look again", file=path)
+        raise UserError("was written anew meanwhile; look again", file=path)
 
 
 def selected_tasks(head: Mapping[str, Any], path: Path) -> frozenset[str] | None:
-    """The tasks that a KEY.json names; None for all. Raises BadInput if somebody wrote something else."""
+    """The tasks that a KEY.json names; None for all. Raises UserError if somebody wrote something else."""
     tasks = head.get("tasks")
     if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) for task in tasks)):
-        raise BadInput('"tasks" is no list of names; --redo starts over', file=path)
+        raise UserError('"tasks" is no list of names; --redo starts over', file=path)
     return None if tasks is None else frozenset(tasks)
 
 
@@ -189,7 +189,7 @@ def read_results(
     suite: Suite | None = None,
     *,
     keep_failed: bool = True,  # may take much memory
-    faults: list[BadInput] | None = None,
+    faults: list[UserError] | None = None,
     see: Callable[[bytes], None] | None = None,  # gets the line of each row
     watch: Callable[[Iterator[Line], int], Iterable[Line]] = lambda lines, _: lines,  # gets the total, too
 ) -> Results:
@@ -225,10 +225,10 @@ def read_results(
     )
 
 
-def _head(path: Path, faults: list[BadInput] | None) -> Mapping[str, Any]:
+def _head(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
     try:
         return load_head(path)
-    except BadInput as error:
+    except UserError as error:
         add_or_raise(error, faults)
         return {}
 
@@ -274,7 +274,7 @@ def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
     }
 
 
-def _accepted(run: Run, key: str | None, faults: list[BadInput] | None) -> Mapping[tuple[str, str], bool]:
+def _accepted(run: Run, key: str | None, faults: list[UserError] | None) -> Mapping[tuple[str, str], bool]:
     """Whether the check found no problem, by task and hash of the program, where it was asked."""
     path = run.checks((key or "").removesuffix(ABLATED))
     accepted: dict[tuple[str, str], bool] = {}
@@ -282,6 +282,6 @@ def _accepted(run: Run, key: str | None, faults: list[BadInput] | None) -> Mappi
         return accepted
     try:
         accepted |= {program: not problems for program, problems in read_checks(path)}
-    except BadInput as error:
+    except UserError as error:
         add_or_raise(error, faults)
     return accepted

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias, TypedDict
 
 import msgspec
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import read_lines, read_rows, to_line
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Status
@@ -64,7 +64,7 @@ class Row(Judgement):
 RowData: TypeAlias = Mapping[str, Any]  # a row of an evaluation, or a part of one, as JSON has it
 
 
-def add_or_raise(fault: BadInput, faults: list[BadInput] | None) -> None:
+def add_or_raise(fault: UserError, faults: list[UserError] | None) -> None:
     """Add a fault to those that are collected; raise it where none are."""
     if faults is None:
         raise fault from None
@@ -157,7 +157,7 @@ def judged_row(line: bytes, *, check_kinds: bool = False) -> JudgedRow:
         if check_kinds:
             _expect_known_kinds(row)
     except (msgspec.DecodeError, UnicodeDecodeError, ValueError, TypeError, LookupError) as error:
-        raise BadInput(f"{NO_ROW} ({error})") from None
+        raise UserError(f"{NO_ROW} ({error})") from None
     return row
 
 
@@ -195,7 +195,7 @@ def read_lines_of(
     *,
     seal: Seal | None = None,
     see: Callable[[bytes], None] | None = None,
-    faults: list[BadInput] | None = None,
+    faults: list[UserError] | None = None,
 ) -> Iterator[Line]:
     """Read an evaluation, but for a torn last line; what is wrong is added to `faults`, or else raised."""
     seal = seal or Seal()
@@ -208,14 +208,14 @@ def read_lines_of(
                 if see is not None:
                     see(line)
                 yield Line(number, at, len(line), row)
-        except BadInput as error:
+        except UserError as error:
             if not line.endswith(b"\n"):
                 break
-            add_or_raise(BadInput(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
+            add_or_raise(UserError(f"{error.sentence}; --redo starts over", file=path, line=number), faults)
             is_told = True
         at += len(line)
     if seal.is_broken(head) and not is_told:
-        add_or_raise(BadInput(f"{BROKEN}; --redo starts over", file=path), faults)
+        add_or_raise(UserError(f"{BROKEN}; --redo starts over", file=path), faults)
 
 
 def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
@@ -225,7 +225,7 @@ def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
                 yield (task, program), problems
             case _:
-                raise BadInput("this line is no check; delete the file", file=path, line=number)
+                raise UserError("this line is no check; delete the file", file=path, line=number)
 
 
 # --- the seal of a finished file

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.rows import JudgedRow
@@ -173,9 +173,9 @@ def kind_of(path: Path | None) -> str:
 def write_table(frame: pl.DataFrame, path: Path, kind: str) -> None:
     """Write a table to a file as csv or parquet; the same table gives the same bytes."""
     if kind not in FORMATS:
-        raise BadInput(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
+        raise UserError(f'there is no format "{kind}"; choose one of {", ".join(FORMATS)}')
     if not path.parent.is_dir():
-        raise BadInput("there is no such folder", file=path.parent)
+        raise UserError("there is no such folder", file=path.parent)
     content = io.BytesIO()
     if kind == "csv":
         # A spreadsheet takes a cell that begins so for a formula; OWASP advises the ' in front.

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.trace import Event, Option
-from codebotler.rtl import Claim, Element, Number, RtlSyntaxError, Time, explain, holds, parse
+from codebotler.rtl import Claim, EventPattern, Number, RtlSyntaxError, Time, explain, holds, parse
 from codebotler.rtl.text.times import times_in
 
 SAVORY = [
@@ -301,4 +301,4 @@ def test_what_happened_in_another_room_is_told_so() -> None:
 
 
 def test_an_element_without_a_place_happens_anywhere() -> None:
-    assert Element("say", Claim("a")).happens_at("wherever")
+    assert EventPattern("say", Claim("a")).happens_at("wherever")

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, Appender, sync_folder, to_line, write_whole
 from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.folder import Run, open_source
@@ -19,9 +19,9 @@ from roboeval.suites.load import Suite
 ROW = {"task": "SayGoodDay", "prompt": 0, "index": 0, "program": "x = 1"}
 
 
-def error_about(path: Path, line: bytes) -> BadInput:
+def error_about(path: Path, line: bytes) -> UserError:
     path.write_bytes(line)
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(UserError) as caught:
         list(read_completions(path))
     assert (str(caught.value.file), caught.value.line) == (str(path), 1)
     return caught.value
@@ -80,7 +80,7 @@ def test_a_row_whose_copy_would_be_too_long_is_refused_before_it_is_copied(
     line = json.dumps(ROW | {"usage": [1] * 2_400_000}, separators=(",", ":")).encode()
     assert len(line) < MAX_ROW
     assert "5,000,000 bytes" in error_about(path, line).sentence
-    with pytest.raises(BadInput, match="5,000,000 bytes"):
+    with pytest.raises(UserError, match="5,000,000 bytes"):
         Run(tmp_path / "run").keep(open_source(str(path), paper).completions)
     assert not (tmp_path / "run").exists()
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import read_rows, to_line
 from roboeval.cli.app import app
 from roboeval.evaluation.evaluate import evaluate_run
@@ -163,7 +163,7 @@ def test_a_program_that_was_changed_is_refused_unless_all_is_redone(tmp_path: Pa
     kept = run.completions.read_bytes()
     run.completions.write_bytes(kept.replace(b"#1", b"#one"))
     before = run.rows("paper").read_bytes()
-    with pytest.raises(BadInput, match=r"SayGoodDay/0/1 .* --redo") as error:
+    with pytest.raises(UserError, match=r"SayGoodDay/0/1 .* --redo") as error:
         judged(run, paper)
     assert (error.value.file, error.value.line) == (run.rows("paper"), 2)
     assert run.rows("paper").read_bytes() == before
@@ -185,7 +185,7 @@ def test_a_program_that_is_changed_while_it_waits_is_tied_to_what_was_judged(
     assert len(list(rows)) == 299
     assert len(judged(run, paper)) == 300
     run.completions.write_bytes(kept)
-    with pytest.raises(BadInput, match="SayGoodDay/0/299 "):
+    with pytest.raises(UserError, match="SayGoodDay/0/299 "):
         judged(run, paper)
 
 
@@ -219,7 +219,7 @@ def test_a_run_that_another_process_writes_is_refused(tmp_path: Path, paper: Sui
     ) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        with pytest.raises(BadInput, match="another process"):
+        with pytest.raises(UserError, match="another process"):
             judged(run, paper)
         process.kill()
     assert len(judged(run, paper)) == 1
@@ -242,7 +242,7 @@ def test_what_was_judged_otherwise_is_refused_unless_all_is_redone(
     judged(run, paper)
     about = json.loads(run.head("paper").read_text())
     run.head("paper").write_text(json.dumps(about | {name: value}))
-    with pytest.raises(BadInput, match=rf"{re.escape(what)}.* --redo"):
+    with pytest.raises(UserError, match=rf"{re.escape(what)}.* --redo"):
         judged(run, paper)
     assert len(judged(run, paper, redo=True)) == 1
     assert json.loads(run.head("paper").read_text()) == about
@@ -262,14 +262,14 @@ def test_rows_of_other_completions_are_refused(tmp_path: Path, paper: Suite) -> 
     judged(run, paper)
     rows = run.completions.read_bytes().splitlines(keepends=True)
     run.completions.write_bytes(rows[1] + rows[0])
-    with pytest.raises(BadInput, match=r"SayGoodDay/0/0 .* SayGoodDay/0/1"):
+    with pytest.raises(UserError, match=r"SayGoodDay/0/0 .* SayGoodDay/0/1"):
         judged(run, paper)
 
 
 def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> None:
     run = a_run(tmp_path / "run", [GREETS])
     before = run.completions.read_bytes()
-    with pytest.raises(BadInput, match="other completions"):
+    with pytest.raises(UserError, match="other completions"):
         careful_run(run.path, paper)
     assert run.completions.read_bytes() == before
 
@@ -278,7 +278,7 @@ def test_other_completions_are_not_overwritten(tmp_path: Path, paper: Suite) -> 
 def test_more_or_fewer_completions_are_others(tmp_path: Path, paper: Suite, more: str | None) -> None:
     run = a_run(tmp_path / "run", [GREETS, "#"])
     other = a_run(tmp_path / "other", [GREETS, "#", more] if more else [GREETS])
-    with pytest.raises(BadInput, match="other completions"):
+    with pytest.raises(UserError, match="other completions"):
         run.keep(open_source(str(other.path), paper).completions)
     run.keep(open_source(str(run.path), paper).completions)
 
@@ -310,7 +310,7 @@ def test_a_source_can_be_a_run_a_file_a_folder_or_a_recorded_model(tmp_path: Pat
     (folder / "SayGoodDay_0_3.py").write_text(f"name = 'x'\nprompt = 'p'\ncompletion = {GREETS!r}\n")
     assert [c.key for c in open_source(str(folder), paper).completions] == [("SayGoodDay", 0, 3)]
     assert len(open_source("recorded:hasty", paper).completions) >= 160
-    with pytest.raises(BadInput, match="no such file or folder") as error:
+    with pytest.raises(UserError, match="no such file or folder") as error:
         open_source(str(tmp_path / "nothing"), paper)
     assert str(error.value.file) == str(tmp_path / "nothing")
 
@@ -319,9 +319,9 @@ def test_only_tasks_with_an_ablation_are_ablated(paper: Suite) -> None:
     kept, left = tasks_to_judge(paper, "LunchTime,SayGoodDay", ablated=True)
     assert kept == frozenset({"LunchTime"})
     assert left == ("SayGoodDay",)
-    with pytest.raises(BadInput, match=r"SayGoodDay .* ablation"):
+    with pytest.raises(UserError, match=r"SayGoodDay .* ablation"):
         tasks_to_judge(paper, "SayGoodDay", ablated=True)
-    with pytest.raises(BadInput, match='"Nonsense"'):
+    with pytest.raises(UserError, match='"Nonsense"'):
         tasks_to_judge(paper, "Nonsense", ablated=False)
 
 
@@ -359,7 +359,7 @@ def test_rows_without_their_head_are_refused(tmp_path: Path, paper: Suite) -> No
     run = a_run(tmp_path / "run", ["def task_program(): pass\n"])
     judged(run, paper)
     run.head("paper").unlink()
-    with pytest.raises(BadInput, match="--redo") as error:
+    with pytest.raises(UserError, match="--redo") as error:
         judged(run, paper)
     assert error.value.file == run.head("paper")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from roboeval.evaluation.runs import published
 from roboeval.evaluation.runs.published import published_completions
 
@@ -23,8 +23,8 @@ def zipped(path: Path, members: Mapping[str, str | bytes], how: int = zipfile.ZI
     return path
 
 
-def error_about(path: Path) -> BadInput:
-    with pytest.raises(BadInput) as caught:
+def error_about(path: Path) -> UserError:
+    with pytest.raises(UserError) as caught:
         list(published_completions(path))
     return caught.value
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from codebotler.core.files import to_line
 from roboeval.analysis.search import Question, Search
 from roboeval.evaluation.evaluate import evaluate_run
@@ -81,7 +81,7 @@ def test_no_flipped_bit_is_overlooked(run: Run, paper: Suite) -> None:
         flipped[number * (len(content) - 1) // (PLACES - 1)] ^= 1 << number % 8
         for name, reading in readers.items():
             path.write_bytes(flipped)
-            with pytest.raises(BadInput) as caught:
+            with pytest.raises(UserError) as caught:
                 reading()
             assert caught.value.file == path, (number, name)
             assert "--redo" in caught.value.sentence
@@ -104,7 +104,7 @@ def test_a_damaged_check_is_said_with_its_line(run: Run, damaged: str) -> None:
     checks.parent.mkdir()
     row = {"task": "LunchTime", "program_sha256": "0", "problems": []}
     checks.write_bytes(to_line(row) + damaged.encode() + b"\n")
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(UserError) as caught:
         read(run)
     assert (caught.value.file, caught.value.line) == (checks, 2)
     assert [fault.line for fault in read(run, faults=[]).faults] == [2]
@@ -114,7 +114,7 @@ def test_rows_that_are_missing_or_too_many_are_noticed(run: Run) -> None:
     lines = run.rows("paper").read_bytes().splitlines(keepends=True)
     for damaged in (lines[:2], [*lines, lines[0]], [*lines, b'{"torn'], [lines[1], lines[0], lines[2]]):
         run.rows("paper").write_bytes(b"".join(damaged))
-        with pytest.raises(BadInput, match="--redo"):
+        with pytest.raises(UserError, match="--redo"):
             read(run)
 
 
@@ -161,7 +161,7 @@ def test_what_is_unknown_in_a_row_is_refused_with_its_line(run: Run, place: Part
     inner[place[-1]] = value
     run.rows("paper").write_bytes(b"".join(map(to_line, rows)))
     unseal(run.path)
-    with pytest.raises(BadInput) as caught:
+    with pytest.raises(UserError) as caught:
         read(run)
     assert (caught.value.file, caught.value.line) == (run.rows("paper"), 2)
     (fault,) = read(run, faults=[]).faults

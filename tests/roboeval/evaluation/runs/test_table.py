@@ -11,7 +11,7 @@ from typing import Any
 import polars as pl
 import pytest
 
-from codebotler.core.errors import BadInput
+from codebotler.core.errors import UserError
 from made_results import results_of
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import RowData
@@ -168,9 +168,9 @@ def test_a_long_table_keeps_its_order() -> None:
 
 
 def test_a_wrong_format_or_place_is_explained(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match=r'"xlsx".* csv, parquet'):
+    with pytest.raises(UserError, match=r'"xlsx".* csv, parquet'):
         write_table(table([], []), tmp_path / "t", "xlsx")
-    with pytest.raises(BadInput, match="no such folder") as error:
+    with pytest.raises(UserError, match="no such folder") as error:
         write_table(table([], []), tmp_path / "no" / "t.csv", "csv")
     assert error.value.file == tmp_path / "no"
 

@@ -1,4 +1,4 @@
-"""Lanes that tests share: to start the processes of one costs more than most tests do."""
+"""WorkerPool that tests share: to start the processes of one costs more than most tests do."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from typing import TypeVar
 import pytest
 
 from codebotler.core.trace import Outcome
-from codebotler.simulator.fork_server import Zygote
+from codebotler.simulator.fork_server import ForkServer
 from codebotler.simulator.skill_protocol import Robot
-from codebotler.simulator.worker import EngineError, Lane
+from codebotler.simulator.worker import EngineError, Worker
 
 Started = TypeVar("Started")
-IDLE: list[SharedLane] = []
+IDLE: list[SharedWorker] = []
 STARTER = [ThreadPoolExecutor(1, "starter")]  # processes of an engine end with the thread that started them
 
 
-class SharedLane(Lane):
-    """A lane that waits for its next user when it is closed, unless it was stopped in the middle of a run."""
+class SharedWorker(Worker):
+    """A worker that waits for its next user when it is closed, unless it was stopped during a run."""
 
     def __init__(self) -> None:
         self.is_running = self.is_leaving = self.was_stopped = False
@@ -49,7 +49,7 @@ class SharedLane(Lane):
         return outcome
 
     def stop(self) -> None:
-        """End what is running, if anything is, and with it the lane."""
+        """End what is running, if anything is, and with it the worker."""
         self.is_leaving = True
         if self.is_running:
             self.was_stopped = True  # also where the run ends by itself just now
@@ -66,20 +66,20 @@ class SharedLane(Lane):
         """End it."""
         super().close()
 
-    def _zygote(self, role: str) -> Zygote:
-        if role in self._zygotes:
-            return self._zygotes[role]
-        return lasting(partial(super()._zygote, role))
+    def _fork_server(self, role: str) -> ForkServer:
+        if role in self._fork_servers:
+            return self._fork_servers[role]
+        return lasting(partial(super()._fork_server, role))
 
     def _expect_a_user(self) -> None:
         if self.is_leaving:
             raise EngineError("the engine was stopped")
 
 
-def lane() -> Lane:
+def worker() -> Worker:
     """One that waits, or else a new one."""
     if not IDLE:
-        return lasting(SharedLane)
+        return lasting(SharedWorker)
     found = IDLE.pop()
     found.is_leaving = False
     return found
@@ -93,10 +93,10 @@ def lasting(start: Callable[[], Started]) -> Started:
 
 @contextmanager
 def shared() -> Iterator[None]:
-    """Let whoever starts a lane be given one of these."""
+    """Let whoever starts a worker be given one of these."""
     with pytest.MonkeyPatch.context() as patch:
         for user in ("codebotler.simulator.engine", "codebotler.missions.mission"):
-            patch.setattr(f"{user}.Lane", lane)
+            patch.setattr(f"{user}.Worker", worker)
         yield
 
 
