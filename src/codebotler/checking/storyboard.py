@@ -10,10 +10,11 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace
 
-DID = {"say": "said", "pick": "picked up", "place": "put down"}
+VERBS = SKILLS.verbs
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20
@@ -96,7 +97,7 @@ def step_text(step: Mapping[str, Any]) -> Text:
             answer = "no answer" if step["answer"] is None else shortened(step["answer"])
             told = f"asked {text} {_options(step['options'])} → {answer}"
         case kind:
-            told = f"{DID.get(kind) or visible(kind)} {text}"
+            told = f"{VERBS[kind].past if kind in VERBS else visible(kind)} {text}"
     return Text(told)
 
 

@@ -1,6 +1,6 @@
 """The skill table: the one place that knows what a robot can be asked to do.
 
-Prompts, the simulator, the isolated child, RTL, ROS types and the pages are all derived from it, so that one
+Prompts, the simulator, the sandbox, RTL, ROS types, explanations and the page are all derived from it: one
 more skill is one more row here and one more behaviour in `codebotler.simulator.robot`.
 """
 
@@ -41,6 +41,25 @@ class Recording:
 
 
 @dataclass(frozen=True)
+class Verb:
+    """What a skill is called when people read about it; the event's text follows it.
+
+    Args:
+        base: the infinitive without "to", such as `pick up`.
+        third: what the robot does, such as `picks up`.
+        past: what it did, such as `picked up`.
+        ing: such as `picking up`.
+        alone: the past without an object, such as `picked something up`.
+    """
+
+    base: str
+    third: str
+    past: str
+    ing: str
+    alone: str = ""
+
+
+@dataclass(frozen=True)
 class RosAction:
     """The ROS action that carries a skill to a robot (paper, section III.C).
 
@@ -76,6 +95,7 @@ class Skill:
         doc: what it does, in a sentence meant for the person or model who writes programs.
         recording: what it leaves in the trace; None for skills that leave nothing.
         ros: the action on a robot.
+        verb: for people; without one they read the skill's name and its arguments.
     """
 
     name: str
@@ -84,6 +104,7 @@ class Skill:
     doc: str
     recording: Recording | None = None
     ros: RosAction | None = None
+    verb: Verb | None = None
 
     @property
     def signature(self) -> str:
@@ -137,6 +158,11 @@ class SkillTable(Mapping[str, Skill]):
         """What can stand in a trace, by kind of event."""
         return {s.recording.kind: s.recording for s in self.rows if s.recording}
 
+    @property
+    def verbs(self) -> Mapping[str, Verb]:
+        """What people read of an event, by its kind; kinds without a verb are absent."""
+        return {s.recording.kind: s.verb for s in self.rows if s.recording and s.verb}
+
 
 SKILLS = SkillTable(
     (
@@ -146,6 +172,12 @@ SKILLS = SkillTable(
             "str",
             "Name the room the robot is in.",
             ros=RosAction("GetCurrentLocation", "/get_current_location_server", result="string"),
+            verb=Verb(
+                "look up where it is",
+                "looks up where it is",
+                "looked up where it is",
+                "looking up where it is",
+            ),
         ),
         Skill(
             "get_all_rooms",
@@ -153,6 +185,12 @@ SKILLS = SkillTable(
             "list[str]",
             "List the names of all rooms.",
             ros=RosAction("GetAllRooms", "/get_all_rooms_server", result="string[]"),
+            verb=Verb(
+                "look up which rooms there are",
+                "looks up which rooms there are",
+                "looked up which rooms there are",
+                "looking up which rooms there are",
+            ),
         ),
         Skill(
             "is_in_room",
@@ -161,6 +199,7 @@ SKILLS = SkillTable(
             "Look whether an object or a person is in the room the robot is in.",
             Recording("check", "entity"),
             RosAction("IsInRoom", "/is_in_room_server", ("string object",), "bool"),
+            Verb("look for", "looks for", "looked for", "looking for", "looked around"),
         ),
         Skill(
             "go_to",
@@ -169,6 +208,7 @@ SKILLS = SkillTable(
             "Drive to a room.",
             Recording("goto", "location"),
             RosAction("GoTo", "/go_to_server", ("string location",), failure="GoToInvalidLocation"),
+            Verb("go to", "drives to", "went to", "going to"),
         ),
         Skill(
             "ask",
@@ -179,6 +219,7 @@ SKILLS = SkillTable(
             RosAction(
                 "Ask", "/ask_server", ("string person", "string question", "string[] options"), "string"
             ),
+            Verb("ask", "asks", "asked", "asking", "asked something"),
         ),
         Skill(
             "say",
@@ -187,6 +228,7 @@ SKILLS = SkillTable(
             "Say a message aloud in the room the robot is in.",
             Recording("say", "message"),
             RosAction("Say", "/say_server", ("string message",)),
+            Verb("say", "says", "said", "saying", "spoke"),
         ),
         Skill(
             "pick",
@@ -195,6 +237,7 @@ SKILLS = SkillTable(
             "Pick up an object in the room; the robot can hold one at a time.",
             Recording("pick", "obj"),
             RosAction("Pick", "/pick_server", ("string obj",)),
+            Verb("pick up", "picks up", "picked up", "picking up", "picked something up"),
         ),
         Skill(
             "place",
@@ -203,6 +246,7 @@ SKILLS = SkillTable(
             "Put down the object that the robot holds.",
             Recording("place", "obj"),
             RosAction("Place", "/place_server", ("string obj",), failure="PlaceNoObject"),
+            Verb("put down", "puts down", "put down", "putting down", "put something down"),
         ),
     )
 )

@@ -20,18 +20,6 @@ from codebotler.missions.log import Line, Summary
 from codebotler.missions.mission import State
 from codebotler.robots.base import Readiness
 
-VERBS: Mapping[str, str] = {
-    "goto": "drives to",
-    "say": "says",
-    "ask": "asks",
-    "check": "looks for",
-    "pick": "picks up",
-    "place": "puts down",
-}
-LOOKS: Mapping[str, str] = {
-    "get_all_rooms": "looks up which rooms there are",
-    "get_current_location": "looks up where it is",
-}
 STYLES: Mapping[State, str] = {
     State.DONE: "bold green",
     State.FAILED: "bold red",
@@ -96,12 +84,13 @@ def told(line: Line) -> Text | None:
 
 def _skill(line: Line) -> Text:
     name, arguments = line["skill"], line["arguments"]
-    recording = SKILLS[name].recording if name in SKILLS else None
-    if name in LOOKS and name in SKILLS:
-        return Text(LOOKS[name])
-    if recording is None or recording.kind not in VERBS:
+    skill = SKILLS.get(name)
+    if skill is None or skill.verb is None:
         return Text(shortened(in_words(name, list(arguments.values()))))
-    words = f'{VERBS[recording.kind]} "{shortened(str(arguments[recording.text]))}"'
+    recording = skill.recording
+    if recording is None:
+        return Text(skill.verb.third)
+    words = f'{skill.verb.third} "{shortened(str(arguments[recording.text]))}"'
     if recording.options:
         words += f" [{shortened(' | '.join(arguments[recording.options]))}]"
     return Text(words, "bold" if recording.kind == "goto" else "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
+from codebotler.core.skills import SKILLS, Verb
 from codebotler.core.words import listed
 from codebotler.rtl.formula import EventPattern, Regex, Text, Without
 from codebotler.rtl.phrases import either, is_any, lacks, literals, quoted, room, room_name, with_texts
@@ -17,24 +18,9 @@ Form: TypeAlias = Literal["base", "past", "ing"]
 Deed: TypeAlias = tuple[EventPattern, ...]
 """What one robot may do: any of these elements. Two of them are one text, in a question or in its options."""
 
-# The kinds of the paper read best with verbs of their own; further skills are told by their names.
-_VERBS: dict[str, dict[Form, str]] = {
-    "goto": {"base": "go", "past": "went", "ing": "going"},
-    "say": {"base": "say", "past": "said", "ing": "saying"},
-    "ask": {"base": "ask", "past": "asked", "ing": "asking"},
-    "check": {"base": "look for", "past": "looked for", "ing": "looking for"},
-    "pick": {"base": "pick up", "past": "picked up", "ing": "picking up"},
-    "place": {"base": "put down", "past": "put down", "ing": "putting down"},
-}
-_OTHER_VERB: dict[Form, str] = {"base": "do", "past": "did", "ing": "doing"}
+_VERBS = SKILLS.verbs
+_OTHER_VERB = Verb("do", "does", "did", "doing")
 _MENTION: dict[Form, str] = {"base": "mention", "past": "mentioned", "ing": "mentioning"}
-_PASTIMES = {
-    "say": "spoke",
-    "ask": "asked something",
-    "check": "looked around",
-    "pick": "picked something up",
-    "place": "put something down",
-}
 _MOST = 5
 
 
@@ -52,7 +38,7 @@ def did(deed: Deed, form: Form, *, never: bool = False) -> str:
 
 def _did(deed: Deed, form: Form, *, never: bool) -> str:  # noqa: PLR0911 - one for each kind
     element = deed[0]
-    verb = _VERBS.get(element.kind, _OTHER_VERB)[form]
+    verb = getattr(_VERBS.get(element.kind, _OTHER_VERB), form)
     if element.answer is not None:
         got = {"base": "get", "past": "got", "ing": "getting"}[form]
         return f"{got} an answer {with_texts(element.answer)}".rstrip()
@@ -63,7 +49,8 @@ def _did(deed: Deed, form: Form, *, never: bool) -> str:  # noqa: PLR0911 - one 
     thing = "anything" if never else "something"
     match element.kind:
         case "goto":
-            return f"{verb} {_destination(element.text, 'anywhere' if never else 'somewhere')}"
+            anywhere = "anywhere" if never else "somewhere"
+            return f"{verb.removesuffix(' to')} {_destination(element.text, anywhere)}"
         case "say":
             return " ".join(filter(None, [verb, thing, with_texts(element.text)]))
         case "ask":
@@ -81,9 +68,9 @@ def happened(event: Event, form: Form) -> str:
         event: what the robot did.
         form: of the verb.
     """
-    verb = _VERBS.get(event.kind, _OTHER_VERB)[form]
+    verb = getattr(_VERBS.get(event.kind, _OTHER_VERB), form)
     if event.kind == "goto":
-        return f"{verb} to {room_name(event.text)}"
+        return f"{verb} {room_name(event.text)}"
     return (
         f"{verb} {quoted(event.text)}"
         if event.kind in _VERBS
@@ -108,7 +95,7 @@ def pastimes(events: Iterable[Event]) -> str:
         events: what it did.
     """
     kinds = dict.fromkeys(event.kind for event in events if event.kind != "goto")
-    return listed([_PASTIMES.get(kind, f"did a {kind}") for kind in kinds])
+    return listed([_VERBS[kind].alone if kind in _VERBS else f"did a {kind}" for kind in kinds])
 
 
 def lacking(deed: Deed, event: Event) -> str:

@@ -8,12 +8,13 @@ from typing import Any
 
 from codebotler.checking.problems import Check, Sample
 from codebotler.checking.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, steps_of
+from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.web.supposing import supposed
 
 MOST_TEXT, MOST_WORLD = 300, 800
 MOST_STRIPS = 6
-WORDS = {"pick": "picks up", "place": "puts down"}
+VERBS = SKILLS.verbs
 
 
 @dataclass(frozen=True)
@@ -134,5 +135,11 @@ def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
         return (Deed("ask", text, number), Deed("answer", heard))
     if kind == "check":
         seen = "and finds it" if step.get("found") else "but does not find it"
-        return (Deed("check", f"looks for {text}, {seen}", number),)
-    return (Deed(kind, text if kind == "say" else f"{WORDS.get(kind, shortened(kind))} {text}", number),)
+        return (Deed("check", f"{VERBS[kind].third} {text}, {seen}", number),)
+    return (
+        Deed(
+            kind,
+            text if kind == "say" else f"{VERBS[kind].third if kind in VERBS else shortened(kind)} {text}",
+            number,
+        ),
+    )
