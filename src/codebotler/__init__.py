@@ -22,8 +22,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from codebotler.checking.check import Check, Problem, check
     from codebotler.core.errors import UserError
-    from codebotler.generation.generate import Generation
-    from codebotler.generation.onecall import generate
+    from codebotler.generation.generate import Generation, generate
     from codebotler.models.base import ModelError
     from codebotler.prompts import prompt_for
     from codebotler.prompts.extract import program_of
@@ -42,7 +41,7 @@ else:  # each name is imported when it is first used
             "ModelError": "models.base",
             "Problem": "checking.check",
             "check": "checking.check",
-            "generate": "generation.onecall",
+            "generate": "generation.generate",
             "program_of": "prompts.extract",
             "prompt_for": "prompts",
         },

@@ -21,7 +21,7 @@ import pytest
 import yaml
 
 from codebotler.missions.mission import State
-from codebotler.missions.view import WORDS
+from codebotler.missions.wording import EVENTS
 from server import Server
 
 ROOT = Path(__file__).parents[2]
@@ -376,7 +376,7 @@ def test_states_and_events_of_missions_are_documented() -> None:
         *(State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED),
     ]
     rows = dict(re.findall(r"^\| `(\w+)` \|(.*)", lines, re.MULTILINE))
-    assert set(re.findall(r"`(\w+)`", rows["event"])) == set(WORDS)
+    assert set(re.findall(r"`(\w+)`", rows["event"])) == set(EVENTS)
 
 
 @pytest.mark.parametrize("page", ["report.md"])

@@ -177,14 +177,15 @@ def run(
     from codebotler.robots.base import Options
     from codebotler.robots.open import open_robot
 
-    request = Request(program, lambda: open_model(model, SamplingSettings()), yes, despite_problems)
+    request = Request(program, model, yes, despite_problems)
     options = Options(
         world=None if world is None else World.read(world),
         speed=speed or None,
         address=address,
         ros_python=ros_python,
     )
-    raise typer.Exit(run_mission(open_robot(robot, options), request, home()))
+    body = open_robot(robot, options)
+    raise typer.Exit(run_mission(body, request, home(), lambda name: open_model(name, SamplingSettings())))
 
 
 @app.command()
@@ -226,8 +227,8 @@ def robots(
     """
     from dataclasses import asdict
 
+    from codebotler.cli.views import robots_view
     from codebotler.core.terminal import print_json, print_rich
-    from codebotler.missions.view import robots_view
     from codebotler.robots.open import all_readiness
 
     found = all_readiness(ros_python)

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from codebotler.checking.check import check
 from codebotler.core.replacing import expect_replaceable
 from codebotler.core.terminal import busy, note, print_source, visible
 from codebotler.core.world import World
-from codebotler.generation.generate import Attempt, Generation, generate, untold
-from codebotler.models.base import Model, SamplingSettings
+from codebotler.generation.generate import Attempt, ignore, write_checked_program
+from codebotler.models.base import SamplingSettings
 from codebotler.models.open import kind_of, open_model
-from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt
-from codebotler.simulator.engine import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
 
@@ -32,20 +28,11 @@ def write(
     repair: bool,
     record: Path | None,
 ) -> bool:
-    """Have a model write a program, and print that; whether a check finds nothing wrong with it.
-
-    Args:
-        prompt: what is asked.
-        model: the name of who is asked.
-        settings: how it is asked.
-        world: where the program is to run; without it, the rooms are those that the program goes to.
-        retries: how many times a rejected program is asked for again, at least 0.
-        repair: whether to ask again with the program and its problems.
-        record: the file that gets a line for every attempt, if one is named.
+    """Have a model write a program, print it, and say whether the check accepts it.
 
     Raises:
         UserError: there is no such model.
-        ModelError: no whole reply came.
+        ModelError: a reply did not arrive, or not all of it.
         EngineError: no isolated process could be started.
         OSError: an attempt could not be recorded; the program is printed all the same.
     """
@@ -53,53 +40,17 @@ def write(
         with busy(f"asking {model}"):
             asked = open_model(model, settings)
             note_down = recording.enter_context(recorder(record, asked.name))
-            plan = None if world is None else RoomMap.of(world)
-            made = generated(asked, prompt, plan=plan, retries=retries, repair=repair, note_down=note_down)
+
+            def tried(attempt: Attempt) -> None:
+                note_down(attempt)
+                _tell(attempt, retries + 1)
+
+            room_map = None if world is None else RoomMap.of(world)
+            made = write_checked_program(
+                asked, prompt, room_map=room_map, retries=retries, repair=repair, tried=tried
+            )
         print_source(made.program)
     return not made.problems
-
-
-def generated(
-    model: Model,
-    prompt: Prompt,
-    *,
-    plan: RoomMap | None = None,
-    retries: int = 0,
-    repair: bool = False,
-    note_down: Callable[[Attempt], None] = untold,
-) -> Generation:
-    """Have a model write a program, and say beside the results what is wrong with each attempt.
-
-    Args:
-        model: who is asked; it is closed at the end.
-        prompt: what is asked.
-        plan: the rooms; without it, they are those that the program goes to.
-        retries: how many times a rejected program is asked for again, at least 0.
-        repair: whether to ask again with the program and its problems.
-        note_down: told each attempt as it ends.
-
-    Raises:
-        ModelError: no whole reply came.
-        EngineError: no isolated process could be started.
-    """
-    with WorkerPool(1) as pool:
-
-        def problems(program: str) -> list[str]:
-            found = check(program, pool=pool, plan=plan)
-            return [problem.sentence for problem in found.problems]
-
-        def tried(attempt: Attempt) -> None:
-            note_down(attempt)
-            _tell(attempt, retries + 1)
-
-        async def asked() -> Generation:
-            try:
-                paced = RateLimited(model, concurrency=1)
-                return await generate(paced, prompt, problems, retries=retries, repair=repair, tried=tried)
-            finally:
-                await model.close()
-
-        return asyncio.run(asked())
 
 
 @contextmanager
@@ -115,7 +66,7 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
         OSError: at the end, if an attempt could not be added; after it, none is.
     """
     if path is None:
-        yield untold
+        yield ignore
         return
     expect_replaceable(path, b"{")
     failed: OSError | None = None

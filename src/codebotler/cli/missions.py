@@ -6,12 +6,12 @@ import os
 from dataclasses import asdict
 from pathlib import Path
 
+from codebotler.cli.views import list_view, mission_view
 from codebotler.core.terminal import note, print_json, print_rich, visible
 from codebotler.missions.log import events_of
 from codebotler.missions.mcap import Clock, export
 from codebotler.missions.pictures import FOLDER, picture_of
 from codebotler.missions.store import find, missions, recover, summary_of
-from codebotler.missions.view import list_view, mission_view
 
 
 def show_missions(home: Path, *, json: bool) -> None:
@@ -24,7 +24,7 @@ def show_missions(home: Path, *, json: bool) -> None:
     Raises:
         UserError: one cannot be read.
     """
-    tell_interrupted(home)
+    note_interrupted(home)
     known = missions(home)
     if json:
         print_json([asdict(summary) for summary in known])
@@ -43,7 +43,7 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
     Raises:
         UserError: there is none of that name, or it cannot be read.
     """
-    tell_interrupted(home)
+    note_interrupted(home)
     folder = find(home, name)
     summary, events = summary_of(folder), events_of(folder)
     if json:
@@ -67,14 +67,14 @@ def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
         UserError: there is none of that name, or it cannot be read.
         OSError: the file cannot be written.
     """
-    tell_interrupted(home)
+    note_interrupted(home)
     folder = find(home, name)
     summary, events = summary_of(folder), events_of(folder)
     export(path, summary, events, clock, folder)
     note(f"wrote {len(events):,} events of mission {summary.id} to {path}")
 
 
-def tell_interrupted(home: Path) -> None:
+def note_interrupted(home: Path) -> None:
     """Close the missions that a tool left behind when it died, and say so.
 
     Raises:

@@ -1,28 +1,24 @@
-"""What `codebotler run` does: a program or an instruction, a check, somebody's word, and the robot's work."""
+"""`codebotler run`: a program or an instruction, a check, a person's approval, and the robot's work."""
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from codebotler.checking.check import check
 from codebotler.cli.check import check_view, read_program
-from codebotler.cli.generate import generated
-from codebotler.cli.missions import tell_interrupted
+from codebotler.cli.missions import note_interrupted
+from codebotler.cli.views import Watcher, ending, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
-from codebotler.missions.mission import GRACE, Mission, MissionError, State
-from codebotler.missions.preflight import beyond, preflight, unknown_rooms
-from codebotler.missions.view import Watcher, ending, source_view
+from codebotler.missions.mission import GRACE, MissionError, State
+from codebotler.missions.session import MissionSession, Order, SessionView
 from codebotler.models.base import Model
-from codebotler.prompts import prompt_for
 from codebotler.robots.base import Robot
-from codebotler.robots.reservation import Reservation
-from codebotler.simulator.sampled_robot import RoomMap
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",
@@ -30,25 +26,20 @@ SIGNALS = {
     signal.SIGHUP: "the end of the terminal",
 }
 OF_SIGNALS = 128  # what shells add to the number of a signal, for the status of a process that it ended
+BRIEFLY = 2.0  # seconds in which what has not moved yet is tidied up after Ctrl-C
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a user asks for.
-
-    Args:
-        what: a file, `-` for standard input, or an instruction.
-        model: gives who writes the program for an instruction; called only then.
-        yes: whether the program may be run without asking.
-        despite_problems: whether it may be run if the check finds problems.
+    """What a user asks for on the command line.
 
     Raises:
-        UserError: it names a program that does not exist, or nothing, or nobody could be asked.
+        UserError: it names a missing program or nothing, or approval would be read from where the program is.
     """
 
-    what: str
-    model: Callable[[], Model]
-    yes: bool = False
+    what: str  # a file, `-` for standard input, or an instruction
+    model: str = "recorded"  # writes the program for an instruction
+    yes: bool = False  # whether to run the program without asking
     despite_problems: bool = False
 
     def __post_init__(self) -> None:
@@ -57,148 +48,104 @@ class Request:
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name one, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
-            raise UserError(
-                "the program comes on standard input, so that nobody can be asked there; add --yes"
-            )
+            raise UserError("the program comes on standard input, so nobody can be asked there; add --yes")
 
     @property
     def is_program(self) -> bool:
-        """Whether it names a program, and does not ask for one."""
+        """Whether it names a program."""
         try:
             return self.what == "-" or Path(self.what).exists()
         except (OSError, ValueError):  # too long for a name, or with a null character
             return False
 
 
-def run(robot: Robot, request: Request, home: Path) -> int:
-    """Bring a mission from a user's request to its end, and show all of it.
-
-    Args:
-        robot: not yet connected.
-        request: what the user asks for.
-        home: the folder of missions.
+def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], Model]) -> int:
+    """Take a user's request to its end, and show all of it.
 
     Returns:
-        the exit status: 0 if it is done, 1 if it is not, 128 and the number of the signal that stopped it.
-
-    Raises:
-        NotReadyError: the robot cannot be used.
-        UserError: the program cannot be read, or the model not be asked.
-        ModelError: no whole reply came.
+        the exit status: 0 if the mission is done, 1 if it is not, 128 plus the number of the signal that
+        stopped it.
     """
-    program = read_program(request.what) if request.is_program else None
-    tell_interrupted(home)
-    instruction = "" if request.is_program else request.what
-    with (
-        _interrupts() as heed,
-        contextlib.ExitStack() as held,
-    ):
-        with busy(f"connecting the robot {robot.name}"):
-            reserved = held.enter_context(Reservation(robot, home))
-        mission = held.enter_context(Mission(home, robot.name, instruction))
-        heed()
-        plan, place = preflight(robot)
-        if program is None:
-            model = request.model()
-            program = written(model, request.what, plan)
-            mission.draft(program, model.name)
-        else:
-            mission.draft(program)
-        if not _is_approved(mission, program, robot, plan, request):
-            return 1
-        heed()
-        return _watched(mission, reserved, place)
+    program = read_program(request.what) if request.is_program else ""
+    note_interrupted(home)
+    order = Order(program=program) if program else Order(request.what, request.model)
+    session = MissionSession(
+        robot, home, order, open_model=open_model, check=lambda source, rooms: check(source, plan=rooms)
+    )
+    session.start()
+    try:
+        view = _prepared(session)
+        _show_check(view, request)
+        if _is_approved(session, view, robot, request):
+            return _watched(session, view, robot, request)
+    except BaseException as error:
+        session.stop(SIGNALS[signal.SIGINT] if isinstance(error, KeyboardInterrupt) else "an error")
+        session.join(BRIEFLY)
+        raise
+    session.join(GRACE)
+    return 1
 
 
-def written(model: Model, instruction: str, plan: RoomMap | None) -> str:
-    """The program that a model writes for an instruction, with the rooms of the robot in mind."""
-    if plan is None:
-        return generated(model, prompt_for(instruction)).program
-    return generated(model, prompt_for(instruction, rooms=plan.rooms), plan=plan).program
+def _prepared(session: MissionSession) -> SessionView:
+    """Wait for a checked program, and show what goes on meanwhile."""
+    view = session.view
+    while view.busy:
+        with busy(view.busy):
+            view = session.wait_until(lambda now, before=view.busy: now.busy != before)  # type: ignore[misc]
+    if session.error is not None:
+        raise session.error
+    return view
 
 
-def _is_approved(
-    mission: Mission, program: str, robot: Robot, plan: RoomMap | None, request: Request
-) -> bool:
-    """Show what a check finds, and ask."""
-    found = check(program, plan=plan)
-    name = request.what if request.is_program and request.what != "-" else "the program"
+def _show_check(view: SessionView, request: Request) -> None:
+    assert view.check is not None, "the program is checked"
     if not request.is_program:
-        print_rich(source_view(program))
-    print_rich(check_view(found, program, name))
-    lacking = beyond(program, robot)
-    problems = [*(problem.sentence for problem in found.problems), *lacking]
-    mission.check(problems)
-    unknown = unknown_rooms(program, plan) if plan and not found.problems else []
-    for sentence in (*lacking, *unknown):
-        told = f"before it moves: {sentence}"
-        mission.note(told)
-        note(shortened(told))
-    if problems and not request.despite_problems:
-        mission.fail(f"the check found {'a problem' if len(problems) == 1 else 'problems'}")
-        note("not run, since it has problems; --despite-problems runs it all the same")
+        print_rich(source_view(view.program))
+    name = request.what if request.is_program and request.what != "-" else "the program"
+    print_rich(check_view(view.check, view.program, name))
+    for sentence in (*view.missing_skills, *view.unknown_rooms):
+        note(shortened(f"before it moves: {sentence}"))
+
+
+def _is_approved(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
+    if view.problems and not request.despite_problems:
+        session.reject(f"the check found {'a problem' if len(view.problems) == 1 else 'problems'}")
+        note("not run, because it has problems; --despite-problems runs it anyway")
         return False
-    if not request.yes and not says_yes(f"run it on the robot {mission.summary.robot}?"):
-        mission.stop("the word of a person")
+    if not request.yes and not says_yes(f"run it on the robot {robot.name}?"):
+        session.stop("the person who was asked")
         note("not run; nothing has moved")
         return False
-    mission.approve(despite_problems=request.despite_problems)
     return True
 
 
-def _watched(mission: Mission, reserved: Reservation, place: str) -> int:
-    """Run it before a user's eyes."""
-    with _stopped_by_signals(mission) as got, Watcher(mission.summary) as watcher:
-        mission.told = watcher
-        with contextlib.suppress(MissionError):  # it was stopped before it could run
-            mission.run(reserved, place)
-    print_rich(ending(mission.summary))
-    if mission.state is State.STOPPED and got:
+def _watched(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> int:
+    """Run the program before the user's eyes."""
+    with _stopped_by_signals(session) as got, Watcher(robot.name) as watcher:
+        session.on_event = watcher
+        with suppress(MissionError):  # it was stopped before it could run
+            session.approve(view.digest, despite_problems=request.despite_problems)
+        session.wait_until(lambda _: False)
+    if session.error is not None:
+        raise session.error
+    assert session.mission is not None, "it has run"
+    print_rich(ending(session.mission.summary))
+    if session.mission.state is State.STOPPED and got:
         return OF_SIGNALS + got[0]
-    return 0 if mission.state is State.DONE else 1
+    return 0 if session.mission.state is State.DONE else 1
 
 
-@contextlib.contextmanager
-def _interrupts() -> Iterator[Callable[[], None]]:
-    """Remember Ctrl-C, which libraries swallow or take for a fault of their own while they are imported.
+@contextmanager
+def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
+    """Stop the session at a signal, and list those that came.
 
-    Gives what raises it again if it came; an exception that comes after it counts as Ctrl-C itself.
-    """
-    came: list[int] = []
-
-    def obey(number: int, _frame: object) -> None:
-        came.append(number)
-        raise KeyboardInterrupt
-
-    def heed() -> None:
-        if came:
-            raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, obey)
-    try:
-        yield heed
-    except Exception:
-        heed()
-        raise
-    finally:
-        if signal.getsignal(signal.SIGINT) is obey:
-            signal.signal(signal.SIGINT, before)
-
-
-@contextlib.contextmanager
-def _stopped_by_signals(mission: Mission) -> Iterator[list[int]]:
-    """Stop the mission when a signal comes, and tell which came; a second one cancels once more.
-
-    Whoever began this with `nohup` wants it to outlive the terminal.
+    A mission started with `nohup` outlives its terminal.
     """
     got: list[int] = []
 
-    def stop(name: str) -> None:
-        with contextlib.suppress(MissionError, OSError):
-            mission.stop(name)
-
     def obey(number: int, _frame: object) -> None:
-        threading.Thread(target=stop, args=(SIGNALS[signal.Signals(number)],), daemon=True).start()
+        by = SIGNALS[signal.Signals(number)]
+        threading.Thread(target=session.stop, args=(by,), daemon=True).start()
         got.append(number)
         if len(got) > 1:
             note(f"\nthe robot was told to stop; it has {GRACE:g} s to confirm that")
@@ -209,5 +156,5 @@ def _stopped_by_signals(mission: Mission) -> Iterator[list[int]]:
     try:
         yield got
     finally:
-        for number, handler in before.items():  # who was impatient must not break the tidying up
+        for number, handler in before.items():  # an impatient user must not break the tidying up
             signal.signal(number, signal.SIG_IGN if got else handler)

@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
+from codebotler.checking.check import check
+from codebotler.core.errors import UserError
 from codebotler.core.words import counted
-from codebotler.models.base import Heard, Model, Reply, unheard
-from codebotler.prompts import Prompt
+from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unheard
+from codebotler.models.open import open_model
+from codebotler.models.rate_limit import RateLimited
+from codebotler.prompts import Prompt, prompt_for
+from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.sampled_robot import RoomMap
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]
-"""Says what is wrong with a program, each problem in a sentence; nothing if it is accepted."""
+"""The problems of a program, each in a sentence; none if it is accepted."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One reply of a model, and what the check says of it.
+    """One reply of a model and the problems found in it.
 
     Args:
-        number: which sample of the prompt it is, counted from 0.
-        prompt: what was asked; that of a repair holds the program before and its problems.
-        reply: what the model wrote.
-        problems: what is wrong with it, each in a sentence; none if it was accepted, or not checked.
+        number: of the sample, from 0.
+        prompt: the request; for a repair, with the previous program and its problems.
+        reply: the model's whole reply.
+        problems: one sentence each; empty if it was accepted, or not checked.
     """
 
     number: int
@@ -32,11 +39,7 @@ class Attempt:
     problems: tuple[str, ...]
 
     def data(self, model: str) -> dict[str, Any]:
-        """The attempt as a row of JSON.
-
-        Args:
-            model: the name of who was asked.
-        """
+        """The attempt as a row of JSON."""
         return {
             "instruction": self.prompt.instruction,
             "model": model,
@@ -53,7 +56,7 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Generation:
-    """All attempts at a program, in order; the last one counts.
+    """All attempts at a program, in order; the last one is the result.
 
     Args:
         attempts: at least one.
@@ -67,55 +70,154 @@ class Generation:
 
     @property
     def program(self) -> str:
-        """The program that came out of it."""
+        """The program of the last attempt."""
         return self.attempts[-1].reply.program
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What is still wrong with it."""
+        """The problems of that program."""
         return self.attempts[-1].problems
 
 
-def untold(_attempt: Attempt) -> None:
-    """Tell nobody."""
+def ignore(_attempt: Attempt) -> None:
+    """Do nothing with an attempt."""
 
 
-async def generate(
+async def write_program(
     model: Model,
     prompt: Prompt,
-    check: Checker | None = None,
+    problems_of: Checker | None = None,
     *,
     retries: int = 0,
     repair: bool = False,
-    number: int = 0,
     heard: Heard = unheard,
-    tried: Callable[[Attempt], None] = untold,
+    tried: Callable[[Attempt], None] = ignore,
 ) -> Generation:
-    """Ask for a program until the check accepts one (rejection sampling; paper, section V).
+    """Ask a model until the check accepts a program (rejection sampling; paper, section V); closes the model.
 
     Args:
-        model: who is asked.
-        prompt: what is asked.
-        check: what accepts or rejects programs; without it, the first one is taken.
-        retries: how many times a rejected program is asked for again, at least 0.
-        repair: whether to ask again with the program and its problems in the request, not as the first time.
-        number: which sample of the prompt the first attempt is, counted from 0; further ones count on.
-        heard: told each piece of text as it comes in.
-        tried: told each attempt as it ends, before the next one begins.
+        model: the model to ask.
+        prompt: the first request.
+        problems_of: accepts or rejects programs; without it, the first program is taken.
+        retries: how many times to ask again for a rejected program, at least 0.
+        repair: whether to ask again with the rejected program and its problems in the request.
+        heard: called with each piece of text as it arrives.
+        tried: called with each attempt before the next one begins.
 
     Raises:
-        ModelError: no whole reply came.
+        ModelError: a reply did not arrive, or not all of it.
         BudgetSpentError: no further request may be made.
     """
     attempts: list[Attempt] = []
-    asked = prompt
-    for sample in range(number, number + retries + 1):
-        reply = await model.reply(asked, number=sample, heard=heard)
-        problems = () if check is None else tuple(await asyncio.to_thread(check, reply.program))
-        attempts.append(Attempt(sample, asked, reply, problems))
-        tried(attempts[-1])
-        if not problems:
-            break
-        if repair:
-            asked = prompt.after(reply.program, problems)
+    limited, request = RateLimited(model, concurrency=1), prompt
+    try:
+        for number in range(retries + 1):
+            reply = await limited.reply(request, number=number, heard=heard)
+            problems = (
+                () if problems_of is None else tuple(await asyncio.to_thread(problems_of, reply.program))
+            )
+            attempts.append(Attempt(number, request, reply, problems))
+            tried(attempts[-1])
+            if not problems:
+                break
+            if repair:
+                request = prompt.after(reply.program, problems)
+    finally:
+        await model.close()
     return Generation(tuple(attempts))
+
+
+def write_checked_program(
+    model: Model,
+    prompt: Prompt,
+    *,
+    rooms: Sequence[str] | None = None,
+    room_map: RoomMap | None = None,
+    retries: int = 0,
+    repair: bool = False,
+    tried: Callable[[Attempt], None] = ignore,
+) -> Generation:
+    """Ask a model until a program passes the check in sampled worlds; also where an event loop runs already.
+
+    Args:
+        model: the model to ask; it is closed at the end.
+        prompt: the first request.
+        rooms: their names; without them and a map, the rooms are those that the program names.
+        room_map: the rooms and the start.
+        retries: how many times to ask again for a rejected program, at least 0.
+        repair: whether to ask again with the rejected program and its problems in the request.
+        tried: called with each attempt before the next one begins.
+
+    Raises:
+        ModelError: a reply did not arrive, or not all of it.
+        EngineError: no isolated process could be started.
+    """
+    with WorkerPool(1) as pool:
+
+        def problems_of(program: str) -> list[str]:
+            return [
+                problem.sentence for problem in check(program, rooms=rooms, plan=room_map, pool=pool).problems
+            ]
+
+        def result() -> Generation:
+            return asyncio.run(
+                write_program(model, prompt, problems_of, retries=retries, repair=repair, tried=tried)
+            )
+
+        try:
+            asyncio.get_running_loop()
+        except RuntimeError:
+            return result()
+        with ThreadPoolExecutor(1) as beside:  # in a notebook
+            return beside.submit(result).result()
+
+
+def generate(
+    instruction: str,
+    *,
+    model: str = "recorded",
+    rooms: Sequence[str] | None = None,
+    retries: int | None = None,
+    repair: bool = False,
+    temperature: float | None = 0.2,
+    top_p: float | None = 0.95,
+    max_tokens: int = 512,
+    seed: int | None = None,
+    timeout: float = 60.0,
+    base_url: str | None = None,
+) -> Generation:
+    """Have a model write a program, check it in sampled worlds, and wait for the result.
+
+    A program with problems is returned all the same, with them: its last attempt counts.
+
+    Args:
+        instruction: what the robot is to do, in plain words.
+        model: the model's name, such as `recorded` or `openai-chat:gpt-5.1`.
+        rooms: the names of all rooms, for the model and for the check; without them, the rooms are those that
+            the program goes to.
+        retries: how many times to ask again for a program with problems, at least 0; by default once with
+            `repair`, else never.
+        repair: whether to ask again with the program and its problems in the request.
+        temperature: from 0 (always the likeliest token) up to about 2; None leaves it to the model.
+        top_p: the share of likely tokens that are drawn from, above 0 and up to 1; None leaves it to the
+            model.
+        max_tokens: the longest reply, in tokens, at least 1.
+        seed: for the random numbers, where a model takes a seed.
+        timeout: seconds for one request altogether.
+        base_url: where the model is served, such as `http://localhost:8000/v1`.
+
+    Raises:
+        UserError: there is no such model, or an argument is out of its range.
+        ModelError: a reply did not arrive, or not all of it.
+        EngineError: no isolated process could be started.
+    """
+    tries = int(repair) if retries is None else retries
+    if tries < 0:
+        raise UserError(f"the number of retries is {tries}, but must be at least 0")
+    if not instruction.strip():
+        raise UserError("the instruction is empty; say what the robot is to do")
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    prompt = prompt_for(instruction, rooms=rooms or ())
+    return write_checked_program(
+        open_model(model, settings), prompt, rooms=rooms, retries=tries, repair=repair
+    )

@@ -186,15 +186,6 @@ def answered(skill: Skill, result: base.Result) -> base.Result:
     return result
 
 
-def in_words(skill: str, given: Sequence[str | Sequence[str]]) -> str:
-    """A call of a skill as a program would write it."""
-    written = []
-    for value in given:
-        texts = [f'"{text}"' for text in ([value] if isinstance(value, str) else value)]
-        written.append(texts[0] if isinstance(value, str) else f"[{', '.join(texts)}]")
-    return f"{skill}({', '.join(written)})"
-
-
 def _text(argument: Argument) -> base.Argument:
     return argument if isinstance(argument, str) else tuple(option.text for option in argument)
 

@@ -1,4 +1,4 @@
-"""Before a robot moves: which rooms it knows, where it is, and what it lacks of what a program asks for."""
+"""Before a robot moves: the rooms it knows, the room it is in, and the skills it lacks."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ WITH_PATTERNS = frozenset({"simulated", "pyrobosim"})
 
 
 def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
-    """What a connected robot says of its rooms, in its own words.
+    """Ask a connected robot for its rooms and for the room it is in.
 
     Returns:
-        the rooms as a check takes them, None if it says nothing that a check could take; and the one that it
-        is in, empty if it says nothing of that.
+        the rooms, None if it does not list them; and the room it is in, empty if it does not say.
 
     Raises:
-        NotReadyError: it does not answer, or says what is no answer.
+        NotReadyError: it does not answer, or not as the skill demands.
     """
     can = [skill for skill in robot.skills if skill not in robot.missing]
 
@@ -60,28 +59,18 @@ def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
     return RoomMap(tuple(names), place or rooms[0], plain=robot.name not in WITH_PATTERNS), place
 
 
-def unknown_rooms(program: str, plan: RoomMap) -> list[str]:
-    """For each room that a program names and the robot does not know, a sentence.
-
-    Args:
-        program: its source.
-        plan: the robot's rooms.
-    """
+def unknown_rooms(program: str, room_map: RoomMap) -> list[str]:
+    """A sentence for each room that a program names and the robot does not know."""
 
     def is_part(name: str) -> bool:
-        return any(name.casefold() in room.casefold() for room in plan.rooms)
+        return any(name.casefold() in room.casefold() for room in room_map.rooms)
 
     named = named_rooms(program)
-    return [no_room(name, plan) for name in named if plan.room(name) is None and not is_part(name)]
+    return [no_room(name, room_map) for name in named if room_map.room(name) is None and not is_part(name)]
 
 
-def beyond(program: str, robot: Robot) -> list[str]:
-    """For each skill that a program calls and a connected robot lacks, a sentence.
-
-    Args:
-        program: its source.
-        robot: connected.
-    """
+def missing_skills(program: str, robot: Robot) -> list[str]:
+    """A sentence for each skill that a program calls and a connected robot lacks."""
     called = called_skills(program, robot.skills)
     return [
         f"line {line}: the robot cannot {skill}: {visible(robot.missing[skill])}"

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.pasted import mission_command
-from codebotler.missions.live import in_words
 from codebotler.missions.log import SUMMARY, Line, Log, Summary, doing, events_of
 from codebotler.missions.mission import STEPS, State
+from codebotler.missions.wording import call_text
 
 ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
@@ -144,7 +144,7 @@ def _how(summary: Summary, events: list[Line]) -> str:
     skill = doing(events)
     if skill is None:
         return "the tool died while the robot did nothing"
-    going = in_words(skill["skill"], list(skill["arguments"].values()))
+    going = call_text(skill["skill"], list(skill["arguments"].values()))
     where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
     where = f" ({where})" if where else ""
     return f"the tool died during {going}{where}; {summary.if_tool_dies}"

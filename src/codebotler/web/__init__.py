@@ -1,1 +1,1 @@
-"""The page and its API: an operator's desk in a browser. Only `codebotler serve` imports it."""
+"""The page and its API: an operator's console in a browser. Only `codebotler serve` imports it."""

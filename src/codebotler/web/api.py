@@ -20,10 +20,9 @@ from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS, Line, Summary, events_of
 from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import MissionError
+from codebotler.missions.session import MissionSession, Order, SessionView
 from codebotler.missions.store import find, missions, summary_of
 from codebotler.web.console import MOST_PROGRAM, Console
-from codebotler.web.turn import Turn
-from codebotler.web.view import Order, View
 
 HERE = "current"
 """Names the mission at hand in an address."""
@@ -89,128 +88,128 @@ def refused(_request: Request, error: Exception) -> AnyText:
     return AnyText({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
-def router(desk: Console) -> APIRouter:
+def router(console: Console) -> APIRouter:
     """The addresses of the API.
 
     Args:
-        desk: what they speak of.
+        console: what they speak of.
     """
     api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AnyText)
-    _add_missions(api, desk)
-    _add_changes(api, desk)
-    _add_events(api, desk)
-    _add_rest(api, desk)
+    _add_missions(api, console)
+    _add_changes(api, console)
+    _add_events(api, console)
+    _add_rest(api, console)
     return api
 
 
-def _add_missions(api: APIRouter, desk: Console) -> None:
+def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
         """All missions, in the order in which they began."""
         with _refusing():
-            return [asdict(summary) for summary in missions(desk.home)]
+            return [asdict(summary) for summary in missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
         """Begin a mission; its program is written and checked meanwhile. One that runs is not disturbed."""
-        model = new.model or ("" if new.program else desk.models[0])
+        model = new.model or ("" if new.program else console.models[0])
         with _refusing():
-            turn = desk.begin(Order(new.instruction, model, new.program))
-        await desk.board.until(lambda: bool(turn.view.id) or turn.view.is_over)
-        if not turn.view.id:
-            raise HTTPException(409, turn.view.trouble or "it was stopped before it began")
-        return view_data(turn.view)
+            session = console.begin(Order(new.instruction, model, new.program))
+        await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
+        if not session.view.id:
+            raise HTTPException(409, session.view.trouble or "it was stopped before it began")
+        return view_data(session.view)
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
         """A mission: the one at hand with its check, one of before in short."""
-        view = desk.view
+        view = console.view
         if mission in {HERE, view.id}:
             return view_data(view)
-        return asdict(_past(desk, mission)[0])
+        return asdict(_past(console, mission)[0])
 
     @api.get("/missions/{mission}/events.jsonl")
     def jsonl(mission: str) -> Response:
         """The events as they lie on the disk."""
-        summary, _ = _past(desk, mission)
-        data = (desk.home / "missions" / summary.id / EVENTS).read_bytes()
+        summary, _ = _past(console, mission)
+        data = (console.home / "missions" / summary.id / EVENTS).read_bytes()
         return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
 
     @api.get("/missions/{mission}/events.mcap")
     def mcap(mission: str, clock: Literal["wall", "robot"] = "wall") -> Response:
         """The events as MCAP, which Foxglove opens."""
-        summary, events = _past(desk, mission)
+        summary, events = _past(console, mission)
         file = io.BytesIO()
-        write_mcap(file, summary, events, folder=desk.home / "missions" / summary.id, clock=clock)
+        write_mcap(file, summary, events, folder=console.home / "missions" / summary.id, clock=clock)
         return _file(file.getvalue(), f"{summary.id}.mcap", "application/octet-stream")
 
 
-def _add_changes(api: APIRouter, desk: Console) -> None:
+def _add_changes(api: APIRouter, console: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
         """Put another program in the place of the one at hand; it is checked meanwhile."""
-        _at_hand(desk, mission)
+        _at_hand(console, mission)
         with _refusing():
-            return view_data(desk.edit(new.program).view)
+            return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: Again) -> dict[str, Any]:
         """Have the model write another program; it is checked afterwards."""
-        turn = _at_hand(desk, mission)
+        session = _at_hand(console, mission)
         with _refusing():
-            turn.ask_again(repair=again.repair)
-        return view_data(turn.view)
+            session.ask_again(repair=again.repair)
+        return view_data(session.view)
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
         """Let the robot run the program that was looked at, and no other."""
-        turn = _at_hand(desk, mission)
+        session = _at_hand(console, mission)
         with _refusing():
-            turn.approve(approval.program, despite_problems=approval.despite_problems)
-        return view_data(turn.view)
+            session.approve(approval.program, despite_problems=approval.despite_problems)
+        return view_data(session.view)
 
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
         """Stop the mission at hand; `state` says when it has stopped."""
-        _at_hand(desk, mission)
-        desk.stop_soon(STOPS)
-        return view_data(desk.view)
+        _at_hand(console, mission)
+        console.stop_soon(STOPS)
+        return view_data(console.view)
 
     @api.post("/stop", status_code=202)
     async def stop(*, only_moving: bool = False) -> dict[str, Any]:
         """Stop whatever goes on, or only a robot that runs; whether there is anything to stop."""
-        return {"stopping": desk.stop_soon(STOPS, only_moving=only_moving)}
+        return {"stopping": console.stop_soon(STOPS, only_moving=only_moving)}
 
 
-def _add_events(api: APIRouter, desk: Console) -> None:
+def _add_events(api: APIRouter, console: Console) -> None:
     @api.get("/missions/{mission}/events", response_class=StreamingResponse)
     async def events(mission: str, last_event_id: Annotated[int, Header(ge=0)] = 0) -> StreamingResponse:
         """The events as they happen (server-sent), from the first one on or after `Last-Event-ID`."""
         return StreamingResponse(
-            _stream(desk, _at_hand(desk, mission), last_event_id),
+            _stream(console, _at_hand(console, mission), last_event_id),
             media_type="text/event-stream",
             headers={"cache-control": "no-store"},
         )
 
 
-def _add_rest(api: APIRouter, desk: Console) -> None:
+def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: ProgramToCheck) -> dict[str, Any]:
         """Say what is wrong with a program, in the rooms of the mission at hand if there is one."""
         with _refusing():
-            return desk.check(new.program, desk.view.plan).data()
+            return console.check(new.program, console.view.room_map).data()
 
     @api.get("/robot", tags=["robot"])
     def robot() -> dict[str, Any]:
         """The robot, its skills and its mission."""
-        view = desk.view
+        view = console.view
         return {
-            "robot": desk.robot.name,
-            "skills": [skill.signature for skill in desk.robot.skills.values()],
-            "missing": dict(desk.robot.missing),
-            "models": list(desk.models),
-            "has_face": desk.face is not None,
-            "interrupted": [asdict(summary) for summary in desk.interrupted],
+            "robot": console.robot.name,
+            "skills": [skill.signature for skill in console.robot.skills.values()],
+            "missing": dict(console.robot.missing),
+            "models": list(console.models),
+            "has_face": console.face is not None,
+            "interrupted": [asdict(summary) for summary in console.interrupted],
             "mission": view.id,
             "state": view.state,
             "reason": view.reason,
@@ -218,23 +217,23 @@ def _add_rest(api: APIRouter, desk: Console) -> None:
         }
 
 
-async def _stream(desk: Console, turn: Turn, known: int) -> AsyncIterator[str]:
+async def _stream(console: Console, session: MissionSession, known: int) -> AsyncIterator[str]:
     """Lines of a server-sent stream. Who reads slowly is sent what there is by then; nothing waits for it."""
 
     def has_more() -> bool:
-        return bool(turn.events(known)) or turn.view.is_over
+        return bool(session.events(known)) or session.view.is_over
 
     while True:
-        for line in turn.events(known):
+        for line in session.events(known):
             known += 1
             yield f"id: {known}\nevent: {line['event']}\ndata: {json.dumps(line)}\n\n"
-        if turn.view.is_over and not turn.events(known):
+        if session.view.is_over and not session.events(known):
             return
-        if not await desk.board.until(has_more, QUIET):
+        if not await console.notifier.until(has_more, QUIET):
             yield ": still there\n\n"
 
 
-def view_data(view: View) -> dict[str, Any]:
+def view_data(view: SessionView) -> dict[str, Any]:
     """A view as plain data."""
     return {
         "id": view.id,
@@ -248,8 +247,8 @@ def view_data(view: View) -> dict[str, Any]:
         "digest": view.digest,
         "is_written": view.is_written,
         "problems": list(view.problems),
-        "unknown_rooms": list(view.unknown),
-        "check": None if view.found is None else view.found.data(),
+        "unknown_rooms": list(view.unknown_rooms),
+        "check": None if view.check is None else view.check.data(),
         "reason": view.reason,
         "doing": view.progress.doing,
         "clock": view.progress.clock,
@@ -257,21 +256,21 @@ def view_data(view: View) -> dict[str, Any]:
     }
 
 
-def _at_hand(desk: Console, mission: str) -> Turn:
-    turn = desk.turn
-    if turn is not None and mission in {HERE, turn.view.id}:
-        return turn
-    summary, _ = _past(desk, mission)
+def _at_hand(console: Console, mission: str) -> MissionSession:
+    session = console.session
+    if session is not None and mission in {HERE, session.view.id}:
+        return session
+    summary, _ = _past(console, mission)
     raise HTTPException(409, f"mission {summary.id} is not the one at hand; only what it left can be read")
 
 
-def _past(desk: Console, mission: str) -> tuple[Summary, list[Line]]:
-    name = desk.view.id if mission == HERE else mission
+def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
+    name = console.view.id if mission == HERE else mission
     if not name:
         none = "there is no mission yet; POST /api/missions begins one"
-        raise HTTPException(404, none if desk.turn is None else "the mission at hand has not begun")
+        raise HTTPException(404, none if console.session is None else "the mission at hand has not begun")
     try:
-        folder = find(desk.home, name)
+        folder = find(console.home, name)
     except UserError:
         raise HTTPException(
             404, f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"

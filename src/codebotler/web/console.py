@@ -1,4 +1,4 @@
-"""The operator's desk: the robot, the mission at hand and those before, the same for every viewer."""
+"""The operator's console: the robot, the mission at hand and those before, the same for every viewer."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from codebotler.core.home import make_folder
 from codebotler.core.world import World
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.mission import GRACE, MissionError
+from codebotler.missions.session import MissionSession, Order, SessionView
 from codebotler.missions.store import recover
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
@@ -21,13 +22,11 @@ from codebotler.robots.face import Face
 from codebotler.simulator.engine import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.notifier import Notifier
-from codebotler.web.turn import Means, Turn
-from codebotler.web.view import Order, View
 
 MOST_PROGRAM = 200_000
 """Characters of a program or an instruction; longer ones are mistakes."""
 
-NOTHING = View()
+NOTHING = SessionView()
 
 
 class Console:
@@ -56,13 +55,13 @@ class Console:
         face: Face | None = None,
     ) -> None:
         self.robot, self.home, self.models, self.world = robot, home, tuple(models), world
-        self.board, self.face = Notifier(), face
+        self.notifier, self.face = Notifier(), face
         if face is not None:
-            face.changed = self.board.change
+            face.changed = self.notifier.change
         self.interrupted: tuple[Summary, ...] = ()
-        self._means = Means(robot, home, open_model, self.check, self.board.change)
+        self._open_model = open_model
         self._lock = threading.Lock()  # held for moments
-        self._turn: Turn | None = None
+        self._session: MissionSession | None = None
         self._checking = threading.Lock()
         self._held = ExitStack()
         self._pool: WorkerPool | None = None
@@ -73,31 +72,31 @@ class Console:
         return self
 
     def __exit__(self, *_: object) -> None:
-        turn = self._turn
-        if turn is not None:
-            if not turn.view.is_over:
-                turn.stop("the end of the tool")
-            turn.join(GRACE + 1)
+        session = self._session
+        if session is not None:
+            if not session.view.is_over:
+                session.stop("the end of the tool")
+            session.join(GRACE + 1)
         with self._checking:
             self._held.close()
 
     @property
-    def turn(self) -> Turn | None:
+    def session(self) -> MissionSession | None:
         """The mission at hand, or the last one; at once."""
-        return self._turn
+        return self._session
 
     @property
-    def view(self) -> View:
+    def view(self) -> SessionView:
         """What all viewers see; at once."""
-        turn = self._turn
-        return NOTHING if turn is None else turn.view
+        session = self._session
+        return NOTHING if session is None else session.view
 
     def events(self, start: int = 0) -> list[Line]:
         """The events of the mission at hand, from one on; at once."""
-        turn = self._turn
-        return [] if turn is None else turn.events(start)
+        session = self._session
+        return [] if session is None else session.events(start)
 
-    def begin(self, order: Order) -> Turn:
+    def begin(self, order: Order) -> MissionSession:
         """Begin a mission; one that is not running yet makes room for it. Back at once.
 
         Raises:
@@ -109,17 +108,26 @@ class Console:
         for text in (order.instruction, order.program):
             _expect_short(text)
         with self._lock:
-            before = self._turn
+            before = self._session
             if before is not None and before.view.is_running:
                 raise MissionError(f"mission {before.view.id} is {before.view.state}; stop it first")
-            self._turn = turn = Turn(before.view.number + 1 if before else 1, order, self._means, before)
+            self._session = session = MissionSession(
+                self.robot,
+                self.home,
+                order,
+                open_model=self._open_model,
+                check=self.check,
+                changed=self.notifier.change,
+                number=before.view.number + 1 if before else 1,
+                before=before,
+            )
         if before is not None and not before.view.is_over:
             threading.Thread(target=before.stop, args=("another instruction",), daemon=True).start()
-        turn.start()
-        self.board.change()
-        return turn
+        session.start()
+        self.notifier.change()
+        return session
 
-    def edit(self, program: str) -> Turn:
+    def edit(self, program: str) -> MissionSession:
         """Put another program in the place of the one at hand; after its end this begins a mission.
 
         Back at once.
@@ -128,11 +136,11 @@ class Console:
             MissionError: the robot runs, or a model is writing.
         """
         _expect_short(program)
-        turn = self._turn
-        if turn is None or turn.view.is_over:
+        session = self._session
+        if session is None or session.view.is_over:
             return self.begin(Order(self.view.order.instruction, program=program))
-        turn.edit(program)
-        return turn
+        session.edit(program)
+        return session
 
     def stop(self, by: str) -> bool:
         """Stop the mission at hand; back when the robot was told so.
@@ -143,10 +151,10 @@ class Console:
         Returns:
             whether there was one.
         """
-        turn = self._turn
-        if turn is None or turn.view.is_over:
+        session = self._session
+        if session is None or session.view.is_over:
             return False
-        turn.stop(by)
+        session.stop(by)
         return True
 
     def stop_soon(self, by: str, *, only_moving: bool = False) -> bool:

@@ -38,11 +38,11 @@ class Answer(BaseModel):
     option: int = Field(strict=True, ge=0, description="The position of the chosen option, from 0.")
 
 
-def router(desk: Console, face: Face) -> APIRouter:
+def router(console: Console, face: Face) -> APIRouter:
     """The addresses of the face.
 
     Args:
-        desk: whose robot speaks there.
+        console: whose robot speaks there.
         face: on which it speaks.
     """
     here = APIRouter(tags=["face"])
@@ -55,7 +55,7 @@ def router(desk: Console, face: Face) -> APIRouter:
     @here.get("/api/face")
     def show() -> dict[str, Any]:
         """What the face shows: what the robot does, said and asks. `question` has the number to answer."""
-        return face_data(desk, face)
+        return face_data(console, face)
 
     @here.post("/api/face/answer")
     def answer(given: Answer) -> dict[str, Any]:
@@ -64,19 +64,19 @@ def router(desk: Console, face: Face) -> APIRouter:
             face.answer(given.question, given.option)
         except AnswerError as error:
             raise HTTPException(409, error.sentence) from None
-        return face_data(desk, face)
+        return face_data(console, face)
 
     @here.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
         """Stop a robot that runs, and nothing else; whether there is one."""
-        return {"stopping": desk.stop_soon(STOPS, only_moving=True)}
+        return {"stopping": console.stop_soon(STOPS, only_moving=True)}
 
     @here.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
         """Send what the face shows, again at each change. Nothing that comes from there is heeded."""
         await socket.accept()
         with face.watched():
-            telling = asyncio.create_task(_tell(socket, desk, face))
+            telling = asyncio.create_task(_tell(socket, console, face))
             try:
                 with suppress(WebSocketDisconnect, KeyError):  # it sent something else than text
                     while True:
@@ -87,23 +87,23 @@ def router(desk: Console, face: Face) -> APIRouter:
     return here
 
 
-async def _tell(socket: WebSocket, desk: Console, face: Face) -> None:
+async def _tell(socket: WebSocket, console: Console, face: Face) -> None:
     """Whoever reads slowly is sent what there is by then; nothing queues up."""
     sent: object = None
     with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
         while True:
-            seen = desk.board.version
-            data = face_data(desk, face)
+            seen = console.notifier.version
+            data = face_data(console, face)
             told = {**data, "seconds_left": None}
             if told != sent:
                 sent = told
                 await socket.send_json(data)
-            await desk.board.until(lambda: desk.board.version != seen)  # noqa: B023 - looked at before the next round
+            await console.notifier.until(lambda: console.notifier.version != seen)  # noqa: B023 - looked at before the next round
 
 
-def face_data(desk: Console, face: Face) -> dict[str, Any]:
+def face_data(console: Console, face: Face) -> dict[str, Any]:
     """What a face shows, as plain data."""
-    view, shown = desk.view, face.shown
+    view, shown = console.view, face.shown
     question = shown.question
     is_moving = view.is_running and view.progress.is_driving
     doing = "asking" if question else "moving" if is_moving else "working" if view.is_running else "idle"

@@ -1,9 +1,10 @@
-"""The operator's page: its three panes, kept in step with the desk."""
+"""The operator's page: its three panes, kept in step with the console."""
 
 from __future__ import annotations
 
 from nicegui import ui
 
+from codebotler.missions.session import SessionView
 from codebotler.web.console import Console
 from codebotler.web.elements import Words
 from codebotler.web.frame import PATIENCE, Frame
@@ -11,18 +12,17 @@ from codebotler.web.panes.instruction import Instruct
 from codebotler.web.panes.past import add as add_past
 from codebotler.web.panes.program import ProgramPane
 from codebotler.web.panes.robot import Status
-from codebotler.web.view import View
 
 PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h-status"))
 EVERY = 0.1
 """Seconds after which a page looks whether something has changed."""
 
 
-def add(desk: Console, frame: Frame) -> None:
+def add(console: Console, frame: Frame) -> None:
     """Put the operator's pages at their addresses.
 
     Args:
-        desk: what they show.
+        console: what they show.
         frame: what all pages have.
     """
 
@@ -31,17 +31,17 @@ def add(desk: Console, frame: Frame) -> None:
         frame("Robot", "/", PARTS)
         Words("h1", "Operate the robot", "unseen")
         with ui.element("div") as panes:
-            instruct = Instruct(desk)
-            program = ProgramPane(desk)
-            status = Status(desk)
+            instruct = Instruct(console)
+            program = ProgramPane(console)
+            status = Status(console)
         seen = -1
 
         def refresh() -> None:
             nonlocal seen
-            version = desk.board.version
+            version = console.notifier.version
             if version != seen:
                 seen = version
-                view = desk.view
+                view = console.view
                 panes.classes(replace=f"operate to-{_next(view)}")
                 for pane in (instruct, program, status):
                     pane.show(view)
@@ -51,10 +51,10 @@ def add(desk: Console, frame: Frame) -> None:
         await ui.context.client.connected()
         await instruct.load()
 
-    add_past(desk, frame)
+    add_past(console, frame)
 
 
-def _next(view: View) -> str:
+def _next(view: SessionView) -> str:
     """What there is to do for an operator now, by which a small screen puts its panes in order."""
     if view.is_running:
         return "watch"

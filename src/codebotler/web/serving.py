@@ -44,7 +44,7 @@ LINGER = 3
 
 
 def serve(
-    desk: Console | None,
+    console: Console | None,
     place: Place,
     access: Access,
     further: Further = (),
@@ -55,7 +55,7 @@ def serve(
     """Serve the page until Ctrl-C; a robot that runs is stopped then.
 
     Args:
-        desk: not yet entered; None where there are only further pages, and no robot.
+        console: not yet entered; None where there are only further pages, and no robot.
         place: where the page is.
         access: who may open it.
         further: pages that other packages add.
@@ -66,12 +66,12 @@ def serve(
         UserError: nobody can listen there.
         OSError: the missions cannot be written.
     """
-    with place.listening() as bound, desk or nullcontext():
+    with place.listening() as bound, console or nullcontext():
         port = bound.getsockname()[1]
-        pages = application(desk, further, runs)
+        pages = application(console, further, runs)
         app: ASGIApp = pages
-        if desk and alone_for is not None:
-            app = Presence(app, alone_for, partial(desk.stop_soon, LEAVING, only_moving=True))
+        if console and alone_for is not None:
+            app = Presence(app, alone_for, partial(console.stop_soon, LEAVING, only_moving=True))
         guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
@@ -83,20 +83,20 @@ def serve(
             ws_max_size=MOST_BYTES,
             timeout_graceful_shutdown=LINGER,
         )
-        for summary in desk.interrupted if desk else ():
+        for summary in console.interrupted if console else ():
             note(f"mission {summary.id} was interrupted: {summary.reason}")
-        note(_links(place, port, access, desk))  # at once, for those who read it through a pipe
-        _Server(settings, desk).run([bound])
+        note(_links(place, port, access, console))  # at once, for those who read it through a pipe
+        _Server(settings, console).run([bound])
 
 
-def _links(place: Place, port: int, access: Access, desk: Console | None) -> str:
+def _links(place: Place, port: int, access: Access, console: Console | None) -> str:
     shown = "localhost" if place.is_loopback else socket.gethostname()
     address = f"http://{shown}:{port}/"
 
     def query(token: str) -> str:
         return "" if access.operator is None else f"?{urlencode({'token': token})}"
 
-    ends = "ends the page and stops the robot" if desk else "ends the page"
+    ends = "ends the page and stops the robot" if console else "ends the page"
     told = [
         f"open this link in a browser; Ctrl-C {ends}:\n",
         f"    {address}{query(access.operator or '')}\n",
@@ -105,24 +105,24 @@ def _links(place: Place, port: int, access: Access, desk: Console | None) -> str
         told.append(
             "other machines get in as well, by this link only; what they send and see is not encrypted\n"
         )
-    if desk and desk.face is not None:
+    if console and console.face is not None:
         where = "here; --host lets other machines in" if place.is_loopback else "on the robot's tablet"
         told.append(f"the robot's face, which can run nothing, to be opened {where}:\n")
         told.append(f"    {address}face{query(access.face)}\n")
     return "\n".join(told)
 
 
-def application(desk: Console | None, further: Further = (), runs: Path = RUNS) -> FastAPI:
+def application(console: Console | None, further: Further = (), runs: Path = RUNS) -> FastAPI:
     """The page and its API, without the guard.
 
     Args:
-        desk: what they show; None where there is no robot.
+        console: what they show; None where there is no robot.
         further: pages that other packages add.
         runs: the folder of runs for those.
     """
     links = tuple((pages.name, pages.address) for pages in further)
-    face = (FACE,) if desk and desk.face else ()
-    frame = Frame((*ROBOT, *face, *links)) if desk else Frame(links, further[0].brand, has_robot=False)
+    face = (FACE,) if console and console.face else ()
+    frame = Frame((*ROBOT, *face, *links)) if console else Frame(links, further[0].brand, has_robot=False)
     app = FastAPI(
         title="CodeBotler",
         version=__version__,
@@ -131,11 +131,11 @@ def application(desk: Console | None, further: Further = (), runs: Path = RUNS) 
         redoc_url=None,
         openapi_url="/api/openapi.json",
     )
-    if desk:
-        app.include_router(api.router(desk))
-        if desk.face is not None:
-            app.include_router(facepage.router(desk, desk.face))
-        operate.add(desk, frame)
+    if console:
+        app.include_router(api.router(console))
+        if console.face is not None:
+            app.include_router(facepage.router(console, console.face))
+        operate.add(console, frame)
     for pages in further:
         pages.add(Site(app, frame, runs))
     app.add_exception_handler(RequestValidationError, api.refused)
@@ -190,12 +190,12 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
 class _Server(uvicorn.Server):
     """Stops the robot as soon as somebody wants to end the tool, before anything else ends."""
 
-    def __init__(self, config: uvicorn.Config, desk: Console | None) -> None:
+    def __init__(self, config: uvicorn.Config, console: Console | None) -> None:
         super().__init__(config)
-        self._desk = desk
+        self._console = console
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """Called for a signal."""
-        if self._desk:
-            threading.Thread(target=self._desk.stop, args=("the end of the page",), daemon=True).start()
+        if self._console:
+            threading.Thread(target=self._console.stop, args=("the end of the page",), daemon=True).start()
         super().handle_exit(sig, frame)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from codebotler.generation.generate import Attempt, Generation, generate
+from codebotler.generation.generate import Attempt, Generation, write_program
 from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt, prompt_for
 
@@ -37,7 +37,7 @@ def no_bad_word(program: str) -> list[str]:
 
 
 def made(model: Scripted, tried: Callable[[Attempt], None] = lambda _: None, **how: object) -> Generation:
-    return asyncio.run(generate(model, PROMPT, no_bad_word, tried=tried, **how))  # type: ignore[arg-type] # how
+    return asyncio.run(write_program(model, PROMPT, no_bad_word, tried=tried, **how))  # type: ignore[arg-type] # how
 
 
 def test_a_program_that_is_accepted_is_asked_for_once() -> None:
@@ -62,10 +62,10 @@ def test_a_rejected_one_is_asked_for_again_as_another_sample_of_the_same_prompt(
 @pytest.mark.parametrize("retries", [0, 1, 3])
 def test_no_more_requests_than_allowed(retries: int) -> None:
     model = Scripted([f"bad {n}" for n in range(9)])
-    rejected = made(model, retries=retries, number=4)
-    assert [number for _, number in model.asked] == list(range(4, 5 + retries))
-    assert rejected.program == f"bad {4 + retries}"
-    assert rejected.problems == (f"line 1 says bad {4 + retries}",)
+    rejected = made(model, retries=retries)
+    assert [number for _, number in model.asked] == list(range(1 + retries))
+    assert rejected.program == f"bad {retries}"
+    assert rejected.problems == (f"line 1 says bad {retries}",)
 
 
 def test_a_repair_carries_the_last_program_and_its_problems() -> None:
@@ -80,7 +80,7 @@ def test_a_repair_carries_the_last_program_and_its_problems() -> None:
 
 
 def test_without_a_check_the_first_program_is_taken() -> None:
-    generation = asyncio.run(generate(Scripted(["bad"]), PROMPT, retries=3))
+    generation = asyncio.run(write_program(Scripted(["bad"]), PROMPT, retries=3))
     assert len(generation.attempts) == 1
 
 

@@ -11,7 +11,8 @@ import pytest
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.trace import Event, Option
 from codebotler.core.world import Person, Room, World
-from codebotler.missions.live import LiveRobot, StoppedError, in_words
+from codebotler.missions.live import LiveRobot, StoppedError
+from codebotler.missions.wording import call_text
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, Result, RobotLostError
 from codebotler.robots.simulated import Simulated
@@ -199,7 +200,7 @@ def test_ninth_skill_needs_nothing_here() -> None:
 
 
 def test_call_in_words() -> None:
-    assert in_words("ask", ["ann", "Tea?", ("Yes", "No")]) == 'ask("ann", "Tea?", ["Yes", "No"])'
+    assert call_text("ask", ["ann", "Tea?", ("Yes", "No")]) == 'ask("ann", "Tea?", ["Yes", "No"])'
 
 
 # --- the stop

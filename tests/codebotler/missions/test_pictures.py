@@ -17,7 +17,7 @@ from codebotler.missions.log import Line, events_of
 from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import Mission, State
 from codebotler.missions.pictures import Pictures, picture_of
-from codebotler.missions.view import told
+from codebotler.missions.wording import event_text
 from codebotler.robots.base import Argument, Feedback, Picture, Result, untold
 from codebotler.robots.reservation import Reservation
 from doubles import Answering
@@ -55,7 +55,7 @@ def test_pictures_are_kept_as_they_came_and_named(tmp_path: Path) -> None:
     assert [(line["number"], line["skill"]) for line in lines] == [(1, "is_in_room")] * 3
     assert [(mission.folder / name).read_bytes() for name in names] == [JPEG, PNG, JPEG]
     assert len(list((mission.folder / "pictures").iterdir())) == 3
-    assert [str(told(line)) for line in lines] == [f"picture: {name}" for name in names]
+    assert [event_text(line) for line in lines] == [f"picture: {name}" for name in names]
 
 
 def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -71,7 +71,7 @@ def test_what_is_not_kept_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         strict=True,
     ):
         assert all(name in text for name in ["picture", "not kept", *named]), text
-    assert str(told(lines[0])) == lines[0]["text"]
+    assert event_text(lines[0]) == lines[0]["text"]
 
 
 def test_picture_that_cannot_be_written_stops_the_robot(

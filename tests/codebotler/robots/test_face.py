@@ -15,7 +15,7 @@ from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room, World
 from codebotler.missions.log import events_of
 from codebotler.missions.mission import Mission, State
-from codebotler.missions.preflight import beyond
+from codebotler.missions.preflight import missing_skills
 from codebotler.robots.base import Argument, CancelledError, Options
 from codebotler.robots.face import SILENCE, AnswerError, Ending, Face, Question
 from codebotler.robots.faced import SPOKEN, Faced, unspoken
@@ -108,8 +108,8 @@ def test_what_the_face_has_the_robot_may_lack() -> None:
     inner.missing = {"say": "no server", "ask": "no server", "pick": "no arm"}
     robot = Faced(inner, Face())
     assert robot.missing == {"pick": "no arm"}
-    assert beyond(TEA, robot) == []
-    assert len(beyond(f"{TEA}    pick('mug')\n", robot)) == 1
+    assert missing_skills(TEA, robot) == []
+    assert len(missing_skills(f"{TEA}    pick('mug')\n", robot)) == 1
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "pyrobosim"])

@@ -1,4 +1,4 @@
-"""The desk: the same rules as on the command line, for any number of viewers, and never waiting for one."""
+"""The console: the rules of the command line for any number of viewers, none of whom it waits for."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import pytest
 from codebotler.checking.problems import Check
 from codebotler.core.world import Room, World
 from codebotler.missions.mission import Mission, MissionError, State
+from codebotler.missions.session import Order, SessionView, digest
 from codebotler.missions.store import missions, summary_of
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
@@ -20,7 +21,6 @@ from codebotler.robots.base import Result, Robot
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import MOST_PROGRAM, Console
-from codebotler.web.view import Order, View, digest
 from doubles import Answering
 
 HELLO = "def task_program():\n    go_to('kitchen')\n    say('hello')\n"
@@ -63,45 +63,45 @@ def desk_of(home: Path, robot: Robot | None = None, author: Author | None = None
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Iterator[Console]:
-    with desk_of(tmp_path) as desk:
-        yield desk
+def console(tmp_path: Path) -> Iterator[Console]:
+    with desk_of(tmp_path) as console:
+        yield console
 
 
-def until(desk: Console, holds: Callable[[View], bool], seconds: float = 10.0) -> View:
+def until(console: Console, holds: Callable[[SessionView], bool], seconds: float = 10.0) -> SessionView:
     """The first view of which something holds."""
     ends = time.monotonic() + seconds
-    while not holds(desk.view):
-        assert time.monotonic() < ends, desk.view
+    while not holds(console.view):
+        assert time.monotonic() < ends, console.view
         time.sleep(0.005)
-    return desk.view
+    return console.view
 
 
-def checked(desk: Console, program: str = HELLO) -> View:
-    desk.begin(Order(program=program))
-    return until(desk, lambda view: view.found is not None)
+def checked(console: Console, program: str = HELLO) -> SessionView:
+    console.begin(Order(program=program))
+    return until(console, lambda view: view.check is not None)
 
 
-def approved(desk: Console, program: str = HELLO) -> None:
-    view = checked(desk, program)
-    turn = desk.turn
-    assert turn is not None
-    turn.approve(view.digest)
+def approved(console: Console, program: str = HELLO) -> None:
+    view = checked(console, program)
+    session = console.session
+    assert session is not None
+    session.approve(view.digest)
 
 
 def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
     author = Author(HELLO)
-    with desk_of(tmp_path, author=author) as desk:
-        turn = desk.begin(Order("say hello in the kitchen", "author"))
-        view = until(desk, lambda view: view.may_be_approved)
+    with desk_of(tmp_path, author=author) as console:
+        session = console.begin(Order("say hello in the kitchen", "author"))
+        view = until(console, lambda view: view.may_be_approved)
         assert (view.program, view.problems, view.state) == (HELLO, (), State.CHECKED)
         assert "kitchen" in author.asked[0].messages[-1].text
         assert author.is_closed
-        turn.approve(view.digest)
-        view = until(desk, lambda view: view.is_over)
+        session.approve(view.digest)
+        view = until(console, lambda view: view.is_over)
         assert view.state is State.DONE
         assert [m.text for m in view.progress.moments if m.kind == "says"] == ["hello"]
-        assert [line["event"] for line in desk.events()][-1] == "state"
+        assert [line["event"] for line in console.events()][-1] == "state"
     (summary,) = missions(tmp_path)
     assert (summary.state, summary.model, summary.instruction) == (
         "done",
@@ -112,49 +112,49 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
 
 def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Path) -> None:
     author = Author(HELLO, waits=True)
-    with desk_of(tmp_path, author=author) as desk:
-        turn = desk.begin(Order("say hello", "author"))
-        view = until(desk, lambda view: bool(view.program))
+    with desk_of(tmp_path, author=author) as console:
+        session = console.begin(Order("say hello", "author"))
+        view = until(console, lambda view: bool(view.program))
         assert (view.program, view.is_written, view.may_be_edited) == (HELLO[:10], True, False)
-        desk.stop("a test")
-        turn.join(5)
-        assert desk.view.is_over
-        assert (desk.view.state, author.is_closed) == (State.STOPPED, True)
+        console.stop("a test")
+        session.join(5)
+        assert console.view.is_over
+        assert (console.view.state, author.is_closed) == (State.STOPPED, True)
 
 
-def test_problems_need_a_word_about_them(desk: Console) -> None:
-    view = checked(desk, BAD)
-    turn = desk.turn
-    assert turn is not None
+def test_problems_need_a_word_about_them(console: Console) -> None:
+    view = checked(console, BAD)
+    session = console.session
+    assert session is not None
     assert '"cellar"' in view.problems[0]
     with pytest.raises(MissionError, match="problems"):
-        turn.approve(view.digest)
-    assert desk.view.state is State.CHECKED
-    turn.approve(view.digest, despite_problems=True)
-    assert until(desk, lambda view: view.is_over).state is State.FAILED
+        session.approve(view.digest)
+    assert console.view.state is State.CHECKED
+    session.approve(view.digest, despite_problems=True)
+    assert until(console, lambda view: view.is_over).state is State.FAILED
 
 
-def test_only_the_program_that_was_seen_can_be_approved(desk: Console) -> None:
-    seen = checked(desk)
-    desk.edit(HELLO.replace("hello", "bye"))
-    turn = desk.turn
-    assert turn is not None
+def test_only_the_program_that_was_seen_can_be_approved(console: Console) -> None:
+    seen = checked(console)
+    console.edit(HELLO.replace("hello", "bye"))
+    session = console.session
+    assert session is not None
     with pytest.raises(MissionError, match=r"changed|checked"):
-        turn.approve(seen.digest)
-    until(desk, lambda view: view.found is not None)
+        session.approve(seen.digest)
+    until(console, lambda view: view.check is not None)
     with pytest.raises(MissionError, match="changed"):
-        turn.approve(seen.digest)
-    assert desk.view.state is State.CHECKED
+        session.approve(seen.digest)
+    assert console.view.state is State.CHECKED
 
 
-def test_an_edited_program_is_checked_again_and_the_last_one_counts(desk: Console) -> None:
-    checked(desk)
+def test_an_edited_program_is_checked_again_and_the_last_one_counts(console: Console) -> None:
+    checked(console)
     for number in range(5):
-        desk.edit(HELLO + f"    say('{number}')\n")
-    view = until(desk, lambda view: view.found is not None)
+        console.edit(HELLO + f"    say('{number}')\n")
+    view = until(console, lambda view: view.check is not None)
     assert view.program.endswith("say('4')\n")
     assert not view.busy
-    assert summary_of(desk.home / "missions" / view.id).program == view.program
+    assert summary_of(console.home / "missions" / view.id).program == view.program
 
 
 def test_a_program_can_be_edited_while_the_robot_is_connected(
@@ -167,14 +167,14 @@ def test_a_program_can_be_edited_while_the_robot_is_connected(
         connect(robot)
 
     monkeypatch.setattr(Simulated, "connect", slow)
-    with desk_of(tmp_path) as desk:
-        desk.begin(Order(program=BAD))
-        until(desk, lambda view: view.busy == "connecting the robot")
-        desk.edit(HELLO)
+    with desk_of(tmp_path) as console:
+        console.begin(Order(program=BAD))
+        until(console, lambda view: view.busy == "connecting the robot")
+        console.edit(HELLO)
         go_on.set()
-        view = until(desk, lambda view: view.found is not None)
+        view = until(console, lambda view: view.check is not None)
         assert (view.program, view.problems) == (HELLO, ())
-        assert summary_of(desk.home / "missions" / view.id).program == HELLO
+        assert summary_of(console.home / "missions" / view.id).program == HELLO
 
 
 def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
@@ -187,118 +187,118 @@ def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
         connect(robot)
 
     monkeypatch.setattr(Simulated, "connect", slow)
-    with desk_of(tmp_path) as desk:
-        turn = desk.begin(Order(program=HELLO))
-        until(desk, lambda view: view.busy == "connecting the robot")
+    with desk_of(tmp_path) as console:
+        session = console.begin(Order(program=HELLO))
+        until(console, lambda view: view.busy == "connecting the robot")
         began = time.monotonic()
-        assert desk.stop("a test")
+        assert console.stop("a test")
         assert time.monotonic() - began < 1
-        assert not desk.view.is_over, "it has not stopped yet"
+        assert not console.view.is_over, "it has not stopped yet"
         go_on.set()
-        turn.join(10)
-        assert (desk.view.state, desk.view.is_over, desk.view.found) == (State.STOPPED, True, None)
-        assert not desk.view.progress.moments
+        session.join(10)
+        assert (console.view.state, console.view.is_over, console.view.check) == (State.STOPPED, True, None)
+        assert not console.view.progress.moments
 
 
 def test_a_model_is_asked_again_with_its_program_and_the_problems(tmp_path: Path) -> None:
     author = Author(BAD, HELLO)
-    with desk_of(tmp_path, author=author) as desk:
-        turn = desk.begin(Order("say hello", "author"))
-        until(desk, lambda view: view.may_be_approved)
-        turn.ask_again(repair=True)
-        view = until(desk, lambda view: view.may_be_approved and view.program == HELLO)
+    with desk_of(tmp_path, author=author) as console:
+        session = console.begin(Order("say hello", "author"))
+        until(console, lambda view: view.may_be_approved)
+        session.ask_again(repair=True)
+        view = until(console, lambda view: view.may_be_approved and view.program == HELLO)
         assert view.problems == ()
         assert "cellar" in author.asked[1].messages[-1].text
 
 
 def test_a_model_that_fails_when_asked_again_takes_nothing_away(tmp_path: Path) -> None:
     author = Author(BAD)
-    with desk_of(tmp_path, author=author) as desk:
-        turn = desk.begin(Order("say hello", "author"))
-        until(desk, lambda view: view.may_be_approved)
-        desk.edit(HELLO)
-        before = until(desk, lambda view: view.may_be_approved and view.program == HELLO)
-        turn.ask_again(repair=False)
-        view = until(desk, lambda view: bool(view.trouble))
+    with desk_of(tmp_path, author=author) as console:
+        session = console.begin(Order("say hello", "author"))
+        until(console, lambda view: view.may_be_approved)
+        console.edit(HELLO)
+        before = until(console, lambda view: view.may_be_approved and view.program == HELLO)
+        session.ask_again(repair=False)
+        view = until(console, lambda view: bool(view.trouble))
         assert view.trouble == "the model is not there"
-        assert (view.program, view.found, view.state) == (HELLO, before.found, State.CHECKED)
-        turn.approve(view.digest)
-        assert until(desk, lambda view: view.is_over).state is State.DONE
-        assert desk.view.program == HELLO
+        assert (view.program, view.check, view.state) == (HELLO, before.check, State.CHECKED)
+        session.approve(view.digest)
+        assert until(console, lambda view: view.is_over).state is State.DONE
+        assert console.view.program == HELLO
 
 
 def test_a_program_is_there_again_when_the_asking_is_stopped(tmp_path: Path) -> None:
     author = Author(HELLO, BAD)
-    with desk_of(tmp_path, author=author) as desk:
-        turn = desk.begin(Order("say hello", "author"))
-        until(desk, lambda view: view.may_be_approved)
+    with desk_of(tmp_path, author=author) as console:
+        session = console.begin(Order("say hello", "author"))
+        until(console, lambda view: view.may_be_approved)
         author.waits = True
-        turn.ask_again(repair=False)
-        until(desk, lambda view: view.program == BAD[:10])
-        desk.stop("a test")
-        assert until(desk, lambda view: view.is_over).program == HELLO
+        session.ask_again(repair=False)
+        until(console, lambda view: view.program == BAD[:10])
+        console.stop("a test")
+        assert until(console, lambda view: view.is_over).program == HELLO
 
 
 def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
-    with desk_of(tmp_path, Simulated(WORLD)) as desk:
-        approved(desk, FAR)
-        view = until(desk, lambda view: bool(view.progress.skill))
+    with desk_of(tmp_path, Simulated(WORLD)) as console:
+        approved(console, FAR)
+        view = until(console, lambda view: bool(view.progress.skill))
         assert (view.progress.doing, view.progress.line) == ('drives to "kitchen"', 3)
         with pytest.raises(MissionError, match="stop it first"):
-            desk.begin(Order(program=HELLO))
+            console.begin(Order(program=HELLO))
         with pytest.raises(MissionError, match="cannot be changed"):
-            desk.edit(HELLO)
-        assert desk.stop("a test")
-        assert until(desk, lambda view: view.is_over).state is State.STOPPED
-        assert not desk.stop("a test")
+            console.edit(HELLO)
+        assert console.stop("a test")
+        assert until(console, lambda view: view.is_over).state is State.STOPPED
+        assert not console.stop("a test")
 
 
-def test_another_instruction_takes_the_place_of_one_that_waits(desk: Console) -> None:
-    first = checked(desk)
-    desk.begin(Order(program=BAD))
-    until(desk, lambda view: view.found is not None and view.number > first.number)
-    assert [summary.state for summary in missions(desk.home)] == ["stopped", "checked"]
+def test_another_instruction_takes_the_place_of_one_that_waits(console: Console) -> None:
+    first = checked(console)
+    console.begin(Order(program=BAD))
+    until(console, lambda view: view.check is not None and view.number > first.number)
+    assert [summary.state for summary in missions(console.home)] == ["stopped", "checked"]
 
 
 def test_the_robot_is_stopped_with_the_tool(tmp_path: Path) -> None:
     robot = Simulated(WORLD)
-    with desk_of(tmp_path, robot) as desk:
-        approved(desk, FAR)
-        until(desk, lambda view: bool(view.progress.skill))
+    with desk_of(tmp_path, robot) as console:
+        approved(console, FAR)
+        until(console, lambda view: bool(view.progress.skill))
     assert missions(tmp_path)[0].state == "stopped"
 
 
 def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     go_on, check = threading.Event(), Console.check
 
-    def slow(desk: Console, program: str, plan: RoomMap | None = None) -> Check:
+    def slow(console: Console, program: str, plan: RoomMap | None = None) -> Check:
         go_on.wait(20)
-        return check(desk, program, plan)
+        return check(console, program, plan)
 
     monkeypatch.setattr(Console, "check", slow)
-    with desk_of(tmp_path) as desk:
-        turn = desk.begin(Order(program=HELLO))
-        until(desk, lambda view: view.busy == "checking" and bool(view.id))
-        desk.stop("a test")
-        assert (desk.view.state, desk.view.found) == (State.STOPPED, None)
+    with desk_of(tmp_path) as console:
+        session = console.begin(Order(program=HELLO))
+        until(console, lambda view: view.busy == "checking" and bool(view.id))
+        console.stop("a test")
+        assert (console.view.state, console.view.check) == (State.STOPPED, None)
         go_on.set()
-        turn.join(10)
-        assert (desk.view.state, desk.view.found, desk.view.is_over) == (State.STOPPED, None, True)
+        session.join(10)
+        assert (console.view.state, console.view.check, console.view.is_over) == (State.STOPPED, None, True)
 
 
 def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
     mission = Mission(tmp_path, "simulated")
     mission.draft(HELLO)
     mission._log.close()
-    with desk_of(tmp_path) as desk:
-        assert [summary.id for summary in desk.interrupted] == [mission.id]
-        assert "the tool died" in desk.interrupted[0].reason
+    with desk_of(tmp_path) as console:
+        assert [summary.id for summary in console.interrupted] == [mission.id]
+        assert "the tool died" in console.interrupted[0].reason
 
 
 def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
-    with desk_of(tmp_path, author=Author()) as desk:
-        desk.begin(Order("say hello", "author"))
-        view = until(desk, lambda view: view.is_over)
+    with desk_of(tmp_path, author=Author()) as console:
+        console.begin(Order("say hello", "author"))
+        view = until(console, lambda view: view.is_over)
         assert (view.trouble, view.state) == ("the model is not there", State.FAILED)
 
 
@@ -310,10 +310,10 @@ def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
         (Order(program="#" * (MOST_PROGRAM + 1)), "too many"),
     ],
 )
-def test_what_cannot_be_begun_is_refused(desk: Console, order: Order, told: str) -> None:
+def test_what_cannot_be_begun_is_refused(console: Console, order: Order, told: str) -> None:
     with pytest.raises(MissionError, match=told):
-        desk.begin(order)
-    assert missions(desk.home) == []
+        console.begin(order)
+    assert missions(console.home) == []
 
 
 def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> None:
@@ -325,25 +325,25 @@ def test_a_robot_that_is_used_elsewhere_is_not_waited_for(tmp_path: Path) -> Non
         assert view.id == ""
 
 
-def test_viewers_are_woken_at_each_change(desk: Console) -> None:
+def test_viewers_are_woken_at_each_change(console: Console) -> None:
     async def watch() -> bool:
-        turn = desk.begin(Order(program=HELLO))
-        return await desk.board.until(lambda: turn.view.found is not None, 10.0)
+        session = console.begin(Order(program=HELLO))
+        return await console.notifier.until(lambda: session.view.check is not None, 10.0)
 
     assert asyncio.run(watch())
-    assert not asyncio.run(desk.board.until(lambda: False, 0.01))
+    assert not asyncio.run(console.notifier.until(lambda: False, 0.01))
 
 
 def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
     """What a viewer does not read does not pile up anywhere: a view is all there is."""
     answers: dict[str, Result] = {"get_all_rooms": ["hall"], "get_current_location": "hall"}
     robot = Answering(lambda skill, _: answers.get(skill))
-    with desk_of(tmp_path, robot) as desk:
-        approved(desk, "def task_program():\n    for n in range(300):\n        say(str(n))\n")
-        view = until(desk, lambda view: view.is_over)
+    with desk_of(tmp_path, robot) as console:
+        approved(console, "def task_program():\n    for n in range(300):\n        say(str(n))\n")
+        view = until(console, lambda view: view.is_over)
         assert view.state is State.DONE
         assert len(view.progress.moments) == 200
-        assert len(desk.events()) > 900
+        assert len(console.events()) > 900
 
 
 def test_a_digest_tells_programs_apart() -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
+from codebotler.missions.progress import MOST, Moment, Progress, line_of
 from codebotler.simulator.sampled_robot import Fact, Reply, Whereabouts
 from codebotler.web.floorplan import MOST_ROOMS, floorplan
-from codebotler.web.progress import MOST, Moment, Progress, line_of
 from codebotler.web.strip import MOST_STRIPS, Deed, strips
 from codebotler.web.supposing import supposed
 

@@ -18,6 +18,7 @@ from websockets.sync.client import ClientConnection, connect
 from codebotler.core.world import Room, World
 from codebotler.missions.log import events_of
 from codebotler.missions.mission import UNCONFIRMED, State
+from codebotler.missions.session import SessionView
 from codebotler.missions.store import missions
 from codebotler.robots.face import Face, Question
 from codebotler.robots.simulated import Simulated
@@ -25,7 +26,6 @@ from codebotler.web.access import SHORTEST_TOKEN
 from codebotler.web.console import Console
 from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
 from codebotler.web.guard import MOST_BYTES
-from codebotler.web.view import View
 from command_line import ENVIRONMENT
 from forked import Forked
 from pageserver import PageServer
@@ -146,11 +146,11 @@ def test_the_face_tells_what_the_robot_does_and_nothing_of_its_program(server: P
 def test_a_robot_that_does_not_confirm_its_stop_is_told_of_on_the_face(tmp_path: Path) -> None:
     """It concerns whoever stands beside it."""
     face = Face()
-    desk = Console(
+    console = Console(
         Simulated(World((Room("a"),), "a")), tmp_path, lambda _: pytest.fail("no model"), face=face
     )
-    desk._turn = type("Ended", (), {"view": View(1, "m", State.FAILED, reason=UNCONFIRMED)})()
-    assert face_data(desk, face)["reason"] == UNCONFIRMED
+    console._session = type("Ended", (), {"view": SessionView(1, "m", State.FAILED, reason=UNCONFIRMED)})()
+    assert face_data(console, face)["reason"] == UNCONFIRMED
 
 
 def test_a_face_stops_a_robot_that_runs_and_nothing_else(server: PageServer) -> None:

@@ -13,12 +13,12 @@ from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.log import Summary
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import unknown_rooms
+from codebotler.missions.session import Order, SessionView
 from codebotler.missions.store import missions
 from codebotler.models.recorded import recorded_model
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
 from codebotler.web.elements import Press, Words, scroll_up, warn
-from codebotler.web.view import Order, View
 
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 RECORDED = "recorded"
@@ -32,11 +32,11 @@ class Instruct:
     """Takes an instruction and says who is to write the program.
 
     Args:
-        desk: on which it is put.
+        console: on which it is put.
     """
 
-    def __init__(self, desk: Console) -> None:
-        self._desk = desk
+    def __init__(self, console: Console) -> None:
+        self._console = console
         self._number = -1
         self._asked = ""
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
@@ -47,8 +47,8 @@ class Instruct:
                 .on("keydown.ctrl.enter", self._ask)
             )
             self._model = ui.select(
-                {name: visible(name) for name in desk.models},
-                value=desk.models[0],
+                {name: visible(name) for name in console.models},
+                value=console.models[0],
                 label="Who writes the program",
             )
             self._model.props("outlined dense").on_value_change(self._about_model)
@@ -62,8 +62,8 @@ class Instruct:
 
     async def load(self) -> None:
         """Fill in what has to be read first: examples, and what was asked for before."""
-        examples = await asyncio.to_thread(_examples, self._desk)
-        before = await asyncio.to_thread(_before, self._desk)
+        examples = await asyncio.to_thread(_examples, self._console)
+        before = await asyncio.to_thread(_before, self._console)
         if self._examples.is_deleted:  # the page was closed meanwhile
             return
         if examples:
@@ -73,7 +73,7 @@ class Instruct:
                 self._before, "Asked before", [(summary.instruction, summary.state) for summary in before]
             )
 
-    def show(self, view: View) -> None:
+    def show(self, view: SessionView) -> None:
         """Show what is at hand."""
         if view.number != self._number:
             self._number = view.number
@@ -86,7 +86,7 @@ class Instruct:
 
     def _ask(self) -> None:
         try:
-            self._desk.begin(Order(self._text.value or "", self._model.value or ""))
+            self._console.begin(Order(self._text.value or "", self._model.value or ""))
         except MissionError as error:
             warn(error.sentence)
         else:
@@ -110,9 +110,9 @@ class Instruct:
         scroll_up()
 
 
-def _examples(desk: Console) -> list[str]:
+def _examples(console: Console) -> list[str]:
     """Short instructions that the recorded model knows, of different kinds, for rooms that are there."""
-    plan = None if desk.world is None else RoomMap.of(desk.world)
+    plan = None if console.world is None else RoomMap.of(console.world)
     found: dict[frozenset[str], str] = {}
     for instruction, replies in sorted(
         recorded_model("recorded").replies.items(), key=lambda known: len(known[0])
@@ -123,10 +123,10 @@ def _examples(desk: Console) -> list[str]:
     return list(found.values())[:MOST_EXAMPLES]
 
 
-def _before(desk: Console) -> list[Summary]:
+def _before(console: Console) -> list[Summary]:
     """The last different instructions."""
     try:
-        known = missions(desk.home)
+        known = missions(console.home)
     except (UserError, OSError):
         return []
     last = {summary.instruction: summary for summary in known if summary.instruction}

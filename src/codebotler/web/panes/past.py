@@ -13,7 +13,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.missions.log import Line, Summary, events_of
 from codebotler.missions.mission import State
 from codebotler.missions.store import find, missions, summary_of
-from codebotler.missions.view import told
+from codebotler.missions.wording import event_text
 from codebotler.web.console import Console
 from codebotler.web.elements import Words
 from codebotler.web.frame import Frame
@@ -33,11 +33,11 @@ STEPS: Mapping[str, str] = {
 """What it means that a mission comes to a state."""
 
 
-def add(desk: Console, frame: Frame) -> None:
+def add(console: Console, frame: Frame) -> None:
     """Put the pages at their addresses.
 
     Args:
-        desk: whose missions.
+        console: whose missions.
         frame: what all pages have.
     """
 
@@ -47,7 +47,7 @@ def add(desk: Console, frame: Frame) -> None:
         with ui.element("div").classes("past"):
             Words("h1", "Missions")
             try:
-                known = await asyncio.to_thread(missions, desk.home)
+                known = await asyncio.to_thread(missions, console.home)
             except UserError as error:
                 Words("p", str(error), "trouble")
                 return
@@ -62,7 +62,7 @@ def add(desk: Console, frame: Frame) -> None:
         frame("Mission", "")
         with ui.element("div").classes("past"):
             try:
-                summary, events = await asyncio.to_thread(_read, desk, mission)
+                summary, events = await asyncio.to_thread(_read, console, mission)
             except UserError as error:
                 Words("p", error.sentence, "trouble")
                 return
@@ -81,12 +81,12 @@ def in_words(line: Line, *, is_first: bool) -> str:
         state, reason = line["state"], shortened(line.get("reason", ""))
         step = "The mission begins" if is_first else STEPS.get(state, visible(state))
         return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
-    words = None if event == "feedback" else told(line)
-    return "" if words is None else words.plain[:1].upper() + words.plain[1:]
+    text = "" if event == "feedback" else event_text(line)
+    return text[:1].upper() + text[1:]
 
 
-def _read(desk: Console, mission: str) -> tuple[Summary, list[Line]]:
-    folder = find(desk.home, mission)
+def _read(console: Console, mission: str) -> tuple[Summary, list[Line]]:
+    folder = find(console.home, mission)
     return summary_of(folder), events_of(folder)
 
 

@@ -16,11 +16,11 @@ from codebotler.checking.problems import Check
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError, State
+from codebotler.missions.session import SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.elements import Press, Words, scroll_up, warn
 from codebotler.web.sceneview import draw_scene
 from codebotler.web.strip import Strip, strips
-from codebotler.web.view import View
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
 MOST_MARKS, MOST_ESCAPES = 400, 2_000
@@ -32,11 +32,11 @@ class ProgramPane:
     """Shows the program of the mission at hand, takes another one, and somebody's word for it.
 
     Args:
-        desk: on which it lies.
+        console: on which it lies.
     """
 
-    def __init__(self, desk: Console) -> None:
-        self._desk = desk
+    def __init__(self, console: Console) -> None:
+        self._console = console
         self._heard = 0  # texts from this browser
         self._told: dict[str, object] = {}
         self._drawn: tuple[object, ...] = ()
@@ -60,10 +60,10 @@ class ProgramPane:
                 self._repair = Press("Have it mended", lambda: self._again(repair=True), "plain")
                 self._again_button = Press("Ask again", lambda: self._again(repair=False), "plain")
             self._board = ui.element("div").classes("storyboard")
-        self._view = desk.view
+        self._view = console.view
         ui.run_javascript(f"programEditor.start({self._editor.id})")
 
-    def show(self, view: View) -> None:
+    def show(self, view: SessionView) -> None:
         """Show the program that is at hand."""
         self._view = view
         shown = _for_editor(view.program)
@@ -74,16 +74,16 @@ class ProgramPane:
         self._writer.say(what if author and view.program else "")
         self._show_verdict(view)
         self._show_word(view)
-        drawn = (view.found, view.problems, view.unknown, shown)
+        drawn = (view.check, view.problems, view.unknown_rooms, shown)
         if drawn != self._drawn:
             self._drawn = drawn
             self._draw(view)
 
-    def _tell(self, view: View, shown: str, *, anyway: bool = False) -> None:
+    def _tell(self, view: SessionView, shown: str, *, anyway: bool = False) -> None:
         """Have the browser show a program and its marks; it does not where something newer is typed there."""
         told: dict[str, object] = {
             "program": shown,
-            "marks": [*_skills(shown), *_escapes(shown), *_marks(view.found, shown)],
+            "marks": [*_skills(shown), *_escapes(shown), *_marks(view.check, shown)],
             "editable": view.may_be_edited,
             "heard": self._heard,
             "anyway": anyway,
@@ -93,38 +93,38 @@ class ProgramPane:
             ui.run_javascript(f"programEditor.show({json.dumps(told)})")
 
     def _typed(self, event: GenericEventArguments) -> None:
-        """Have the desk check what was typed, unless somebody else was quicker."""
+        """Have the console check what was typed, unless somebody else was quicker."""
         typed, self._heard = event.args["text"], int(event.args["number"])
-        current = _for_editor(self._desk.view.program)
+        current = _for_editor(self._console.view.program)
         if typed is None:
             self._restore(f"A program has at most {MOST_PROGRAM:,} characters; this one was longer.")
         elif event.args["base"] != current:
             self._restore("Somebody else changed the program meanwhile; what you just typed is left out.")
         elif typed != current:
-            self._try(lambda: self._desk.edit(typed))
-        self.show(self._desk.view)
+            self._try(lambda: self._console.edit(typed))
+        self.show(self._console.view)
 
     def _restore(self, why: str) -> None:
-        """Have the browser show what the desk has, and say why."""
-        view = self._desk.view
+        """Have the browser show what the console has, and say why."""
+        view = self._console.view
         self._tell(view, _for_editor(view.program), anyway=True)
         warn(why, 10.0)
 
     # --- somebody's word
 
-    def _show_verdict(self, view: View) -> None:
+    def _show_verdict(self, view: SessionView) -> None:
         count = len(view.problems)
-        if view.found is None:
+        if view.check is None:
             self._verdict.say("")
             return
         many = f"{count} problems" if count > 1 else "1 problem"
         self._verdict.classes(add="bad" if count else "good", remove="good" if count else "bad")
         told = f"{many}. The robot should not run this." if count else "The check found no problem."
-        if view.found.rooms_are_guessed:
+        if view.check.rooms_are_guessed:
             told += " The robot does not tell its rooms; they were taken from the program."
         self._verdict.say(told)
 
-    def _show_word(self, view: View) -> None:
+    def _show_word(self, view: SessionView) -> None:
         open_ = view.state in {State.DRAFTING, State.CHECKED} and not view.is_over and bool(view.program)
         may_again = view.may_be_approved and bool(view.order.model)
         self._word.set_visibility(open_ or self._may_rerun(view))
@@ -138,43 +138,43 @@ class ProgramPane:
         )
         self._ticked()
 
-    def _may_rerun(self, view: View) -> bool:
+    def _may_rerun(self, view: SessionView) -> bool:
         return view.is_over and bool(view.program)
 
     def _ticked(self) -> None:
-        view = self._desk.view
+        view = self._console.view
         accepted = not view.problems or bool(self._despite.value)
         self._run.allow(self._may_rerun(view) or (view.may_be_approved and accepted))
         self._run.classes(add="risky" if view.problems else "", remove="" if view.problems else "risky")
 
     async def _approve(self) -> None:
-        turn, view = self._desk.turn, self._view
+        session, view = self._console.session, self._view
         if self._may_rerun(view):
-            self._try(lambda: self._desk.edit(view.program))
-        elif turn is not None and await self._is_seen(view):
+            self._try(lambda: self._console.edit(view.program))
+        elif session is not None and await self._is_seen(view):
             try:
                 despite = bool(self._despite.value)
-                await asyncio.to_thread(turn.approve, view.digest, despite_problems=despite)
+                await asyncio.to_thread(session.approve, view.digest, despite_problems=despite)
             except MissionError as error:
                 warn(error.sentence)
             else:
                 scroll_up()
 
-    async def _is_seen(self, view: View) -> bool:
+    async def _is_seen(self, view: SessionView) -> bool:
         """Whether this browser shows that very program; two people may type at the same time."""
         seen = await ui.run_javascript("programEditor.settle()", timeout=5.0)
         if seen["text"] == _for_editor(view.program):
             return True
-        if seen["number"] > self._heard or seen["text"] == _for_editor(self._desk.view.program):
+        if seen["number"] > self._heard or seen["text"] == _for_editor(self._console.view.program):
             ui.notify("What was just typed is checked first.", position="top")
         else:
             self._restore("The program was changed meanwhile; look at it again.")
         return False
 
     def _again(self, *, repair: bool) -> None:
-        turn = self._desk.turn
-        if turn is not None:
-            self._try(lambda: turn.ask_again(repair=repair))
+        session = self._console.session
+        if session is not None:
+            self._try(lambda: session.ask_again(repair=repair))
 
     def _try(self, do: Callable[[], object]) -> None:
         try:
@@ -184,16 +184,16 @@ class ProgramPane:
 
     # --- what was found
 
-    def _draw(self, view: View) -> None:
+    def _draw(self, view: SessionView) -> None:
         self._problems.clear()
         with self._problems:
-            for sentence in (*view.problems, *view.unknown)[:MOST_PROBLEMS]:
+            for sentence in (*view.problems, *view.unknown_rooms)[:MOST_PROBLEMS]:
                 kind = "problem" if sentence in view.problems else "unsure"
                 Words("li", shortened(sentence), kind)
         self._board.clear()
-        if view.found is not None:
+        if view.check is not None:
             with self._board:
-                _draw_strips(strips(view.found))
+                _draw_strips(strips(view.check))
 
 
 def _for_editor(program: str) -> str:

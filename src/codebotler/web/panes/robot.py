@@ -6,12 +6,12 @@ from nicegui import ui
 
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.mission import State
+from codebotler.missions.progress import Moment
+from codebotler.missions.session import SessionView
 from codebotler.web.console import Console
 from codebotler.web.elements import Press, Words
 from codebotler.web.floorplan import floorplan
 from codebotler.web.panes.question import Asking
-from codebotler.web.progress import Moment
-from codebotler.web.view import View
 
 HEADLINES = {
     None: "Nothing is asked for",
@@ -33,28 +33,28 @@ class Status:
     """Shows how far the mission at hand has come.
 
     Args:
-        desk: whose mission.
+        console: whose mission.
     """
 
-    def __init__(self, desk: Console) -> None:
-        self._desk = desk
+    def __init__(self, console: Console) -> None:
+        self._console = console
         self._drawn: tuple[Moment, ...] = ()
         self._mapped: object = None
         with ui.element("section").classes("pane status").props("aria-labelledby=h-status"):
             with ui.element("div").classes("head"):
                 Words("h2", "Status").props("id=h-status")
-                Words("span", desk.robot.name, "robot-name")
+                Words("span", console.robot.name, "robot-name")
             self._gone = ui.element("div").classes("interrupted")
             self._state = Words("p", "", "headline").props("role=status aria-live=polite")
             self._doing = Words("p", "", "doing")
             self._where = Words("p", "", "quiet")
-            self._asking = None if desk.face is None else Asking(desk.face)
+            self._asking = None if console.face is None else Asking(console.face)
             self._reason = Words("p", "", "reason")
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
         self._tell_interrupted()
 
-    def show(self, view: View) -> None:
+    def show(self, view: SessionView) -> None:
         """Show how far it has come."""
         progress = view.progress
         state = view.state
@@ -76,9 +76,9 @@ class Status:
         self._draw_map(view)
         self._draw_moments(progress.moments)
 
-    def _draw_map(self, view: View) -> None:
-        progress, plan = view.progress, view.plan
-        world = self._desk.world
+    def _draw_map(self, view: SessionView) -> None:
+        progress, plan = view.progress, view.room_map
+        world = self._console.world
         if world is None and plan is not None:
             world = World(tuple(map(Room, plan.rooms)), plan.start)
         if world is None:
@@ -87,7 +87,7 @@ class Status:
         at = progress.at
         if at is None:
             at = next((one.stand_at for one in laid_out(world).rooms if one.name == room), None)
-        what = (id(self._desk.world), plan, at, room)
+        what = (id(self._console.world), plan, at, room)
         if what != self._mapped:
             self._mapped = what
             self._map.set_content(floorplan(world, at, room))
@@ -111,12 +111,12 @@ class Status:
                 row.move(target_index=0)
 
     def _tell_interrupted(self) -> None:
-        self._gone.set_visibility(bool(self._desk.interrupted))
+        self._gone.set_visibility(bool(self._console.interrupted))
         with self._gone:
-            for summary in self._desk.interrupted:
+            for summary in self._console.interrupted:
                 Words("p", f"Mission {summary.id} was interrupted: {summary.reason}")
             Press("I have seen it", self._seen, "plain")
 
     def _seen(self) -> None:
-        self._desk.interrupted = ()
+        self._console.interrupted = ()
         self._gone.set_visibility(False)

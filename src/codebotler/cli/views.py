@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from types import TracebackType
 from typing import Self
@@ -13,11 +13,10 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.pasted import mission_command
-from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import console, shortened, visible
-from codebotler.missions.live import in_words
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.mission import State
+from codebotler.missions.wording import event_text
 from codebotler.robots.base import Readiness
 
 STYLES: Mapping[State, str] = {
@@ -26,23 +25,27 @@ STYLES: Mapping[State, str] = {
     State.STOPPED: "bold yellow",
     State.INTERRUPTED: "bold red",
 }
-FOUND = {True: "found", False: "not found"}
+EVENT_STYLES: Mapping[str, str] = {
+    "feedback": "dim",
+    "picture": "dim",
+    "error": "red",
+    "stop": "yellow",
+    "cancelled": "yellow",
+    "late": "yellow",
+    "log": "yellow",
+}
 LATEST = 999_999.95  # seconds that are written out, in ten characters with their unit
 CLEAR = "\r\x1b[2K"
 
 
 class Watcher:
-    """Prints what a robot does as it happens; on a terminal, how a skill goes on takes one line only.
+    """Prints events as they happen; on a terminal, the feedback of a skill takes one line."""
 
-    Args:
-        summary: of the mission.
-    """
-
-    def __init__(self, summary: Summary) -> None:
+    def __init__(self, robot: str) -> None:
         self._console = console(highlight=False)
         self._is_half = False
         self._console.print()
-        self._console.print(Text.assemble(("running", "bold"), f" on the robot {summary.robot}"))
+        self._console.print(Text.assemble(("running", "bold"), f" on the robot {robot}"))
 
     def __enter__(self) -> Self:
         return self
@@ -54,8 +57,8 @@ class Watcher:
 
     def __call__(self, line: Line) -> None:
         """Print an event."""
-        text = told(line)
-        if text is None or line["event"] == "state":
+        text = _event_line(line)
+        if not text or line["event"] == "state":
             return
         passing = line["event"] == "feedback" and self._console.is_terminal
         self._end_line()
@@ -76,54 +79,14 @@ def _at(line: Line) -> str:
     return f"{clock:.1f} s" if clock < LATEST else f"{clock:.1e} s"
 
 
-def told(line: Line) -> Text | None:
-    """An event in words; None if there is nothing to tell a person."""
-    words = WORDS.get(line["event"])
-    return words(line) if words else None
-
-
-def _skill(line: Line) -> Text:
-    name, arguments = line["skill"], line["arguments"]
-    skill = SKILLS.get(name)
-    if skill is None or skill.verb is None:
-        return Text(shortened(in_words(name, list(arguments.values()))))
-    recording = skill.recording
-    if recording is None:
-        return Text(skill.verb.third)
-    words = f'{skill.verb.third} "{shortened(str(arguments[recording.text]))}"'
-    if recording.options:
-        words += f" [{shortened(' | '.join(arguments[recording.options]))}]"
-    return Text(words, "bold" if recording.kind == "goto" else "")
-
-
-def _result(line: Line) -> Text | None:
-    result = line["result"]
-    if result is None:
-        return None
-    if isinstance(result, bool) and line["skill"] == "is_in_room":
-        return Text(f"→ {FOUND[result]}")
-    return Text(f"→ {shortened(', '.join(map(str, result)) if isinstance(result, list) else str(result))}")
-
-
-def _state(line: Line) -> Text:
-    reason = f": {shortened(line['reason'])}" if "reason" in line else ""
-    return Text.assemble((line["state"], "bold"), reason)
-
-
-WORDS: Mapping[str, Callable[[Line], Text | None]] = {
-    "skill": _skill,
-    "result": _result,
-    "state": _state,
-    "feedback": lambda line: Text(shortened(line["text"]), "dim"),
-    "picture": lambda line: Text(shortened(line.get("text") or f"picture: {line.get('file')}"), "dim"),
-    "error": lambda line: Text(f"{visible(line['kind'])}: {shortened(line['message'])}", "red"),
-    "sleep": lambda line: Text(f"waits for {line['seconds']:g} s"),
-    "stop": lambda line: Text(f"told to stop by {visible(line['by'])}", "yellow"),
-    "cancelled": lambda _: Text("stopped in the middle of it", "yellow"),
-    "late": lambda _: Text("ended although it was stopped; nothing more is started", "yellow"),
-    "log": lambda line: Text(shortened(line["text"]), "yellow"),
-}
-"""How each kind of event is told."""
+def _event_line(line: Line) -> Text:
+    """An event as a styled line; empty if there is nothing to read."""
+    text = Text(event_text(line), EVENT_STYLES.get(line["event"], ""))
+    if line["event"] == "state":
+        text.stylize("bold", 0, len(line["state"]))
+    elif line["event"] == "skill" and line["skill"] == "go_to":
+        text.stylize("bold")
+    return text
 
 
 def ending(summary: Summary) -> Group:
@@ -168,8 +131,8 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
     table = grid("left", "right", "left")
     before: Text | None = None
     for line in events:
-        text = told(line)
-        if text is not None and text != before:  # another program, while one is drafted, is no other state
+        text = _event_line(line)
+        if text and text != before:  # another program, while one is drafted, is no other state
             before = text if line["event"] == "state" else None
             at = datetime.fromtimestamp(line["time"]).astimezone()
             table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_at(line), "dim"), text)

@@ -14,7 +14,7 @@ from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point
 from codebotler.missions.log import Line
-from codebotler.missions.view import told
+from codebotler.missions.wording import event_text
 
 AT = re.compile(r"at \((-?\d+(?:\.\d+)?), (-?\d+(?:\.\d+)?)\)")
 MOST = 200
@@ -77,18 +77,18 @@ class Progress:
             now = now.with_skill(line, program)
         elif event in ENDS:
             now = replace(now, doing="", skill="", line=None, is_driving=False)
-        words = None if event == "state" else told(line)
-        if words is None or (event == "sleep" and not line["seconds"]):
+        text = "" if event == "state" else event_text(line)
+        if not text or (event == "sleep" and not line["seconds"]):
             return now
-        return replace(now, moments=(*now.moments, _moment(line, words.plain))[-MOST:])
+        return replace(now, moments=(*now.moments, _moment(line, text))[-MOST:])
 
     def with_skill(self, line: Line, program: str) -> Progress:
         """As a skill begins."""
-        words, name = told(line), line["skill"]
+        name = line["skill"]
         drives = name in SKILLS and getattr(SKILLS[name].recording, "kind", "") == "goto"
         now = replace(
             self,
-            doing=words.plain if words else name,
+            doing=event_text(line),
             skill=name,
             line=line_of(program, name, tuple(map(_plain, line["arguments"].values()))),
             is_driving=drives,

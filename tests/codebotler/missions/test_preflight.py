@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check
-from codebotler.cli.run import Request, written
+from codebotler.cli.run import Request
 from codebotler.cli.run import run as run_mission
 from codebotler.core.world import Room, World
 from codebotler.missions.mission import Mission, State
@@ -83,7 +83,7 @@ def test_interrupt_that_a_library_swallows_counts_all_the_same(
     (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt):
-        run_mission(robot, Request(str(tmp_path / "go.py"), lambda: Writing(""), yes=True), tmp_path)
+        run_mission(robot, Request(str(tmp_path / "go.py"), yes=True), tmp_path, nobody)
     assert signal.getsignal(signal.SIGINT) is before
 
 
@@ -117,7 +117,11 @@ class Writing:
     async def close(self) -> None: ...
 
 
-def test_check_and_model_see_the_robots_own_words(capsys: pytest.CaptureFixture[str]) -> None:
+def nobody(_name: str) -> Writing:
+    raise AssertionError("there is a program")
+
+
+def test_a_check_sees_the_robots_own_words() -> None:
     plan, place = preflight(Answering(knowing(["hall", LAB], LAB)))
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", LAB), LAB, LAB)
@@ -125,13 +129,20 @@ def test_check_and_model_see_the_robots_own_words(capsys: pytest.CaptureFixture[
     (unknown,) = unknown_rooms('def task_program():\n    go_to("lab (2nd flor)")\n', plan)
     assert '"lab (2nd flor)"' in unknown
     assert f'"{LAB}"' in unknown
-    model = Writing(TO_THE_LAB)
-    assert written(model, "go to the lab", plan) == TO_THE_LAB
+
+
+@pytest.mark.parametrize(
+    ("program", "status"), [(TO_THE_LAB, 0), ('def task_program():\n    go_to("cellar")\n', 1)]
+)
+def test_a_model_is_told_the_robots_own_words(
+    program: str, status: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = Writing(program)
+    robot = Answering(knowing(["hall", LAB], LAB))
+    assert run_mission(robot, Request("go to the lab", yes=True), tmp_path, lambda _: model) == status
     assert f"hall, {LAB}" in model.asked[0].text
     assert f"hall, {LAB}" in model.asked[0].messages[-1].text
-    assert capsys.readouterr().err == ""
-    written(Writing('def task_program():\n    go_to("cellar")\n'), "go down", plan)
-    assert '"cellar"' in capsys.readouterr().err
+    assert ('"cellar"' in capsys.readouterr().out) is bool(status)
 
 
 def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
@@ -183,6 +194,6 @@ def test_place_of_a_mission_is_in_the_robots_own_words(
     monkeypatch.setattr(Mission, "run", run)
     program = tmp_path / "say.py"
     program.write_text("def task_program():\n    say('hello')\n")
-    request = Request(str(program), lambda: Writing(""), yes=True)
-    assert run_mission(Answering(knowing(["hall", LAB], LAB)), request, tmp_path / "home") == 0
+    request = Request(str(program), yes=True)
+    assert run_mission(Answering(knowing(["hall", LAB], LAB)), request, tmp_path / "home", nobody) == 0
     assert places == [LAB]

@@ -1,0 +1,409 @@
+"""One mission from an instruction to its end: written, checked, approved, run, stopped.
+
+The command line and the page drive a session, and observe it; it prints nothing and knows no page.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import logging
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from codebotler.checking.problems import Check
+from codebotler.core.errors import UserError
+from codebotler.core.terminal import system_sentence, visible
+from codebotler.generation.generate import write_program
+from codebotler.missions.log import Line
+from codebotler.missions.mission import STEPS, Mission, MissionError, State
+from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
+from codebotler.missions.progress import Progress
+from codebotler.models.base import Model, ModelError
+from codebotler.prompts import prompt_for
+from codebotler.robots.base import NotReadyError, Robot
+from codebotler.robots.reservation import Reservation
+from codebotler.simulator.engine import EngineError
+from codebotler.simulator.sampled_robot import RoomMap
+
+LOG = logging.getLogger("codebotler.missions")
+EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a person asks for: an instruction and the model that writes the program, or a program."""
+
+    instruction: str = ""
+    model: str = ""  # its name; empty where the program comes with the order
+    program: str = ""
+
+
+@dataclass(frozen=True)
+class SessionView:
+    """A session at one moment, the same for all who observe it."""
+
+    number: int = 0  # of the session, from 1; 0 before the first
+    id: str = ""  # of the mission; empty until it exists
+    state: State | None = None  # of the mission
+    reason: str = ""  # why it came to that state
+    busy: str = ""  # what goes on before the robot moves, such as `checking`
+    trouble: str = ""  # why it could not go on, in a sentence
+    order: Order = field(default_factory=Order)
+    program: str = ""  # while a model writes, as much as has arrived
+    author: str = ""  # the model that wrote it; empty if a person did
+    is_written: bool = False  # whether a model is writing now
+    check: Check | None = None  # of this very program
+    missing_skills: tuple[str, ...] = ()  # that the program calls and the robot lacks, in sentences
+    unknown_rooms: tuple[str, ...] = ()  # that the program names and the robot does not know, in sentences
+    room_map: RoomMap | None = None  # of the robot, as far as it says
+    progress: Progress = field(default_factory=Progress)
+    is_over: bool = True
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What speaks against running the program, in sentences."""
+        found = () if self.check is None else self.check.problems
+        return (*(problem.sentence for problem in found), *self.missing_skills)
+
+    @property
+    def digest(self) -> str:
+        """Names this program and no other, for those who approve it."""
+        return digest(self.program)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the robot works, or ends what it did."""
+        return self.state in {State.RUNNING, State.STOPPING} and not self.is_over
+
+    @property
+    def may_be_approved(self) -> bool:
+        """Whether the program can be approved as it stands."""
+        return self.state is State.CHECKED and not self.is_over and not self.busy
+
+    @property
+    def may_be_edited(self) -> bool:
+        """Whether another program can replace this one."""
+        if self.is_over or self.is_written:
+            return self.is_over
+        waits = self.state is None and bool(self.order.program)  # for the robot; nothing typed is lost
+        return waits or self.state in {State.DRAFTING, State.CHECKED}
+
+
+def digest(program: str) -> str:
+    """A short name of a program, by its content."""
+    return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()[:16]
+
+
+def ignore(_line: Line) -> None:
+    """Do nothing with an event."""
+
+
+class MissionSession:
+    """Drives one mission on a thread of its own.
+
+    Args:
+        robot: not connected; it is while the session lasts.
+        home: the folder of missions.
+        order: what is asked for.
+        open_model: gives a model by its name.
+        check: checks a program, given the robot's rooms.
+        changed: called at each change of the view; must return at once.
+        number: of the session, from 1.
+        before: the session to wait for.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        home: Path,
+        order: Order,
+        *,
+        open_model: Callable[[str], Model],
+        check: Callable[[str, RoomMap | None], Check],
+        changed: Callable[[], None] = lambda: None,
+        number: int = 1,
+        before: MissionSession | None = None,
+    ) -> None:
+        self._robot, self._home = robot, home
+        self._open_model, self._check, self._changed, self._before = open_model, check, changed, before
+        self._lock = threading.Condition()  # held for moments; never while a mission is asked for something
+        self._editing = threading.Lock()  # held while a program is replaced or approved
+        self._view = SessionView(number, order=order, program=order.program, busy="waiting", is_over=False)
+        self._events: list[Line] = []
+        self._mission: Mission | None = None
+        self._edited: str | None = None
+        self._ask_again: tuple[Sequence[str], ...] = ()
+        self._stopped_by: str | None = None
+        self._asking: tuple[asyncio.AbstractEventLoop, asyncio.Task[str]] | None = None
+        self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
+        self.on_event: Callable[[Line], None] = ignore  # what it raises stops the robot
+        self.error: Exception | None = None  # that ended it, once it is over
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def join(self, seconds: float | None = None) -> None:
+        """Wait for its end."""
+        self._thread.join(seconds)
+
+    def wait_until(self, holds: Callable[[SessionView], bool]) -> SessionView:
+        """Wait for a view of which something holds, or for the last one; signals are handled meanwhile."""
+        with self._lock:
+            self._lock.wait_for(lambda: self._view.is_over or holds(self._view))
+            return self._view
+
+    @property
+    def view(self) -> SessionView:
+        """It at this moment."""
+        return self._view
+
+    @property
+    def mission(self) -> Mission | None:
+        """Its mission, once the robot is reserved."""
+        return self._mission
+
+    def events(self, start: int = 0) -> list[Line]:
+        """The events of the mission, from one on."""
+        return self._events[start:]
+
+    def edit(self, program: str) -> None:
+        """Replace the program, and have it checked; does not wait for the check.
+
+        Raises:
+            MissionError: it is too late for that, or a model is writing.
+        """
+        with self._editing, self._lock:
+            if self._view.is_over or not self._view.may_be_edited:
+                raise MissionError("the program cannot be changed now")
+            self._edited = program
+            self._change(program=program, author="", busy="checking", **UNCHECKED)
+
+    def ask_again(self, *, repair: bool) -> None:
+        """Have the model write another program; with `repair`, it is shown this one and its problems.
+
+        Raises:
+            MissionError: no model wrote it, or it is too late for that.
+        """
+        with self._lock:
+            view = self._view
+            if not view.may_be_approved or not view.order.model:
+                raise MissionError("no model can be asked again now")
+            self._ask_again = (view.problems if repair else (),)
+            self._change(busy=f"asking {view.order.model}", is_written=True)
+
+    def approve(self, seen: str, *, despite_problems: bool = False) -> None:
+        """Let the robot run a program.
+
+        Args:
+            seen: the digest of the program that the person saw.
+            despite_problems: whether they approve it although the check found problems.
+
+        Raises:
+            MissionError: the program has changed, was not checked, or has problems.
+        """
+        with self._editing:
+            view, mission = self._view, self._mission
+            if mission is None or view.busy:
+                raise MissionError("the program is not checked yet")
+            if seen != view.digest or seen != digest(mission.summary.program):
+                raise MissionError("the program has changed; look at it again")
+            mission.approve(despite_problems=despite_problems)
+
+    def reject(self, reason: str) -> None:
+        """End the mission before it runs."""
+        assert self._mission is not None, "there is a program to reject"
+        self._mission.fail(reason)
+
+    def stop(self, by: str) -> None:
+        """Stop whatever goes on; returns when the robot has been told.
+
+        Args:
+            by: who stops it, in words such as `Ctrl-C`.
+        """
+        self._stopped_by = self._stopped_by or by
+        mission, asking = self._mission, self._asking
+        try:
+            if mission is not None:
+                with suppress(MissionError):  # it ended by itself
+                    mission.stop(by)
+        finally:
+            if asking is not None:
+                with suppress(RuntimeError):  # the answer has arrived
+                    asking[0].call_soon_threadsafe(asking[1].cancel)
+            with self._lock:
+                self._lock.notify_all()
+
+    # --- on its own thread
+
+    def _run(self) -> None:
+        try:
+            if self._before is not None:
+                self._before.join()
+                self._before = None
+            self._show(busy="connecting the robot")
+            self._through()
+        except EXPECTED as error:
+            self.error = error
+            self._show(trouble=_sentence(error))
+        except Exception as error:
+            self.error = error
+            LOG.exception("a mission broke off")
+            self._show(trouble=f"{type(error).__name__}: {visible(str(error))}")
+        finally:
+            self._show(is_over=True, busy="", is_written=False)
+
+    def _through(self) -> None:
+        order = self._view.order
+        if self._is_stopped():
+            return
+        with (
+            Reservation(self._robot, self._home) as reserved,
+            Mission(self._home, self._robot.name, order.instruction, told=self._note) as mission,
+        ):
+            self._mission = mission
+            self._show(id=mission.id, state=mission.state)
+            if self._is_stopped():
+                mission.stop(self._stopped_by or "")
+                return
+            room_map, place = preflight(self._robot)
+            self._show(room_map=room_map)
+            if order.program:
+                self._take(mission, order.program)
+            else:
+                self._ask(mission, ())
+            while mission.state in {State.DRAFTING, State.CHECKED}:
+                self._wait_for_a_person(mission)
+            if mission.state is State.APPROVED:
+                with suppress(MissionError):  # it was stopped before it could run
+                    mission.run(reserved, place)
+
+    def _is_stopped(self) -> bool:
+        return self._stopped_by is not None
+
+    def _wait_for_a_person(self, mission: Mission) -> None:
+        with self._lock:
+            self._lock.wait_for(
+                lambda: self._edited is not None or self._ask_again or mission.state is not State.CHECKED
+            )
+            edited, again = self._edited, self._ask_again
+            self._ask_again = ()
+        if mission.state not in {State.DRAFTING, State.CHECKED}:
+            return
+        if again:
+            self._ask(mission, again[0])
+        elif edited is not None:
+            self._take(mission, edited)
+
+    def _ask(self, mission: Mission, problems: Sequence[str]) -> None:
+        """Have the model write a program, and take it."""
+        name, before = self._view.order.model, self._view
+        self._show(busy=f"asking {name}", is_written=True, program="", trouble="", **UNCHECKED)
+        try:
+            model = self._open_model(name)
+            program = asyncio.run(self._written(model, before.program, problems))
+        except asyncio.CancelledError:
+            if before.program:
+                self._restore(before)
+            return
+        except (UserError, ModelError) as error:
+            if not before.program:
+                raise
+            self._restore(before)
+            self._show(trouble=visible(str(error)))
+            return
+        self._show(is_written=False, author=model.name)
+        self._take(mission, program)
+
+    def _restore(self, before: SessionView) -> None:
+        """Show the previous program: no other was written."""
+        kept = ("program", "author", "check", "missing_skills", "unknown_rooms")
+        self._show(**{name: getattr(before, name) for name in kept}, busy="", is_written=False)
+
+    async def _written(self, model: Model, before: str, problems: Sequence[str]) -> str:
+        rooms = () if self._view.room_map is None else self._view.room_map.rooms
+        prompt = prompt_for(self._view.order.instruction, rooms=rooms)
+        if problems:
+            prompt = prompt.after(before, problems)
+
+        async def written() -> str:
+            return (await write_program(model, prompt, heard=self._heard)).program
+
+        task = asyncio.create_task(written())
+        self._asking = (asyncio.get_running_loop(), task)
+        try:
+            if self._is_stopped():
+                task.cancel()
+            return await task
+        finally:
+            self._asking = None
+
+    def _heard(self, piece: str) -> None:
+        with self._lock:
+            self._change(program=self._view.program + piece)
+
+    def _take(self, mission: Mission, program: str) -> None:
+        """Make a program the mission's, and check it."""
+        with self._editing, self._lock:
+            if self._edited not in {None, program}:
+                return  # another one was typed meanwhile
+            self._edited = None
+            self._change(program=program, busy="checking", trouble="", **UNCHECKED)
+            view = self._view
+        try:
+            mission.draft(program, view.author)
+            check = self._check(program, view.room_map)
+            missing = tuple(missing_skills(program, self._robot))
+            unknown = unknown_rooms(program, view.room_map) if view.room_map and not check.problems else ()
+            checked = replace(
+                view, check=check, missing_skills=missing, unknown_rooms=tuple(unknown), busy=""
+            )
+            mission.check(checked.problems)
+        except MissionError:
+            if not mission.has_ended:
+                raise
+            return
+        for sentence in (*missing, *unknown):
+            mission.note(f"before it moves: {sentence}")
+        with self._lock:
+            if self._edited is None:
+                names = (*UNCHECKED, "busy")
+                self._change(**{name: getattr(checked, name) for name in names})
+
+    # --- what observers see
+
+    def _note(self, line: Line) -> None:
+        """Take an event of the mission, which holds its lock meanwhile."""
+        with self._lock:
+            self._events.append(line)
+            view = self._view
+            changes: dict[str, object] = {"progress": view.progress.after(line, view.program)}
+            if line["event"] == "state":
+                changes |= {"state": State(line["state"]), "reason": line.get("reason", "")}
+                if line["state"] not in STEPS:
+                    changes["busy"] = ""
+            self._change(**changes)
+        self.on_event(line)
+
+    def _show(self, **changes: object) -> None:
+        with self._lock:
+            self._change(**changes)
+
+    def _change(self, **changes: object) -> None:
+        """Change the view; the caller has the lock."""
+        self._view = replace(self._view, **changes)  # type: ignore[arg-type]  # names and values of its fields
+        self._lock.notify_all()
+        self._changed()
+
+
+UNCHECKED: dict[str, object] = {"check": None, "missing_skills": (), "unknown_rooms": ()}
+
+
+def _sentence(error: Exception) -> str:
+    if isinstance(error, OSError) and error.filename is not None:
+        return system_sentence(error)
+    return visible(str(error))

@@ -1,0 +1,63 @@
+"""What happens in a mission, event by event, in English."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from codebotler.core.skills import SKILLS
+from codebotler.core.terminal import shortened, visible
+from codebotler.missions.log import Line
+
+
+def event_text(line: Line) -> str:
+    """An event as people read it, such as `drives to "kitchen"`; empty if there is nothing to read."""
+    words = EVENTS.get(line["event"])
+    return words(line) if words else ""
+
+
+def call_text(skill: str, arguments: Sequence[str | Sequence[str]]) -> str:
+    """A call of a skill as a program would write it."""
+    quoted = [[f'"{text}"' for text in ([a] if isinstance(a, str) else a)] for a in arguments]
+    texts = [
+        q[0] if isinstance(a, str) else f"[{', '.join(q)}]" for a, q in zip(arguments, quoted, strict=True)
+    ]
+    return f"{skill}({', '.join(texts)})"
+
+
+def _skill(line: Line) -> str:
+    skill, arguments = SKILLS.get(line["skill"]), line["arguments"]
+    if skill is None or skill.verb is None:
+        return shortened(call_text(line["skill"], list(arguments.values())))
+    if skill.recording is None:
+        return skill.verb.third
+    words = f'{skill.verb.third} "{shortened(str(arguments[skill.recording.text]))}"'
+    options = arguments.get(skill.recording.options or "")
+    return f"{words} [{shortened(' | '.join(options))}]" if options else words
+
+
+def _result(line: Line) -> str:
+    match line["result"]:
+        case None:
+            return ""
+        case bool(found):
+            return "→ found" if found else "→ not found"
+        case list(texts):
+            return f"→ {shortened(', '.join(map(str, texts)))}"
+        case result:
+            return f"→ {shortened(str(result))}"
+
+
+EVENTS: Mapping[str, Callable[[Line], str]] = {
+    "skill": _skill,
+    "result": _result,
+    "state": lambda line: line["state"] + (f": {shortened(line['reason'])}" if "reason" in line else ""),
+    "feedback": lambda line: shortened(line["text"]),
+    "picture": lambda line: shortened(line.get("text") or f"picture: {line.get('file')}"),
+    "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",
+    "sleep": lambda line: f"waits for {line['seconds']:g} s",
+    "stop": lambda line: f"stop requested by {visible(line['by'])}",
+    "cancelled": lambda _: "stopped while it was under way",
+    "late": lambda _: "finished despite the stop; nothing else will start",
+    "log": lambda line: shortened(line["text"]),
+}
+"""The text of each kind of event."""
