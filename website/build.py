@@ -33,7 +33,7 @@ MODULES = {
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
         *("codebotler.robots.ros", "codebotler.robots.ros1", "codebotler.robots.virtual"),
         *("codebotler.robots.worker", "codebotler.models.base", "codebotler.models.open"),
-        *("codebotler.models.rate_limit", "codebotler.perception", "codebotler.web.further"),
+        *("codebotler.models.rate_limit", "codebotler.perception", "codebotler.web.frame"),
     ),
     "roboeval": (
         "roboeval",

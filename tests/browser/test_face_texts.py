@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Page, WebSocketRoute, expect
 
-from codebotler.web.facepage import words
+from codebotler.web.face import words
 from evil import EVIL, NAMES, OWN_TAGS
 from faces import HEARING, SPEAKING
 from pageserver import PageServer

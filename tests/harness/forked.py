@@ -19,7 +19,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
 
-PAGE = ("codebotler.web.serving", "roboeval.web.pages")
+PAGE = ("codebotler.web.server", "roboeval.web.pages")
 """What a page needs besides, and other commands do not."""
 LONGEST = 1_000_000  # bytes of a request
 

@@ -277,8 +277,8 @@ def serve(
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_faced, open_robot
+    from codebotler.web.access import entrance
     from codebotler.web.console import Console
-    from codebotler.web.place import entrance
 
     place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)
     known = None if world is None else World.read(world)
@@ -296,8 +296,8 @@ def serve(
     body = open_robot(robot, options) if shown is None else open_faced(robot, options, shown)
     desk = Console(body, home(), opened, models=models, world=known, face=shown)
 
-    from codebotler.web.further import installed
-    from codebotler.web.serving import serve as serve_page
+    from codebotler.web.frame import installed
+    from codebotler.web.server import serve as serve_page
 
     serve_page(desk, place, access, installed(), runs, alone_for=stop_when_alone)
 

@@ -1,135 +1,182 @@
-"""Who may do what: tokens, roles, the cookie, and how often a wrong token may be tried."""
+"""Who may open the page, and at which address: tokens, roles, cookies, hosts."""
 
 from __future__ import annotations
 
 import hashlib
 import hmac
+import ipaddress
 import secrets
-import threading
+import socket
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
 from codebotler.core.errors import UserError
 
 TRIES, WINDOW = 10, 60.0
-"""So many wrong tokens may come from an address in so many seconds."""
+"""How many wrong tokens may come from an address in so many seconds."""
 
 MOST_ADDRESSES = 10_000
+SHORTEST_TOKEN = 16
+LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+QUEUE = 128  # connections that wait to be accepted
 
 
 class Role(StrEnum):
-    """What somebody may do: an operator everything, the robot's face only to speak and to ask."""
+    """What a visitor may do: an operator everything, the robot's face only speak and ask."""
 
     OPERATOR = "operator"
     FACE = "face"
 
 
 class TooManyTriesError(Exception):
-    """An address has tried too many wrong tokens; the right one is not looked at either, for a while."""
-
-
-SHORTEST_TOKEN = 16
+    """Too many wrong tokens came from an address; for a while the right one is refused as well."""
 
 
 def new_token() -> str:
-    """A token that nobody guesses."""
+    """A random token."""
     return secrets.token_urlsafe(24)
 
 
 @dataclass(frozen=True)
 class Access:
-    """Knows the tokens.
+    """The tokens, and which role each gives."""
 
-    Args:
-        operator: the token of operators; None where nobody needs one.
-        face: the token of the robot's face.
-        unguessable: whose tokens were made here, so that nobody guesses them; these open at any time.
-        now: a clock that never goes back, in seconds.
-    """
-
-    operator: str | None = field(default_factory=new_token)
+    operator: str | None = field(default_factory=new_token)  # None where operators need none
     face: str = field(default_factory=new_token)
-    unguessable: frozenset[Role] = frozenset()
+    unguessable: frozenset[Role] = frozenset()  # whose tokens were made here; these open at any time
     now: Callable[[], float] = time.monotonic
     _wrong: dict[str, deque[float]] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
 
     @classmethod
     def asked_for(
         cls, operator: str | None, face: str | None, *, open_to_all: bool, is_loopback: bool
     ) -> Access:
-        """What a user wants.
-
-        Args:
-            operator: the token of operators; None for a new one.
-            face: that of the face; None for a new one.
-            open_to_all: whether operators need none.
-            is_loopback: whether only this machine gets there.
+        """The tokens that a user chose, and new ones for None.
 
         Raises:
-            UserError: that would let in whoever should not be.
+            UserError: they would let in more people than intended.
         """
         if open_to_all and (operator or face or not is_loopback):
-            raise UserError("--no-token is only for this machine; leave out --host and all tokens")
-        for token in (operator, face):
-            if token is not None and len(token) < SHORTEST_TOKEN:
-                raise UserError(
-                    f"this token can be guessed; take {SHORTEST_TOKEN} characters or more, or none"
-                )
+            raise UserError("--no-token works on this machine only; leave out --host and all tokens")
+        if any(token is not None and len(token) < SHORTEST_TOKEN for token in (operator, face)):
+            raise UserError(f"this token is too short; use {SHORTEST_TOKEN} characters or more, or none")
         if operator is not None and operator == face:
-            raise UserError("the face's token would open the operator's page; take another one")
-        long = frozenset(
-            role for role, token in ((Role.OPERATOR, operator), (Role.FACE, face)) if token is None
-        )
-        return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable=long)
+            raise UserError("the face's token would open the operator's page; choose another one")
+        made = {Role.OPERATOR: operator is None, Role.FACE: face is None}
+        unguessable = frozenset(role for role, is_new in made.items() if is_new)
+        return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """The role that a token gives; None for a wrong one, which is counted.
-
-        Args:
-            token: that somebody showed.
-            address: from which.
+        """The role that a token gives; None for a wrong one, which counts against the address it came from.
 
         Raises:
             TooManyTriesError: too many wrong ones came from there.
         """
-        with self._lock:
-            role = self._of(token, lambda known: known)
-            if role in self.unguessable:
-                return role
-            wrong = self._recent(address)
-            if len(wrong) >= TRIES:
-                raise TooManyTriesError
-            if role is None:
-                if address not in self._wrong and len(self._wrong) >= MOST_ADDRESSES:
-                    self._wrong.pop(next(iter(self._wrong)))
-                self._wrong.setdefault(address, wrong).append(self.now())
+        role = self._of(token, lambda known: known)
+        if role in self.unguessable:
             return role
+        wrong = self._wrong.get(address, deque(maxlen=TRIES))
+        while wrong and wrong[0] <= self.now() - WINDOW:
+            wrong.popleft()
+        if len(wrong) >= TRIES:
+            raise TooManyTriesError
+        if role is None:
+            if address not in self._wrong and len(self._wrong) >= MOST_ADDRESSES:
+                self._wrong.pop(next(iter(self._wrong)))
+            self._wrong.setdefault(address, wrong).append(self.now())
+        return role
 
     def of_cookie(self, value: str) -> Role | None:
         """The role that a cookie gives; None for a wrong one."""
         return self._of(value, _in_cookie)
 
     def cookie(self, role: Role) -> str:
-        """What stands in the cookie of a role: not the token itself, which opens more than one browser."""
+        """The value of a role's cookie: not the token itself, which opens other browsers."""
         return _in_cookie(self.face if role is Role.FACE else self.operator or "")
 
     def _of(self, shown: str, form: Callable[[str], str]) -> Role | None:
-        tokens = {Role.OPERATOR: self.operator, Role.FACE: self.face}
-        for role, token in tokens.items():
+        for role, token in ((Role.OPERATOR, self.operator), (Role.FACE, self.face)):
             if token and hmac.compare_digest(form(token).encode(), shown.encode(errors="replace")):
                 return role
         return None
 
-    def _recent(self, address: str) -> deque[float]:
-        wrong = self._wrong.get(address, deque(maxlen=TRIES))
-        while wrong and wrong[0] <= self.now() - WINDOW:
-            wrong.popleft()
-        return wrong
-
 
 def _in_cookie(token: str) -> str:
     return hmac.new(token.encode(), b"codebotler cookie", hashlib.sha256).hexdigest()
+
+
+@dataclass(frozen=True)
+class GuardRules:
+    """Which requests the guard lets through."""
+
+    access: Access
+    hosts: frozenset[str] = LOOPBACK  # names of the page, without ports
+    any_address: bool = False  # whether numeric addresses are accepted besides, as from other machines
+    cookie: str = "codebotler"  # its name, another one for each port
+
+
+@dataclass(frozen=True)
+class Place:
+    """The address of the page."""
+
+    host: str = "127.0.0.1"
+    port: int = 8080  # 0 takes a free one
+    names: tuple[str, ...] = ()  # further names of the page
+
+    @property
+    def is_loopback(self) -> bool:
+        """Whether only this machine can reach it."""
+        try:
+            return ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return self.host in LOOPBACK
+
+    def listening(self) -> socket.socket:
+        """An open socket there.
+
+        Raises:
+            UserError: the port is in use, or the host is not this machine.
+        """
+        try:
+            family, kind, protocol, _, address = socket.getaddrinfo(
+                self.host, self.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+            )[0]
+            bound = socket.socket(family, kind, protocol)
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bound.bind(address)
+            bound.listen(QUEUE)
+        except OSError as error:
+            raise UserError(
+                f"cannot listen on {self.host}, port {self.port}: {error.strerror}; "
+                "choose another --port, or --host"
+            ) from None
+        return bound
+
+    def rules(self, access: Access, port: int) -> GuardRules:
+        """The guard's rules for this address."""
+        named = {name.lower() for name in (self.host, *self.names)}
+        hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
+        return GuardRules(access, frozenset(hosts), not self.is_loopback, f"codebotler-{port}")
+
+
+def entrance(
+    host: str, port: int, names: Sequence[str], token: str | None, face: str | None = None, *, no_token: bool
+) -> tuple[Place, Access]:
+    """The address and the tokens of a page, as the command line has them.
+
+    Args:
+        host: the address to listen on.
+        port: 0 takes a free one.
+        names: further names of the page.
+        token: of operators; a new one by default.
+        face: the token of the robot's face; a new one by default.
+        no_token: whether everybody on this machine may open the page.
+
+    Raises:
+        UserError: the tokens would let in more people than intended.
+    """
+    place = Place(host, port, tuple(names))
+    return place, Access.asked_for(token, face, open_to_all=no_token, is_loopback=place.is_loopback)

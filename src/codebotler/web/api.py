@@ -1,4 +1,4 @@
-"""Everything the page does, over HTTP: missions, checks, the robot."""
+"""The HTTP API: everything the page does with missions, checks and the robot."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from codebotler.missions.store import find, missions, summary_of
 from codebotler.web.console import MOST_PROGRAM, Console
 
 HERE = "current"
-"""Names the mission at hand in an address."""
+"""The mission at hand, in an address."""
 
 STOPS = "the page"
-"""Who stops a mission over the API, in words."""
+"""Who stops a mission over the API."""
 
 QUIET = 15.0
-"""Seconds after which a stream says that it is still there."""
+"""Seconds between signs of life in a stream."""
 
 Text = Annotated[str, Field(max_length=MOST_PROGRAM)]
 
@@ -41,59 +41,55 @@ class _Form(BaseModel):
 
 
 class NewMission(_Form):
-    """What somebody asks for: an instruction, a program, or both."""
+    """A new mission: an instruction, a program, or both."""
 
     instruction: Text = ""
-    model: Annotated[str, Field(max_length=200)] = Field("", description="The first one, if none is named.")
+    model: Annotated[str, Field(max_length=200)] = Field("", description="By default the first one.")
     program: Text = ""
 
 
 class NewProgram(_Form):
-    """A program in the place of the one at hand."""
+    """A program that replaces the one at hand."""
 
     program: Text
 
 
 class Approval(_Form):
-    """Somebody's word for a program."""
+    """A person's approval of a program."""
 
-    program: str = Field(description="The digest of the program that was looked at.")
+    program: str = Field(description="The digest of the program that the person saw.")
     despite_problems: bool = False
 
 
 class Again(_Form):
-    """Another program is wanted of the model."""
+    """A request for another program."""
 
-    repair: bool = Field(default=False, description="Whether it is told the program and its problems.")
+    repair: bool = Field(default=False, description="Whether to send the model the program and its problems.")
 
 
 class ProgramToCheck(_Form):
-    """A program that is only checked."""
+    """A program to check."""
 
     program: Text
 
 
 class AnyText(JSONResponse):
-    """JSON in ASCII, which holds texts that no encoding takes, such as half characters of a program."""
+    """JSON in ASCII, which can hold the half characters of a program."""
 
     def render(self, content: object) -> bytes:
-        """As bytes."""
+        """The response's body."""
         return json.dumps(content, separators=(",", ":")).encode("ascii")
 
 
 def refused(_request: Request, error: Exception) -> AnyText:
-    """Say what is wrong with a request, without sending all of it back."""
-    assert isinstance(error, RequestValidationError), "it is called for no other"
+    """Say what is wrong with a request, without sending it back."""
+    assert isinstance(error, RequestValidationError), "registered for this error alone"
     told = [{name: fault[name] for name in ("type", "loc", "msg")} for fault in error.errors()]
     return AnyText({"detail": told}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
 
 def router(console: Console) -> APIRouter:
-    """The addresses of the API.
-
-    Args:
-        console: what they speak of.
-    """
+    """The addresses of the API."""
     api = APIRouter(prefix="/api", tags=["missions"], default_response_class=AnyText)
     _add_missions(api, console)
     _add_changes(api, console)
@@ -105,24 +101,24 @@ def router(console: Console) -> APIRouter:
 def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions")
     def list_missions() -> list[dict[str, Any]]:
-        """All missions, in the order in which they began."""
+        """All missions, oldest first."""
         with _refusing():
             return [asdict(summary) for summary in missions(console.home)]
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission; its program is written and checked meanwhile. One that runs is not disturbed."""
+        """Begin a mission; its program is written and checked meanwhile. Refused while a mission runs."""
         model = new.model or ("" if new.program else console.models[0])
         with _refusing():
             session = console.begin(Order(new.instruction, model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
         if not session.view.id:
-            raise HTTPException(409, session.view.trouble or "it was stopped before it began")
+            raise HTTPException(409, session.view.trouble or "the mission was stopped before it began")
         return view_data(session.view)
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """A mission: the one at hand with its check, one of before in short."""
+        """A mission: the one at hand with its check, a past one in short."""
         view = console.view
         if mission in {HERE, view.id}:
             return view_data(view)
@@ -130,7 +126,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}/events.jsonl")
     def jsonl(mission: str) -> Response:
-        """The events as they lie on the disk."""
+        """The events as JSON lines."""
         summary, _ = _past(console, mission)
         data = (console.home / "missions" / summary.id / EVENTS).read_bytes()
         return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
@@ -147,14 +143,14 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 def _add_changes(api: APIRouter, console: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
-        """Put another program in the place of the one at hand; it is checked meanwhile."""
+        """Replace the program; it is checked meanwhile."""
         _at_hand(console, mission)
         with _refusing():
             return view_data(console.edit(new.program).view)
 
     @api.post("/missions/{mission}/again", status_code=202)
     def ask_again(mission: str, again: Again) -> dict[str, Any]:
-        """Have the model write another program; it is checked afterwards."""
+        """Have the model write another program, which is then checked."""
         session = _at_hand(console, mission)
         with _refusing():
             session.ask_again(repair=again.repair)
@@ -162,7 +158,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/approve")
     def approve(mission: str, approval: Approval) -> dict[str, Any]:
-        """Let the robot run the program that was looked at, and no other."""
+        """Run the program that the person saw, and no other."""
         session = _at_hand(console, mission)
         with _refusing():
             session.approve(approval.program, despite_problems=approval.despite_problems)
@@ -177,7 +173,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/stop", status_code=202)
     async def stop(*, only_moving: bool = False) -> dict[str, Any]:
-        """Stop whatever goes on, or only a robot that runs; whether there is anything to stop."""
+        """Stop whatever goes on, or only a robot that runs; says whether there is anything to stop."""
         return {"stopping": console.stop_soon(STOPS, only_moving=only_moving)}
 
 
@@ -195,7 +191,7 @@ def _add_events(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: ProgramToCheck) -> dict[str, Any]:
-        """Say what is wrong with a program, in the rooms of the mission at hand if there is one."""
+        """Check a program, in the rooms of the mission at hand if there is one."""
         with _refusing():
             return console.check(new.program, console.view.room_map).data()
 
@@ -218,7 +214,7 @@ def _add_rest(api: APIRouter, console: Console) -> None:
 
 
 async def _stream(console: Console, session: MissionSession, known: int) -> AsyncIterator[str]:
-    """Lines of a server-sent stream. Who reads slowly is sent what there is by then; nothing waits for it."""
+    """Server-sent events; a slow reader skips nothing and delays nobody."""
 
     def has_more() -> bool:
         return bool(session.events(known)) or session.view.is_over
@@ -261,7 +257,7 @@ def _at_hand(console: Console, mission: str) -> MissionSession:
     if session is not None and mission in {HERE, session.view.id}:
         return session
     summary, _ = _past(console, mission)
-    raise HTTPException(409, f"mission {summary.id} is not the one at hand; only what it left can be read")
+    raise HTTPException(409, f"mission {summary.id} is over; it can only be read")
 
 
 def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:

@@ -1,10 +1,11 @@
-"""The operator's console: the robot, the mission at hand and those before, the same for every viewer."""
+"""The operator's console: the robot and the mission at hand, the same for every viewer."""
 
 from __future__ import annotations
 
+import asyncio
 import threading
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
+from contextlib import ExitStack, aclosing, contextmanager, suppress
 from pathlib import Path
 from typing import Self
 
@@ -21,27 +22,21 @@ from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
 from codebotler.simulator.engine import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
-from codebotler.web.notifier import Notifier
 
 MOST_PROGRAM = 200_000
-"""Characters of a program or an instruction; longer ones are mistakes."""
-
-NOTHING = SessionView()
+"""The longest program or instruction, in characters."""
 
 
 class Console:
-    """Holds a robot and the mission at hand; as a context manager, from the start of the tool to its end.
-
-    All methods are for any thread. Those that say so are back at once, the others may wait for a disk or for
-    a robot.
+    """Holds a robot and the mission at hand, for any number of viewers on any threads.
 
     Args:
-        robot: not connected; it is, while a mission has it.
+        robot: not connected; a mission connects it.
         home: the folder of missions.
         open_model: gives a model by its name.
-        models: the names that are offered, the first one by default.
-        world: where the robot is, if somebody has measured it.
-        face: on which the robot speaks, if it does.
+        models: the names on offer, the default first.
+        world: the robot's surroundings, if known.
+        face: where the robot speaks, if it does.
     """
 
     def __init__(
@@ -82,31 +77,31 @@ class Console:
 
     @property
     def session(self) -> MissionSession | None:
-        """The mission at hand, or the last one; at once."""
+        """The mission at hand, or the last one."""
         return self._session
 
     @property
     def view(self) -> SessionView:
-        """What all viewers see; at once."""
+        """What all viewers see."""
         session = self._session
-        return NOTHING if session is None else session.view
+        return SessionView() if session is None else session.view
 
     def events(self, start: int = 0) -> list[Line]:
-        """The events of the mission at hand, from one on; at once."""
+        """The events of the mission at hand, from one on."""
         session = self._session
         return [] if session is None else session.events(start)
 
     def begin(self, order: Order) -> MissionSession:
-        """Begin a mission; one that is not running yet makes room for it. Back at once.
+        """Begin a mission; one that is not running yet makes room for it.
 
         Raises:
-            MissionError: the robot is on another one, or the order cannot be carried out.
+            MissionError: a mission is running, or nothing is asked for.
         """
         order = Order(order.instruction.strip(), order.model.strip(), order.program)
         if not order.program.strip() and not (order.instruction and order.model):
             raise MissionError("nothing is asked for; say what the robot is to do")
         for text in (order.instruction, order.program):
-            _expect_short(text)
+            _check_length(text)
         with self._lock:
             before = self._session
             if before is not None and before.view.is_running:
@@ -128,41 +123,30 @@ class Console:
         return session
 
     def edit(self, program: str) -> MissionSession:
-        """Put another program in the place of the one at hand; after its end this begins a mission.
-
-        Back at once.
+        """Replace the program at hand; after the end of a mission this begins another one.
 
         Raises:
             MissionError: the robot runs, or a model is writing.
         """
-        _expect_short(program)
+        _check_length(program)
         session = self._session
         if session is None or session.view.is_over:
             return self.begin(Order(self.view.order.instruction, program=program))
         session.edit(program)
         return session
 
-    def stop(self, by: str) -> bool:
-        """Stop the mission at hand; back when the robot was told so.
-
-        Args:
-            by: who wants it, in words.
-
-        Returns:
-            whether there was one.
-        """
+    def stop(self, by: str) -> None:
+        """Stop the mission at hand, if there is one; returns when the robot has been told."""
         session = self._session
-        if session is None or session.view.is_over:
-            return False
-        session.stop(by)
-        return True
+        if session is not None and not session.view.is_over:
+            session.stop(by)
 
     def stop_soon(self, by: str, *, only_moving: bool = False) -> bool:
-        """Have the mission at hand stopped by a thread of its own, so that nothing slow delays it; at once.
+        """Stop the mission at hand on a thread of its own, so that nothing slow delays it.
 
         Args:
-            by: who wants it, in words.
-            only_moving: whether a mission whose robot does not run goes on.
+            by: who stops it, in words.
+            only_moving: whether to stop only a robot that runs.
 
         Returns:
             whether there is anything to stop.
@@ -173,12 +157,12 @@ class Console:
         threading.Thread(target=self.stop, args=(by,), daemon=True).start()
         return True
 
-    def check(self, program: str, plan: RoomMap | None = None) -> Check:
-        """Say what is wrong with a program, one after the other.
+    def check(self, program: str, room_map: RoomMap | None = None) -> Check:
+        """Check a program; one at a time.
 
         Args:
             program: its source.
-            plan: the robot's rooms; without them they are taken from the program.
+            room_map: the robot's rooms; without them they are taken from the program.
 
         Raises:
             EngineError: no isolated process could be started.
@@ -186,9 +170,58 @@ class Console:
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
-            return check(program, plan=plan, pool=self._pool)
+            return check(program, plan=room_map, pool=self._pool)
 
 
-def _expect_short(text: str) -> None:
+class Notifier:
+    """Wakes viewers at each change; they then read what there is, so no queue can grow."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._wakes: list[Callable[[], None]] = []
+
+    def change(self) -> None:
+        """Wake all viewers; from any thread."""
+        with self._lock:
+            wakes = tuple(self._wakes)
+        for wake in wakes:
+            wake()
+
+    @contextmanager
+    def watched(self, wake: Callable[[], None]) -> Iterator[None]:
+        """Have a function called at each change, on the thread that makes it; it must return at once."""
+        with self._lock:
+            self._wakes.append(wake)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._wakes.remove(wake)
+
+    async def changes(self) -> AsyncGenerator[None]:
+        """Yield now, and again after changes; those during one round of the loop count as one."""
+        loop, changed = asyncio.get_running_loop(), asyncio.Event()
+
+        def wake() -> None:
+            with suppress(RuntimeError):  # the loop has ended, and with it all who waited
+                loop.call_soon_threadsafe(changed.set)
+
+        with self.watched(wake):
+            while True:
+                changed.clear()
+                yield
+                await changed.wait()
+
+    async def until(self, holds: Callable[[], bool], seconds: float | None = None) -> bool:
+        """Wait until something holds, at most so many seconds; whether it does."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(seconds), aclosing(self.changes()) as changes:
+                async for _ in changes:
+                    if holds():
+                        return True
+        return holds()
+
+
+def _check_length(text: str) -> None:
     if len(text) > MOST_PROGRAM:
-        raise MissionError(f"{len(text):,} characters are too many; at most {MOST_PROGRAM:,} are taken")
+        raise MissionError(f"{len(text):,} characters are too many; {MOST_PROGRAM:,} is the limit")

@@ -1,7 +1,4 @@
-"""Text and buttons on a page, as plain elements; what they are given is shown as text, never as markup.
-
-Characters that nobody sees, or that turn others round, are written out as escapes.
-"""
+"""Text and buttons on a page: shown as text, never as markup, with hidden characters written out."""
 
 from __future__ import annotations
 
@@ -14,14 +11,8 @@ from nicegui.elements.mixins.text_element import TextElement
 from codebotler.core.terminal import visible_lines
 
 
-class Words(TextElement):
-    """An element that holds a text.
-
-    Args:
-        tag: of HTML, such as `p`.
-        text: which it holds at first.
-        kind: its CSS classes.
-    """
+class PlainText(TextElement):
+    """An HTML element with a text; `kind` is its CSS classes."""
 
     def __init__(self, tag: str, text: str = "", kind: str = "") -> None:
         super().__init__(tag=tag, text=visible_lines(text))
@@ -29,7 +20,7 @@ class Words(TextElement):
         self.props("dir=auto")
 
     def say(self, text: str) -> None:
-        """Hold another text; without one, it is not to be seen."""
+        """Show another text; an empty one hides the element."""
         shown = visible_lines(text)
         if shown != self.text:
             self.text = shown
@@ -37,28 +28,17 @@ class Words(TextElement):
 
 
 def scroll_up() -> None:
-    """Where the panes stand below each other, show the first one; that is the one that matters now."""
+    """Show the first pane, where panes stand one below another."""
     ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
 
 
 def warn(sentence: str, seconds: float = 5.0) -> None:
-    """Say beside all else that something cannot be done.
-
-    Args:
-        sentence: why.
-        seconds: for which it stands there.
-    """
+    """Show a warning for some seconds."""
     ui.notify(visible_lines(sentence), type="warning", position="top", timeout=1000 * seconds)
 
 
-class Press(Words):
-    """A button.
-
-    Args:
-        text: on it.
-        pressed: called when it is pressed.
-        kind: its CSS classes.
-    """
+class Button(PlainText):
+    """A button that calls a function when it is pressed."""
 
     def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "") -> None:
         super().__init__("button", text, kind)
@@ -67,7 +47,7 @@ class Press(Words):
         self._may = True
 
     def allow(self, may: bool) -> None:  # noqa: FBT001 - one word after the verb
-        """Let it be pressed, or not."""
+        """Enable or disable it."""
         if may != self._may:
             self._may = may
             if may:

@@ -1,4 +1,4 @@
-"""The rooms and the robot as a drawing (SVG)."""
+"""A map of the rooms and the robot (SVG)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from codebotler.core.world import Point, World, laid_out
 MARGIN = 0.6
 MOST_ROOMS = 100
 WIDE = 0.62
-"""How wide a letter is, in heights of letters, so that names fit into their rooms."""
+"""The width of a letter, in heights of a letter."""
 
 SMALLEST, LARGEST = 0.2, 0.62
 MOST_LETTERS = 60
 
 
 def floorplan(world: World, at: Point | None = None, room: str = "") -> str:
-    """Draw a world as seen from above.
+    """Draw a world as seen from above; rooms without a footprint are laid out along a hallway.
 
     Args:
-        world: whose rooms are drawn; those that nobody measured are laid out along a hallway.
-        at: where the robot is, in metres; None where nobody knows.
-        room: the name of the room that the robot is in, or drives to.
+        world: the rooms.
+        at: the robot's position in metres, if known.
+        room: the room that the robot is in, or drives to.
     """
     rooms = laid_out(world).rooms[:MOST_ROOMS]
     corners = [corner for one in rooms for corner in one.footprint or ()] + ([at] if at else [])
@@ -31,7 +31,7 @@ def floorplan(world: World, at: Point | None = None, room: str = "") -> str:
     low, high = min(y for _, y in corners) - MARGIN, max(y for _, y in corners) + MARGIN
     parts = []
     for one in rooms:
-        assert one.footprint is not None, "it is laid out"
+        assert one.footprint is not None, "rooms are laid out"
         here = " here" if one.name == room else ""
         points = " ".join(f"{x - left:.2f},{high - y:.2f}" for x, y in one.footprint)
         parts.append(f'<polygon class="room{here}" points="{points}"/>')
@@ -40,7 +40,7 @@ def floorplan(world: World, at: Point | None = None, room: str = "") -> str:
         x, y = at[0] - left, high - at[1]
         parts.append(f'<g class="robot"><circle class="halo" cx="{x:.2f}" cy="{y:.2f}" r=".62"/>')
         parts.append(f'<circle class="body" cx="{x:.2f}" cy="{y:.2f}" r=".34"/></g>')
-    where = f"The robot is in {room}." if room else "Where the robot is, is not known."
+    where = f"The robot is in {room}." if room else "The position of the robot is unknown."
     return (
         f'<svg class="floorplan" viewBox="0 0 {right - left:.2f} {high - low:.2f}" role="img" '
         f'aria-label="{escape(shortened(f"Map of {len(rooms)} rooms. {where}", 200))}">{"".join(parts)}</svg>'
@@ -48,7 +48,7 @@ def floorplan(world: World, at: Point | None = None, room: str = "") -> str:
 
 
 def _name(name: str, footprint: tuple[Point, ...], left: float, high: float) -> Iterator[str]:
-    """The name of a room, at its upper side, in up to two lines; the robot mostly stands in its middle."""
+    """The name of a room, at its upper side, in up to two lines: the robot mostly stands in the middle."""
     xs, ys = [x for x, _ in footprint], [y for _, y in footprint]
     lines = _broken(shortened(name, MOST_LETTERS))
     size = (max(xs) - min(xs)) * 0.92 / (WIDE * max(map(len, lines)) or 1)
@@ -60,7 +60,7 @@ def _name(name: str, footprint: tuple[Point, ...], left: float, high: float) -> 
 
 
 def _broken(name: str) -> list[str]:
-    """A name in one line, or in two that are about as long."""
+    """A name in one line, or in two of about the same length."""
     words = name.split()
     if len(words) < 2 or len(name) < 9:  # noqa: PLR2004 - two words, and longer than fits
         return [name]

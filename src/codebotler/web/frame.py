@@ -1,11 +1,16 @@
-"""What all pages have in common: the bar with their names, and STOP where there is a robot."""
+"""What all pages share: the bar and STOP; and how other packages add pages."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from importlib.metadata import entry_points
+from pathlib import Path
 
+from fastapi import FastAPI
 from nicegui import html, ui
+
+from codebotler.core.terminal import note
 
 HEAD = '<link rel="stylesheet" href="/static/page.css">'
 BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
@@ -13,18 +18,21 @@ BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assert
 <script src="/static/stop.js"></script>"""
 ROBOT = (("Robot", "/"), ("Missions", "/missions"))
 FACE = ("Face", "/face")
+GROUP = "codebotler.pages"
+"""The entry points of pages."""
+
 PATIENCE = 60.0
-"""Seconds that a page may take to be put together: a run is read when it is first looked at."""
+"""Seconds that a page may take to build: a run is read when it is first opened."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Puts the bar on a page; STOP needs nothing of the rest to work.
+    """Puts the bar on a page; STOP works without the rest of the page.
 
     Args:
         links: names and addresses of pages, in order.
-        brand: what it is all called.
-        has_robot: whether there is one to stop.
+        brand: the name in the bar.
+        has_robot: whether there is a robot to stop.
     """
 
     links: tuple[tuple[str, str], ...] = ROBOT
@@ -36,8 +44,8 @@ class Frame:
 
         Args:
             title: of the page.
-            here: the address of the page that is marked in the bar.
-            parts: names and addresses of its parts, for screens on which they stand below each other.
+            here: the address that is marked in the bar.
+            parts: names and addresses within the page, for screens that show its panes one below another.
         """
         ui.page_title(f"{title} · {self.brand}")
         ui.add_head_html(HEAD)
@@ -54,3 +62,52 @@ class Frame:
                     link = html.a(name, href=address)
                     if address == here:
                         link.props('aria-current="page"')
+
+
+@dataclass(frozen=True)
+class Site:
+    """What further pages are added to; the guard protects them too, and keeps faces out.
+
+    Args:
+        app: takes further addresses: of the API below `/api/`, of files below `/static/`.
+        frame: to be called first on each page.
+        runs: the folder of runs.
+    """
+
+    app: FastAPI
+    frame: Frame
+    runs: Path
+
+
+@dataclass(frozen=True)
+class Pages:
+    """Pages that another package adds.
+
+    Args:
+        name: in the bar.
+        brand: the name of the site where there are no other pages.
+        address: of the first page.
+        add: adds the pages.
+    """
+
+    name: str
+    brand: str
+    address: str
+    add: Callable[[Site], None]
+
+
+def installed() -> tuple[Pages, ...]:
+    """The pages that installed packages add; those that cannot be loaded are noted and left out."""
+    return tuple(_loaded())
+
+
+def _loaded() -> Iterator[Pages]:
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        try:
+            pages = point.load()
+            if not isinstance(pages, Pages):
+                raise TypeError(f"{point.value} is not an instance of Pages")  # noqa: TRY301 - noted like all else
+        except Exception as error:  # noqa: BLE001 - no package keeps an operator from the robot
+            note(f'the pages "{point.name}" cannot be added: {error}')
+        else:
+            yield pages

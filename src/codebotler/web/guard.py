@@ -1,31 +1,29 @@
-"""Stands before the page and its API, the websocket included: hosts, origins, tokens, sizes, headers."""
+"""Stands in front of the page and its API: checks hosts, origins, tokens and sizes, and adds headers."""
 
 from __future__ import annotations
 
 import ipaddress
-import json
 import re
 import secrets
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from http import HTTPStatus
-from http.cookies import CookieError, SimpleCookie
 from posixpath import normpath
-from typing import Any, TypeAlias
-from urllib.parse import parse_qsl, quote, urlencode
+from urllib.parse import quote, urlencode
 
+from starlette.datastructures import MutableHeaders
+from starlette.requests import HTTPConnection
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocketClose
 
-from codebotler.web.access import Access, Role, TooManyTriesError
+from codebotler.web.access import GuardRules, Role, TooManyTriesError
 
 MOST_BYTES = 2_000_000
-"""Of a request's body."""
+"""The largest body of a request."""
 
 CHANGES_NOTHING = frozenset({"GET", "HEAD", "OPTIONS"})
 FOR_FACES = ("/face", "/api/face", "/static", "/favicon.ico")
-"""Where a face may go: not to NiceGUI's websocket, which takes messages for any page by its number."""
-
-LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+"""What a face may open: not NiceGUI's websocket, which takes messages for any page by its number."""
 
 POLICY = (
     "default-src 'none'; script-src 'self' 'nonce-{nonce}' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
@@ -35,6 +33,7 @@ POLICY = (
 """`unsafe-eval` and inline styles are what NiceGUI needs: Vue builds its templates and handlers in the
 browser, Quasar and CodeMirror write styles. No inline script runs but those that bear this answer's nonce."""
 
+PLAIN_POLICY = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
 HEADERS = {
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -44,58 +43,42 @@ HEADERS = {
     "permissions-policy": "camera=(), geolocation=(), payment=(), usb=(), microphone=(self)",
 }
 HOST = re.compile(r"(?:([a-z0-9._-]+)|\[([0-9a-f:.]+)\])(?::(\d{1,5}))?")
-"""A name or an address, and perhaps a port: any, since a tunnel or a proxy in front has one of its own."""
+"""A name or an address and any port, since a tunnel or a proxy in front has a port of its own."""
 
 MOST_PORT = 65_535
 CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
-NO_CONTROL = "there is no such page, and no address of ours has control characters"
 SCRIPT = re.compile(rb"<script(?=[\s>])")
-Headers: TypeAlias = Mapping[str, str]
 
+NO_CONTROL = "there is no such page: no address here has control characters"
+NO_PAGE = "there is no such page"
+WRONG = "this is not the token"
+OTHER_SITE = "this came from another page, which may not do that"
+TOO_LARGE = f"at most {MOST_BYTES:,} bytes are accepted"
 
-@dataclass(frozen=True)
-class Rules:
-    """Whom the guard lets in.
-
-    Args:
-        access: knows the tokens.
-        hosts: names by which the page may be called, without ports.
-        any_address: whether numeric addresses of this machine will do besides, as from other machines.
-        cookie: its name; that of another port is another one.
-    """
-
-    access: Access
-    hosts: frozenset[str] = LOOPBACK
-    any_address: bool = False
-    cookie: str = "codebotler"
+REFUSAL = """<!doctype html><html lang="en"><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1"><title>CodeBotler</title>
+<style>body{{font:18px/1.5 system-ui,sans-serif;color-scheme:light dark;max-width:34rem;margin:20vh auto;
+padding:0 1.5rem}}h1{{font-size:1.4rem}}</style><h1>CodeBotler</h1><p>{sentence}</p></html>"""
 
 
 class RefusedError(Exception):
-    """A request that is not answered.
-
-    Args:
-        status: of HTTP.
-        sentence: why, and the mend.
-    """
+    """A request that is refused, with the status and a sentence that says why."""
 
     def __init__(self, status: HTTPStatus, sentence: str) -> None:
-        super().__init__(sentence)
+        super().__init__(status, sentence)
         self.status, self.sentence = status, sentence
-
-    def __reduce__(self) -> tuple[object, ...]:
-        return type(self), (self.status, self.sentence), vars(self)
 
 
 class Guard:
-    """ASGI in front of ASGI.
+    """ASGI middleware that lets a request through or refuses it.
 
     Args:
-        app: what is behind it.
-        rules: whom it lets in.
-        has_page: whether anything is at a path, such as a page to which a link with a token may lead.
+        app: the page and its API.
+        rules: which requests are let through.
+        has_page: whether there is anything at a path.
     """
 
-    def __init__(self, app: ASGIApp, rules: Rules, has_page: Callable[[str], bool]) -> None:
+    def __init__(self, app: ASGIApp, rules: GuardRules, has_page: Callable[[str], bool]) -> None:
         self._app, self._rules, self._has_page = app, rules, has_page
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -103,110 +86,86 @@ class Guard:
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
-        headers = {
-            name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]
-        }
+        request = HTTPConnection(scope)
+        is_http = scope["type"] == "http"
         try:
-            self._expect_path(scope["path"])
-            self._expect_host(scope)
-            self._expect_origin(scope, headers)
-            token = _given_token(scope)
-            if token is not None and scope["type"] == "http":
-                await self._let_in(token, scope, send)
+            self._check_path(scope["path"])
+            self._check_host(request)
+            _check_origin(request)
+            if is_http and (token := _token_in_link(request)) is not None:
+                await self._let_in(token, request)(scope, receive, send)
                 return
-            role = self._role(scope, headers)
-            _expect_allowed(role, scope["path"])
-            _expect_small(headers)
+            role = self._role(request)
+            _check_role(role, scope["path"])
+            _check_length(request)
         except RefusedError as error:
-            await _refuse(scope, headers, error, receive, send)
+            closing = WebSocketClose(code=1008, reason=error.sentence[:100])
+            await (_refusal(request, error) if is_http else closing)(scope, receive, send)
             return
         scope.setdefault("state", {})["role"] = role
-        if scope["type"] == "http":
-            body = _Body(receive)
-            await self._app(scope, body.receive, body.unless_too_large(_with_headers(send)))
+        if is_http:
+            await _LimitedBody(receive, send).run(self._app, scope)
         else:
             await self._app(scope, receive, send)
 
-    # --- where to
-
-    def _expect_path(self, path: str) -> None:
-        """Control characters stand in names that people gave, which pages look up, and nowhere else."""
-        if CONTROL.search(path) and not self._has_page(path):
+    def _check_path(self, path: str) -> None:
+        if CONTROL.search(path) and not self._has_page(path):  # names that people gave may have them
             raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
 
-    # --- from where
+    def _check_host(self, request: HTTPConnection) -> None:
+        """Refuse other names: a foreign page whose name leads here (DNS rebinding) calls us by that name."""
+        name = _host(request)
+        if name not in self._rules.hosts and not (self._rules.any_address and _is_address(name)):
+            raise RefusedError(
+                HTTPStatus.MISDIRECTED_REQUEST,
+                "this page does not go by that name; use the link that was printed when it started",
+            )
 
-    def _expect_host(self, scope: Scope) -> None:
-        """A page of somebody else's whose name leads here (DNS rebinding) calls us by that name."""
-        name = _host(scope)
-        if name in self._rules.hosts or (self._rules.any_address and _is_address(name)):
-            return
-        raise RefusedError(
-            HTTPStatus.MISDIRECTED_REQUEST,
-            "this page does not go by that name; use the link that codebotler serve printed",
-        )
-
-    def _expect_origin(self, scope: Scope, headers: Headers) -> None:
-        """A page of somebody else's may neither change anything nor listen."""
-        origin, site = headers.get("origin"), headers.get("sec-fetch-site")
-        changes = scope["type"] == "websocket" or scope["method"] not in CHANGES_NOTHING
-        if origin is not None and not _is_same(origin, headers.get("host", ""), scope):
-            raise RefusedError(HTTPStatus.FORBIDDEN, "this came from another page, which may not do that")
-        from_browser = "cookie" in headers or scope["type"] == "websocket"
-        if changes and origin is None and from_browser and "authorization" not in headers:
-            raise RefusedError(HTTPStatus.FORBIDDEN, "a browser has to say from which page this comes")
-        navigates = headers.get("sec-fetch-mode") == "navigate"
-        if site in {"cross-site", "same-site"} and not navigates:
-            raise RefusedError(HTTPStatus.FORBIDDEN, "this came from another page, which may not do that")
-
-    # --- who
-
-    def _role(self, scope: Scope, headers: Headers) -> Role | None:
+    def _role(self, request: HTTPConnection) -> Role | None:
         access = self._rules.access
-        kind, _, given = headers.get("authorization", "").partition(" ")
+        kind, _, given = request.headers.get("authorization", "").partition(" ")
         if kind.lower() == "bearer" and given:
-            role = self._of_token(given.strip(), scope)
+            role = self._of_token(given.strip(), request)
             if role is None:
-                raise RefusedError(HTTPStatus.UNAUTHORIZED, "this is not the token")
+                raise RefusedError(HTTPStatus.UNAUTHORIZED, WRONG)
             return role
-        role = access.of_cookie(_cookie(headers, self._rules.cookie))
+        role = access.of_cookie(request.cookies.get(self._rules.cookie, ""))
         return Role.OPERATOR if role is None and access.operator is None else role
 
-    def _of_token(self, token: str, scope: Scope) -> Role | None:
+    def _of_token(self, token: str, request: HTTPConnection) -> Role | None:
         try:
-            return self._rules.access.of_token(token, (scope.get("client") or ("",))[0])
+            return self._rules.access.of_token(token, request.client.host if request.client else "")
         except TooManyTriesError:
             raise RefusedError(
                 HTTPStatus.TOO_MANY_REQUESTS, "too many wrong tokens came from there; wait a minute"
             ) from None
 
-    async def _let_in(self, token: str, scope: Scope, send: Send) -> None:
-        """Change a token in the link for a cookie, so that it stands in no history."""
-        role = self._of_token(token, scope)
+    def _let_in(self, token: str, request: HTTPConnection) -> Response:
+        """Exchange a token in the link for a cookie, so that no history keeps it."""
+        role = self._of_token(token, request)
         if role is None and self._rules.access.operator is not None:
-            raise RefusedError(HTTPStatus.UNAUTHORIZED, "this is not the token")
-        rest = [(name, value) for name, value in _query(scope) if name != "token"]
-        path = "/" + scope["path"].strip("/")  # two slashes would begin the name of another host
+            raise RefusedError(HTTPStatus.UNAUTHORIZED, WRONG)
+        path = "/" + request.scope["path"].strip("/")  # two slashes would begin the name of another host
         if CONTROL.search(path):
             raise RefusedError(HTTPStatus.BAD_REQUEST, NO_CONTROL)
         if normpath(path) != path or not self._has_page(path):  # browsers follow ".."
-            raise RefusedError(HTTPStatus.NOT_FOUND, "there is no such page")
+            raise RefusedError(HTTPStatus.NOT_FOUND, NO_PAGE)
+        rest = [(name, value) for name, value in request.query_params.multi_items() if name != "token"]
         where = quote(path) + (f"?{urlencode(rest)}" if rest else "")
-        headers = {**HEADERS, "location": where, "cache-control": "no-store"}
+        answer = RedirectResponse(where, HTTPStatus.SEE_OTHER, {**HEADERS, "cache-control": "no-store"})
+        answer.headers["location"] = where
         if role is not None:
-            cookie = f"{self._rules.cookie}={self._rules.access.cookie(role)}"
-            headers["set-cookie"] = f"{cookie}; Path=/; HttpOnly; SameSite=Strict"
-        await _answer(send, HTTPStatus.SEE_OTHER, headers)
+            value = self._rules.access.cookie(role)
+            answer.set_cookie(self._rules.cookie, value, httponly=True, samesite="strict")
+        return answer
 
 
-def _host(scope: Scope) -> str:
-    """The name by which we are called."""
-    told = [value.decode("latin-1").lower() for name, value in scope["headers"] if name.lower() == b"host"]
-    found = HOST.fullmatch(told[0]) if len(told) == 1 else None
+def _host(request: HTTPConnection) -> str:
+    """The name by which the page was called."""
+    named = [host.lower() for host in request.headers.getlist("host")]
+    found = HOST.fullmatch(named[0]) if len(named) == 1 else None
     if found is None or not 0 < int(found[3] or 80) <= MOST_PORT:
-        raise RefusedError(
-            HTTPStatus.BAD_REQUEST, "the header Host must stand there once, with a name and a port"
-        )
+        raise RefusedError(HTTPStatus.BAD_REQUEST, "send the header Host once, with a name and a port")
     return found[1] or found[2]
 
 
@@ -218,139 +177,97 @@ def _is_address(name: str) -> bool:
     return True
 
 
+def _check_origin(request: HTTPConnection) -> None:
+    """Refuse foreign pages, which may neither change anything nor listen."""
+    headers, is_socket = request.headers, request.scope["type"] == "websocket"
+    origin = headers.get("origin")
+    if origin is not None and not _is_same(origin, headers.get("host", ""), request.scope):
+        raise RefusedError(HTTPStatus.FORBIDDEN, OTHER_SITE)
+    changes = is_socket or request.scope["method"] not in CHANGES_NOTHING
+    from_browser = "cookie" in headers or is_socket
+    if changes and origin is None and from_browser and "authorization" not in headers:
+        raise RefusedError(HTTPStatus.FORBIDDEN, "a browser must send the header Origin")
+    navigates = headers.get("sec-fetch-mode") == "navigate"
+    if headers.get("sec-fetch-site") in {"cross-site", "same-site"} and not navigates:
+        raise RefusedError(HTTPStatus.FORBIDDEN, OTHER_SITE)
+
+
 def _is_same(origin: str, host: str, scope: Scope) -> bool:
     secure = scope["scheme"] in {"https", "wss"}
     return origin.lower() == f"http{'s' if secure else ''}://{host.lower()}"
 
 
-def _query(scope: Scope) -> list[tuple[str, str]]:
-    return parse_qsl(scope.get("query_string", b"").decode("latin-1"), keep_blank_values=True)
-
-
-def _given_token(scope: Scope) -> str | None:
-    """The token in the link, for pages only."""
-    if scope["path"].startswith(("/api/", "/_nicegui")):
+def _token_in_link(request: HTTPConnection) -> str | None:
+    """The token in the link of a page."""
+    if request.scope["path"].startswith(("/api/", "/_nicegui")):
         return None
-    return next((value for name, value in _query(scope) if name == "token"), None)
+    return request.query_params.get("token")
 
 
-def _cookie(headers: Headers, name: str) -> str:
-    try:
-        found = SimpleCookie(headers.get("cookie", "")).get(name)
-    except CookieError:
-        return ""
-    return "" if found is None else found.value
-
-
-def _expect_allowed(role: Role | None, path: str) -> None:
+def _check_role(role: Role | None, path: str) -> None:
     if role is None:
         raise RefusedError(
-            HTTPStatus.UNAUTHORIZED, "open the link that codebotler serve printed; it has the token"
+            HTTPStatus.UNAUTHORIZED, "open the link that was printed at the start; it holds the token"
         )
     if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in FOR_FACES):
-        raise RefusedError(HTTPStatus.FORBIDDEN, "this link is for the robot's face; it opens nothing else")
+        raise RefusedError(HTTPStatus.FORBIDDEN, "this link opens the robot's face and nothing else")
 
 
-TOO_LARGE = f"at most {MOST_BYTES:,} bytes are taken"
-
-
-def _expect_small(headers: Headers) -> None:
-    told = headers.get("content-length", "0")
-    if not told.isascii() or not told.isdigit() or int(told) > MOST_BYTES:
+def _check_length(request: HTTPConnection) -> None:
+    length = request.headers.get("content-length", "0")
+    if not length.isascii() or not length.isdigit() or int(length) > MOST_BYTES:
         raise RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, TOO_LARGE)
 
 
-class _Body:
-    """A request's body, up to what is taken; who does not tell its length is cut off there, and told why."""
+class _LimitedBody:
+    """Cuts off a request whose body is too large, and adds the headers that browsers obey to the answer."""
 
-    def __init__(self, receive: Receive) -> None:
-        self._receive = receive
-        self._taken = 0
+    def __init__(self, receive: Receive, send: Send) -> None:
+        self._receive, self._send = receive, send
+        self._length = 0
+        self._nonce = secrets.token_urlsafe(16)
+        self._is_page = self._is_refused = False
+
+    async def run(self, app: ASGIApp, scope: Scope) -> None:
+        self._scope = scope
+        await app(scope, self.receive, self.send)
 
     async def receive(self) -> Message:
-        """The next piece."""
         message = await self._receive()
-        self._taken += len(message.get("body", b""))
-        return {"type": "http.disconnect"} if self._taken > MOST_BYTES else message
+        self._length += len(message.get("body", b""))
+        return {"type": "http.disconnect"} if self._length > MOST_BYTES else message
 
-    def unless_too_large(self, send: Send) -> Send:
-        """Send what is answered; but that it was too much, where what is behind knows only that it ended."""
-        is_told = False
-
-        async def instead(message: Message) -> None:
-            nonlocal is_told
-            if is_told:
-                return
-            if self._taken > MOST_BYTES and message["type"] == "http.response.start":
-                is_told = True
-                body = json.dumps({"detail": TOO_LARGE}).encode()
-                kind = {
-                    "content-type": "application/json",
-                    "cache-control": "no-store",
-                    "connection": "close",
-                }
-                await _answer(send, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, kind, body)
-                return
-            await send(message)
-
-        return instead
-
-
-def _with_headers(send: Send) -> Send:
-    """Add what browsers are to obey; a page's own scripts get the nonce."""
-    nonce = secrets.token_urlsafe(16)
-    is_page = False
-
-    async def with_headers(message: Message) -> None:
-        nonlocal is_page
+    async def send(self, message: Message) -> None:
+        if self._is_refused:
+            return
         if message["type"] == "http.response.start":
-            kept = list(message["headers"])
-            is_page = any(
-                name.lower() == b"content-type" and value.startswith(b"text/html") for name, value in kept
-            )
-            if is_page:
-                kept = [(name, value) for name, value in kept if name.lower() != b"content-length"]
-            ours = {**HEADERS, "content-security-policy": POLICY.format(nonce=nonce)}
-            message = {**message, "headers": [*kept, *_raw(ours)]}
-        elif is_page and message["type"] == "http.response.body":
-            mark = f'<script nonce="{nonce}"'.encode()
-            message = {**message, "body": SCRIPT.sub(mark, message.get("body", b""))}
-        await send(message)
-
-    return with_headers
-
-
-def _raw(headers: Mapping[str, str]) -> Iterable[tuple[bytes, bytes]]:
-    return [(name.encode(), value.encode()) for name, value in headers.items()]
-
-
-async def _answer(send: Send, status: HTTPStatus, headers: Mapping[str, str], body: bytes = b"") -> None:
-    start: dict[str, Any] = {"type": "http.response.start", "status": status.value}
-    length = {"content-length": str(len(body))}
-    await send({**start, "headers": list(_raw({**headers, **length}))})
-    await send({"type": "http.response.body", "body": body})
+            if self._length > MOST_BYTES:
+                self._is_refused = True
+                error = RefusedError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, TOO_LARGE)
+                answer = _refusal(HTTPConnection(self._scope), error)
+                answer.headers["connection"] = "close"  # the rest of the body is not read
+                await answer(self._scope, self._receive, self._send)
+                return
+            headers = MutableHeaders(raw=list(message["headers"]))
+            self._is_page = headers.get("content-type", "").startswith("text/html")
+            if self._is_page:
+                del headers["content-length"]
+            for name, value in HEADERS.items():
+                headers[name] = value
+            headers.append("content-security-policy", POLICY.format(nonce=self._nonce))
+            message = {**message, "headers": headers.raw}
+        elif self._is_page and message["type"] == "http.response.body":
+            marked = SCRIPT.sub(f'<script nonce="{self._nonce}"'.encode(), message.get("body", b""))
+            message = {**message, "body": marked}
+        await self._send(message)
 
 
-REFUSAL = """<!doctype html><html lang="en"><meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1"><title>CodeBotler</title>
-<style>body{{font:18px/1.5 system-ui,sans-serif;color-scheme:light dark;max-width:34rem;margin:20vh auto;
-padding:0 1.5rem}}h1{{font-size:1.4rem}}</style><h1>CodeBotler</h1><p>{sentence}</p></html>"""
-
-
-async def _refuse(scope: Scope, headers: Headers, error: RefusedError, receive: Receive, send: Send) -> None:
-    if scope["type"] == "websocket":
-        await receive()
-        await send({"type": "websocket.close", "code": 1008, "reason": error.sentence[:100]})
-        return
-    wants_page = "text/html" in headers.get("accept", "")
-    if wants_page:
-        body, kind = REFUSAL.format(sentence=error.sentence).encode(), "text/html; charset=utf-8"
-    else:
-        body, kind = json.dumps({"detail": error.sentence}).encode(), "application/json"
-    plain = "default-src 'none'; style-src 'unsafe-inline'; frame-ancestors 'none'"
-    answer = {**HEADERS, "content-type": kind, "content-security-policy": plain, "cache-control": "no-store"}
+def _refusal(request: HTTPConnection, error: RefusedError) -> Response:
+    headers = {**HEADERS, "content-security-policy": PLAIN_POLICY, "cache-control": "no-store"}
     if error.status is HTTPStatus.UNAUTHORIZED:
-        answer["www-authenticate"] = "Bearer"
+        headers["www-authenticate"] = "Bearer"
     if error.status is HTTPStatus.TOO_MANY_REQUESTS:
-        answer["retry-after"] = "60"
-    await _answer(send, error.status, answer, body)
+        headers["retry-after"] = "60"
+    if "text/html" in request.headers.get("accept", ""):
+        return HTMLResponse(REFUSAL.format(sentence=error.sentence), error.status, headers)
+    return JSONResponse({"detail": error.sentence}, error.status, headers)

@@ -138,8 +138,8 @@ def serve(
     They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
     """
     from codebotler.core.errors import UserError
-    from codebotler.web.place import entrance
-    from codebotler.web.serving import serve as serve_page
+    from codebotler.web.access import entrance
+    from codebotler.web.server import serve as serve_page
     from roboeval.web.pages import pages
     from roboeval.web.run_store import RunStore
 

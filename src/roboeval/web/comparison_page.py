@@ -10,7 +10,7 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import Words
+from codebotler.web.elements import PlainText
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data
@@ -24,13 +24,13 @@ NOT_ALIKE = "These runs were judged by different suites or versions of a suite. 
 
 async def draw_comparison(store: RunStore, names: Sequence[str]) -> None:
     """Draw the runs of these names."""
-    Words("h1", "Runs side by side")
+    PlainText("h1", "Runs side by side")
     if not names:
-        Words("p", "Tick runs in the list, then show them side by side.", "quiet")
+        PlainText("p", "Tick runs in the list, then show them side by side.", "quiet")
         html.a("All runs", href="/runs")
         return
     if len(names) > MOST:
-        Words("p", f"These are the first {MOST} of {len(names):,} runs.", "quiet")
+        PlainText("p", f"These are the first {MOST} of {len(names):,} runs.", "quiet")
     comparison = _Comparison(store, names[:MOST])
     await comparison.refresh()
     ui.timer(EVERY, comparison.refresh, immediate=False)
@@ -45,14 +45,14 @@ class _Comparison:
         self._troubles = ui.element("div").props("role=status")
         self._list = ui.element("ul").classes("beside-list")
         with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
-            Words("h2", "Where they pass").props("id=h-heat")
+            PlainText("h2", "Where they pass").props("id=h-heat")
             self._tasks = HeatMap("Tasks by prompts, run by run", "Task")
             text = "Percent of the completions of each prompt; the first column of a run is their mean."
-            Words("p", text, "quiet")
+            PlainText("p", text, "quiet")
         with ui.element("section").classes("pane causes").props("aria-labelledby=h-kinds"):
-            Words("h2", "Why they fail").props("id=h-kinds")
+            PlainText("h2", "Why they fail").props("id=h-kinds")
             self._kinds = HeatMap("Kinds of failures by run", "Kind of failure")
-            Words("p", "Percent of all completions of a run.", "quiet")
+            PlainText("p", "Percent of all completions of a run.", "quiet")
 
     async def refresh(self) -> None:
         """Show the runs as they are now."""
@@ -77,7 +77,7 @@ class _Comparison:
         self._troubles.clear()
         with self._troubles:
             for sentence in troubles:
-                Words("p", sentence, "trouble")
+                PlainText("p", sentence, "trouble")
         self._list.clear()
         with self._list:
             for run in runs:
@@ -103,6 +103,6 @@ def _draw_run(run: Snapshot) -> None:
     data = run_data(run)
     with ui.element("li"):
         html.a(shortened(run.name, MOST_NAME), href=address(run.name)).props("dir=auto")
-        show_state(data, Words("small"))
-        Words("b", score_text(data))
-        Words("span", f"{count_text(data)} completions, {models_of(run)}", "quiet")
+        show_state(data, PlainText("small"))
+        PlainText("b", score_text(data))
+        PlainText("span", f"{count_text(data)} completions, {models_of(run)}", "quiet")

@@ -13,10 +13,9 @@ from codebotler.checking.storyboard import step_text
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.core.world import World
-from codebotler.web.elements import Words
+from codebotler.web.elements import PlainText
 from codebotler.web.floorplan import floorplan
-from codebotler.web.sceneview import draw_scene
-from codebotler.web.strip import scenes
+from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED, cut_told
 from roboeval.evaluation.failures import label_of
@@ -70,45 +69,45 @@ def _draw_head(run: Snapshot, data: Mapping[str, Any], chosen: Filter, query: st
                 task, prompt, index = other
                 href = f"{address(run.name)}/{quote(task, safe='')}/{prompt}/{index}{query}"
                 html.a(text, href=href).classes("beside")
-    Words("h1", shortened(name_of(key), MOST_NAME))
+    PlainText("h1", shortened(name_of(key), MOST_NAME))
     with ui.element("p").classes("facts"):
         why, state = data["failure"], {None: "waits", True: "done", False: "failed"}[data["passed"]]
         verdict = "not judged yet" if data["passed"] is None else "passed"
         if why is not None:
             verdict = shortened(f"{label_of(why['class'])}: {why['kind']}")
-        Words("small", verdict, f"state state-{state}")
+        PlainText("small", verdict, f"state state-{state}")
         if data["model"] is not None:
-            Words("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
+            PlainText("span", f"written by {shortened(data['model'], 200)}{by_hand([data['model']])}")
     if data["stale"]:
-        Words("p", CHANGED, "trouble")
+        PlainText("p", CHANGED, "trouble")
     instruction = data["instruction"]
     text = NOT_RECORDED if instruction is None else shortened(instruction, MOST_INSTRUCTION)
-    Words("p", text, "instruction")
+    PlainText("p", text, "instruction")
 
 
 def _draw_program(data: Mapping[str, Any]) -> None:
     with ui.element("section").classes("pane").props("aria-labelledby=h-program"):
-        Words("h2", "Program").props("id=h-program")
+        PlainText("h2", "Program").props("id=h-program")
         if data["program"] is None:
-            Words("p", "It is no longer in this run.", "quiet")
+            PlainText("p", "It is no longer in this run.", "quiet")
             return
         lines = (world["line"] for world in data["worlds"] if not world["satisfied"])
         view = ProgramView(data["program"], (line for line in lines if line is not None))
         if view.left_out:
-            Words("p", f"{view.left_out:,} more lines; all are in completions.jsonl.", "quiet")
+            PlainText("p", f"{view.left_out:,} more lines; all are in completions.jsonl.", "quiet")
 
 
 def _draw_worlds(judged: Sequence[Mapping[str, Any]], worlds: Mapping[str, World]) -> None:
     with ui.element("div").classes("worlds-of"):
         if not judged:
-            Words("p", "It has not been judged yet.", "quiet")
+            PlainText("p", "It has not been judged yet.", "quiet")
         for number, data in enumerate(judged, 1):
             with ui.element("article").classes("pane world-of").props(f"aria-labelledby=h-world-{number}"):
                 with ui.element("div").classes("head"):
                     title = f"World {number} of {len(judged)}: {shortened(data['world'], 300)}"
-                    Words("h2", title).props(f"id=h-world-{number}")
+                    PlainText("h2", title).props(f"id=h-world-{number}")
                     state = ("satisfied", "done") if data["satisfied"] else ("not satisfied", "failed")
-                    Words("small", state[0], f"state state-{state[1]}")
+                    PlainText("small", state[0], f"state state-{state[1]}")
                 _draw_world(data, worlds.get(data["world"]))
 
 
@@ -116,18 +115,18 @@ def _draw_world(data: Mapping[str, Any], world: World | None) -> None:
     steps, cut = data["steps"], data.get("cut")
     wrong = {check["step"] for check in data["failed_checks"]} - {None}
     if data["error"] is not None:
-        Words("p", _error_text(data), "quiet" if data["satisfied"] else "trouble")
+        PlainText("p", _error_text(data), "quiet" if data["satisfied"] else "trouble")
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
             _draw_check(check)
     if not steps and cut is None:
-        Words("p", "The robot did nothing.", "quiet")
+        PlainText("p", "The robot did nothing.", "quiet")
     elif steps and "place" in steps[0]:
         with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
             for scene in scenes(steps, steps[0]["place"], wrong):
                 draw_scene(scene, wrong)
     if cut is not None:
-        Words("p", f"{cut_told(cut)}.", "quiet")
+        PlainText("p", f"{cut_told(cut)}.", "quiet")
     if steps:
         kept = "Every step" if cut is None else "Every step that was kept"
         _draw_folded(f"{kept}, {len(steps):,} in all", lambda: _draw_steps(steps))
@@ -143,17 +142,17 @@ def _error_text(data: Mapping[str, Any]) -> str:
 
 def _draw_check(check: Mapping[str, Any]) -> None:
     with ui.element("li").classes("failed-check"):
-        Words("code", shortened(check["check"]))
+        PlainText("code", shortened(check["check"]))
         if check["explanation"] is not None:
-            Words("span", shortened(check["explanation"], MOST_SENTENCE))
+            PlainText("span", shortened(check["explanation"], MOST_SENTENCE))
         if check["step"] is not None:
-            Words("small", f"step {check['step']}", "quiet")
+            PlainText("small", f"step {check['step']}", "quiet")
 
 
 def _draw_folded(title: str, draw: Callable[[], None]) -> None:
     """Something that is drawn when it is unfolded for the first time."""
     with html.details() as details:
-        Words("summary", title)
+        PlainText("summary", title)
         inside = ui.element("div").classes("unfolded")
 
     def unfold() -> None:
@@ -166,7 +165,7 @@ def _draw_folded(title: str, draw: Callable[[], None]) -> None:
 
 def _draw_steps(steps: Sequence[Mapping[str, Any]]) -> None:
     lines = (f"{step['step']:>4}  {step_text(step).plain}" for step in steps)
-    Words("pre", "\n".join(lines), "source").props('tabindex=0 aria-label="Every step"')
+    PlainText("pre", "\n".join(lines), "source").props('tabindex=0 aria-label="Every step"')
 
 
 def _draw_rooms(world: World) -> None:
@@ -174,5 +173,5 @@ def _draw_rooms(world: World) -> None:
     with ui.element("dl").classes("rooms"):
         for room in world.rooms:
             inside = ", ".join([*map(describe_person, room.people), *room.objects])
-            Words("dt", shortened(room.name, 200))
-            Words("dd", shortened(inside, 500) if inside else "nobody and nothing")
+            PlainText("dt", shortened(room.name, 200))
+            PlainText("dd", shortened(inside, 500) if inside else "nobody and nothing")

@@ -11,8 +11,7 @@ from fastapi.responses import RedirectResponse
 from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
-from codebotler.web.frame import PATIENCE
-from codebotler.web.further import Pages, Site
+from codebotler.web.frame import PATIENCE, Pages, Site
 from roboeval.suites.load import Suite
 from roboeval.web.api import Chosen, Evaluation, router
 from roboeval.web.comparison_page import draw_comparison

@@ -10,7 +10,7 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import Press, Words
+from codebotler.web.elements import Button, PlainText
 from roboeval.evaluation.failures import plural_of
 from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models_of, percent
 from roboeval.web.run_store import RunGoneError, RunStore
@@ -37,23 +37,23 @@ class _RunPage:
         self._store, self._run, self._chosen, self._evaluation = store, run, chosen, evaluation
         self._changes = 0
         self._kinds: dict[Filter, _Kind] = {}
-        Words("h1", shortened(run.name, MOST_NAME))
-        self._trouble = Words("p", "", "trouble").props("role=alert")
+        PlainText("h1", shortened(run.name, MOST_NAME))
+        self._trouble = PlainText("p", "", "trouble").props("role=alert")
         self._trouble.say("")
         self._head = ui.element("div").classes("run-head")
         with ui.element("div").classes("findings"):
             with ui.element("section").classes("pane").props("aria-labelledby=h-heat"):
-                self._title = Words("h2", "").props("id=h-heat")
+                self._title = PlainText("h2", "").props("id=h-heat")
                 self._heat = HeatMap("Tasks by prompts", "Task", self._choose_cell)
                 text = "Percent of the completions of each prompt; the first column is their mean."
-                Words("p", text, "quiet")
+                PlainText("p", text, "quiet")
             with ui.element("section").classes("pane ends").props("aria-labelledby=h-kinds"):
-                Words("h2", "How they end").props("id=h-kinds")
+                PlainText("h2", "How they end").props("id=h-kinds")
                 self._ends = ui.element("div").classes("kinds")
             with ui.element("section").classes("pane list").props("id=completions aria-labelledby=h-list"):
                 with ui.element("div").classes("head"):
-                    self._which = Words("h2", "").props("id=h-list")
-                    self._all = Press("Show all", lambda: self._choose(Filter()), "plain small")
+                    self._which = PlainText("h2", "").props("id=h-list")
+                    self._all = Button("Show all", lambda: self._choose(Filter()), "plain small")
                 self._list = CompletionList()
         self._show()
 
@@ -121,10 +121,10 @@ class _Kind:
 
     def __init__(self, name: str, kind: Filter, choose: Callable[[Filter], None]) -> None:
         look = "kind" + " of-class" * (kind.kind is not None) + " bad-kind" * (kind.failure is not None)
-        with Press("", lambda: choose(kind), look) as self._button:
-            Words("span", shortened(name, MOST_NAME))
-            self._count = Words("b")
-            self._share = Words("small", "", "quiet")
+        with Button("", lambda: choose(kind), look) as self._button:
+            PlainText("span", shortened(name, MOST_NAME))
+            self._count = PlainText("b")
+            self._share = PlainText("small", "", "quiet")
 
     def show(self, count: int, of: int, *, is_here: bool) -> None:
         """Show how many there are, of how many, and whether it is chosen."""
@@ -137,15 +137,15 @@ class _Kind:
 def _draw_head(run: Snapshot) -> None:
     data, key = run_data(run), run.results.key
     with ui.element("p").classes("facts"):
-        state = Words("small")
-        Words("span", models_of(run) + (f", judged by {shortened(key, MOST_NAME)}" if key else ""))
-        Words("b", score_text(data))
-        Words("span", f"{count_text(data)} completions")
+        state = PlainText("small")
+        PlainText("span", models_of(run) + (f", judged by {shortened(key, MOST_NAME)}" if key else ""))
+        PlainText("b", score_text(data))
+        PlainText("span", f"{count_text(data)} completions")
     bar = html.progress(max="1").classes("long")
     show_state(data, state, bar)
     with ui.element("ul").classes("notes"):
         for sentence in data["notes"]:
-            Words("li", sentence, "unsure")
+            PlainText("li", sentence, "unsure")
     with ui.element("p").classes("facts"):
         for other in run.evaluations if len(run.evaluations) > 1 else ():
             link = html.a(shortened(other, MOST_NAME), href=address(run.name) + Filter().query(other))

@@ -12,7 +12,7 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.pasted import runnable
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import Press, Words
+from codebotler.web.elements import Button, PlainText
 from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import EVERY, count_text, show_state
@@ -33,8 +33,8 @@ MOST_NAME = 80
 
 async def draw_runs(folder: Path, runs: RunList) -> None:
     """Draw the runs in a folder."""
-    Words("h1", "Runs")
-    Words("p", f"In {shortened(str(await asyncio.to_thread(folder.resolve)), 200)}", "quiet")
+    PlainText("h1", "Runs")
+    PlainText("p", f"In {shortened(str(await asyncio.to_thread(folder.resolve)), 200)}", "quiet")
     table = _Table(runs)
     await table.refresh()
     ui.timer(EVERY, table.refresh, immediate=False)
@@ -49,18 +49,18 @@ class _Table:
         self._heads: dict[str, ui.element] = {}
         self._data: list[dict[str, Any]] = []
         self._rows: list[_Row] = []
-        self._trouble = Words("p", "", "trouble").props("role=alert")
+        self._trouble = PlainText("p", "", "trouble").props("role=alert")
         self._empty = ui.element("div").classes("first-run")
         with self._empty:
-            Words("p", NOTHING, "quiet")
-            Words("pre", f"{runnable('roboeval')} {FIRST}", "source").props("tabindex=0")
+            PlainText("p", NOTHING, "quiet")
+            PlainText("pre", f"{runnable('roboeval')} {FIRST}", "source").props("tabindex=0")
         self._form = ui.element("form").props("action=/side-by-side method=get")
         with self._form:
             region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Runs"')
             with region, html.table().classes("runs"):
                 with html.thead(), html.tr():
                     with html.th().props("scope=col").classes("tick"):
-                        Words("span", "Side by side", "unseen")
+                        PlainText("span", "Side by side", "unseen")
                     for name in COLUMNS:
                         self._draw_head(name)
                 self._body = html.tbody()
@@ -69,10 +69,10 @@ class _Table:
     def _draw_head(self, name: str) -> None:
         with html.th().props("scope=col") as head:
             if name in ORDERS:
-                Press(name, lambda: self._show(self._data, name), "sort")
+                Button(name, lambda: self._show(self._data, name), "sort")
                 self._heads[name] = head
             else:
-                Words("span", name)
+                PlainText("span", name)
 
     async def refresh(self) -> None:
         """Show the runs as they are now."""
@@ -110,19 +110,19 @@ class _Row:
                 box.props["aria-label"] = f"Show {shortened(name, MOST_NAME)} side by side with others"
             with html.th().props("scope=row"):
                 with html.a(href=address(name)):
-                    Words("b", shortened(name, MOST_NAME))
-                self._models = Words("span", "", "quiet")
-                self._notes = Words("span", "", "bad note")
+                    PlainText("b", shortened(name, MOST_NAME))
+                self._models = PlainText("span", "", "quiet")
+                self._notes = PlainText("span", "", "bad note")
             with html.td():
-                self._suite = Words("span")
+                self._suite = PlainText("span")
             with html.td():
-                self._state = Words("small")
+                self._state = PlainText("small")
                 self._bar = html.progress(max="1")
             with html.td().classes("count"):
-                self._count = Words("span")
+                self._count = PlainText("span")
             with html.td().classes("score"):
-                self._score = Words("b")
-                self._interval = Words("span", "", "quiet")
+                self._score = PlainText("b")
+                self._interval = PlainText("span", "", "quiet")
                 self._meter = ui.element("span").classes("meter").props("aria-hidden=true")
 
     def show(self, run: Mapping[str, Any]) -> None:

@@ -14,7 +14,7 @@ from nicegui.element import Element
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import Words
+from codebotler.web.elements import PlainText
 from codebotler.web.frame import Frame
 from roboeval.web.heat_map import NONE
 from roboeval.web.serializers import State
@@ -33,7 +33,7 @@ def page_of(frame: Frame, title: str) -> Iterator[None]:
         try:
             yield
         except UserError as error:
-            Words("p", error.sentence, "trouble").props("role=alert")
+            PlainText("p", error.sentence, "trouble").props("role=alert")
             html.a("All runs", href="/runs")
 
 
@@ -83,7 +83,7 @@ class ProgramView(Element, component="static/code.js"):
 # --- how a run is doing, from its data in short
 
 
-def show_state(data: Mapping[str, Any], label: Words, bar: Element | None = None) -> None:
+def show_state(data: Mapping[str, Any], label: PlainText, bar: Element | None = None) -> None:
     """Show how far a run has come on a label, and on a bar of its progress."""
     state = str(data["state"])
     label.say(state)

@@ -12,8 +12,7 @@ from codebotler.core.world import Room, World
 from codebotler.missions.progress import MOST, Moment, Progress, line_of
 from codebotler.simulator.sampled_robot import Fact, Reply, Whereabouts
 from codebotler.web.floorplan import MOST_ROOMS, floorplan
-from codebotler.web.strip import MOST_STRIPS, Deed, strips
-from codebotler.web.supposing import supposed
+from codebotler.web.storyboard import MOST_STRIPS, Deed, strips, supposed
 
 PROGRAM = """def task_program():
     for room in get_all_rooms():
@@ -169,7 +168,7 @@ def test_strips_say_what_their_worlds_are_like() -> None:
 def test_a_drive_to_nowhere_and_a_long_run_are_shown() -> None:
     (nowhere,) = strips(check("def task_program():\n    go_to('cellar')\n", rooms=["hall"]))
     assert (nowhere.scenes[-1].is_found, nowhere.ends_well) == (False, False)
-    assert nowhere.ending == 'Here it breaks off: there is no room "cellar" (GoToInvalidLocation)'
+    assert nowhere.ending == 'Fails: there is no room "cellar" (GoToInvalidLocation)'
     many = "def task_program():\n    for n in range(200):\n        say(str(n))\n"
     (long,) = strips(check(many, rooms=["hall"]))
     assert "182 more steps" in [deed.text for scene in long.scenes for deed in scene.deeds]

@@ -14,9 +14,8 @@ from starlette.types import Message, Receive, Scope, Send
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from codebotler.web.access import TRIES, WINDOW, Access, Role, TooManyTriesError
-from codebotler.web.guard import LOOPBACK, MOST_BYTES, Guard, Rules, _is_same
-from codebotler.web.place import Place
+from codebotler.web.access import LOOPBACK, TRIES, WINDOW, Access, GuardRules, Place, Role, TooManyTriesError
+from codebotler.web.guard import MOST_BYTES, Guard, _is_same
 from command_line import ENVIRONMENT
 from forked import Forked
 from pageserver import PageServer
@@ -62,7 +61,7 @@ def test_the_link_opens_the_page_and_leaves_no_token_in_it(server: PageServer) -
     assert (answer.status, answer.headers["location"]) == (303, "/missions?a=b")
     cookie = answer.headers["set-cookie"]
     assert server.token not in cookie
-    assert {"HttpOnly", "SameSite=Strict", "Path=/"} <= {part.strip() for part in cookie.split(";")}
+    assert {"httponly", "samesite=strict", "path=/"} <= {part.strip().lower() for part in cookie.split(";")}
     assert server.ask("GET", "/", cookie=cookie.partition(";")[0]).status == 200
     assert socket(server, cookie=cookie.partition(";")[0], origin=origin(server)) == 101
 
@@ -183,14 +182,14 @@ def test_a_token_is_made_for_each_start() -> None:
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (["--no-token", "--host", "0.0.0.0"], "only for this machine"),
-        (["--no-token", "--host", "::"], "only for this machine"),
-        (["--no-token", "--host", "0"], "only for this machine"),
-        (["--no-token", "--host", "127.example"], "only for this machine"),
-        (["--no-token", "--host", ""], "only for this machine"),
-        (["--no-token", "--token", "x" * 20], "only for this machine"),
-        (["--token", "short"], "can be guessed"),
-        (["--host", "999.1.1.1"], "nobody can listen"),
+        (["--no-token", "--host", "0.0.0.0"], "this machine only"),
+        (["--no-token", "--host", "::"], "this machine only"),
+        (["--no-token", "--host", "0"], "this machine only"),
+        (["--no-token", "--host", "127.example"], "this machine only"),
+        (["--no-token", "--host", ""], "this machine only"),
+        (["--no-token", "--token", "x" * 20], "this machine only"),
+        (["--token", "short"], "too short"),
+        (["--host", "999.1.1.1"], "cannot listen"),
     ],
 )
 def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told: str) -> None:
@@ -205,14 +204,14 @@ def test_careless_options_are_refused(tmp_path: Path, arguments: list[str], told
 def test_other_machines_need_the_token_and_that_is_said(tmp_path: Path) -> None:
     with PageServer(tmp_path, "--host", "0.0.0.0") as server:
         assert server.token
-        assert "other machines" in server.said
+        assert "Other machines" in server.said
         for path in ("/", "/api/robot", "/static/page.css"):
             assert server.ask("GET", path).status == 401
             assert server.ask("GET", path, host=f"192.0.2.7:{server.port}").status == 401
             assert server.ask("GET", path, host="evil.example").status == 421
         assert server.call("GET", "/api/robot").status == 200
     with PageServer(tmp_path) as server:
-        assert "other machines" not in server.said
+        assert "Other machines" not in server.said
 
 
 def test_without_a_token_this_machine_gets_in_but_no_other_page(tmp_path: Path) -> None:
@@ -402,9 +401,12 @@ def test_no_more_of_a_body_is_passed_on_than_is_taken() -> None:
         raise AssertionError(message)
 
     headers = [(b"host", b"localhost"), (b"authorization", b"Bearer an operator's")]
-    scope = {"type": "http", "method": "POST", "path": "/api/check", "scheme": "http", "headers": headers}
+    scope = {"type": "http", "method": "POST", "path": "/api/check", "query_string": b"", "scheme": "http"}
+    scope["headers"] = headers
     asyncio.run(
-        Guard(behind, Rules(Access("an operator's", "a face's")), set().__contains__)(scope, receive, send)
+        Guard(behind, GuardRules(Access("an operator's", "a face's")), set().__contains__)(
+            scope, receive, send
+        )
     )
     assert [message["type"] for message in passed] == ["http.request", "http.request", "http.disconnect"]
 
@@ -443,8 +445,9 @@ def passed(path: str, token: str, hosts: Sequence[str] = ("localhost",)) -> int:
 
     named = [(b"host", host.encode("latin-1")) for host in hosts]
     headers = [*named, (b"authorization", f"Bearer {token}".encode())]
-    scope = {"type": "http", "method": "POST", "path": path, "scheme": "http", "headers": headers}
-    rules = Rules(Access("an operator's", "a face's"), LOOPBACK | {"robot.local"})
+    scope = {"type": "http", "method": "POST", "path": path, "query_string": b"", "scheme": "http"}
+    scope["headers"] = headers
+    rules = GuardRules(Access("an operator's", "a face's"), LOOPBACK | {"robot.local"})
     guard = Guard(behind, rules, set().__contains__)
     asyncio.run(guard(scope, receive, send))
     return int(sent[0]["status"])

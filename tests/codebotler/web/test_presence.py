@@ -9,7 +9,7 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from codebotler.web.access import Role
-from codebotler.web.presence import SOCKETS, Presence
+from codebotler.web.server import SOCKETS, Presence
 
 PAGE = f"{SOCKETS}socket.io/"
 SECONDS = 10.0

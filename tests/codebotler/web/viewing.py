@@ -21,7 +21,7 @@ ONLY_FAULTS = {"resultTypes": ["violations"]}  # the rest would take as long aga
 Screen: TypeAlias = tuple[str, tuple[int, int], bool]
 SCREENS: list[Screen] = [
     (f"{name}-{'dark' if dark else 'light'}", size, dark)
-    for name, size in (("console", DESK), ("tablet", TABLET), ("phone", PHONE))
+    for name, size in (("desk", DESK), ("tablet", TABLET), ("phone", PHONE))
     for dark in (False, True)
 ]
 

@@ -17,8 +17,8 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from codebotler.core.files import to_line
-from codebotler.web.access import Access
-from codebotler.web.guard import Guard, Rules
+from codebotler.web.access import Access, GuardRules
+from codebotler.web.guard import Guard
 from command_line import refused, roboeval
 from pageserver import PageServer
 from roboeval.evaluation.runs.folder import Run
@@ -243,9 +243,16 @@ def test_a_face_cannot_see_runs(path: str) -> None:
     def status(token: str) -> int:
         sent.clear()
         headers = [(b"host", b"localhost"), (b"authorization", f"Bearer {token}".encode())]
-        scope = {"type": "http", "method": "GET", "path": path, "scheme": "http", "headers": headers}
+        scope = {
+            "type": "http",
+            "method": "GET",
+            "path": path,
+            "query_string": b"",
+            "scheme": "http",
+            "headers": headers,
+        }
         asyncio.run(
-            Guard(behind, Rules(Access("an operator's", "a face's")), set().__contains__)(
+            Guard(behind, GuardRules(Access("an operator's", "a face's")), set().__contains__)(
                 scope, receive, send
             )
         )

@@ -1,4 +1,4 @@
-"""The first pane: what somebody asks for, in plain words."""
+"""The instruction pane: what the robot is to do, and which model writes the program."""
 
 from __future__ import annotations
 
@@ -18,29 +18,25 @@ from codebotler.missions.store import missions
 from codebotler.models.recorded import recorded_model
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
-from codebotler.web.elements import Press, Words, scroll_up, warn
+from codebotler.web.elements import Button, PlainText, scroll_up, warn
 
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 RECORDED = "recorded"
 ABOUT_RECORDED = (
-    "A recorded model is no model: people wrote these programs for known instructions, so that all can be "
-    "tried without a key. It knows only such instructions as the examples."
+    "These programs were written by people and recorded, so that you can try everything without an API key. "
+    "They cover known instructions only, such as the examples below."
 )
 
 
-class Instruct:
-    """Takes an instruction and says who is to write the program.
-
-    Args:
-        console: on which it is put.
-    """
+class InstructionPane:
+    """Takes an instruction and the choice of a model."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
         self._number = -1
         self._asked = ""
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
-            Words("h2", "Instruct").props("id=h-instruct")
+            PlainText("h2", "Instruct").props("id=h-instruct")
             self._text = (
                 ui.textarea("What is the robot to do?")
                 .props('outlined autogrow input-class="words" maxlength=200000 dir=auto')
@@ -49,19 +45,19 @@ class Instruct:
             self._model = ui.select(
                 {name: visible(name) for name in console.models},
                 value=console.models[0],
-                label="Who writes the program",
+                label="Model",
             )
             self._model.props("outlined dense").on_value_change(self._about_model)
-            self._about = Words("p", ABOUT_RECORDED, "quiet")
-            self._write = Press("Write the program", self._ask, "primary")
-            self._trouble = Words("p", "", "trouble").props("role=alert")
+            self._about = PlainText("p", ABOUT_RECORDED, "quiet")
+            self._write = Button("Write the program", self._ask, "primary")
+            self._trouble = PlainText("p", "", "trouble").props("role=alert")
             self._examples = ui.element("div").classes("picks")
             self._before = ui.element("div").classes("picks")
         self._about_model()
         self._trouble.say("")
 
     async def load(self) -> None:
-        """Fill in what has to be read first: examples, and what was asked for before."""
+        """Add the examples and the recent instructions, which are read from files."""
         examples = await asyncio.to_thread(_examples, self._console)
         before = await asyncio.to_thread(_before, self._console)
         if self._examples.is_deleted:  # the page was closed meanwhile
@@ -69,15 +65,13 @@ class Instruct:
         if examples:
             self._fill(self._examples, "Examples", [(text, "") for text in examples])
         if before:
-            self._fill(
-                self._before, "Asked before", [(summary.instruction, summary.state) for summary in before]
-            )
+            self._fill(self._before, "Recent", [(summary.instruction, summary.state) for summary in before])
 
     def show(self, view: SessionView) -> None:
-        """Show what is at hand."""
+        """Show a view."""
         if view.number != self._number:
             self._number = view.number
-            if (self._text.value or "").strip() in {"", self._asked}:  # nobody is writing another one here
+            if (self._text.value or "").strip() in {"", self._asked}:  # nobody is typing another one here
                 self._text.value = visible_lines(view.order.instruction)
             self._asked = visible_lines(view.order.instruction)
         self._write.allow(not view.is_written and not view.is_running)
@@ -98,12 +92,12 @@ class Instruct:
     def _fill(self, where: ui.element, title: str, texts: list[tuple[str, str]]) -> None:
         where.clear()
         with where:
-            Words("h3", title)
+            PlainText("h3", title)
             for text, state in texts:
                 with html.button(type="button").classes("pick").on("click", lambda t=text: self._take(t)):
-                    Words("span", shortened(text, MOST_TEXT))
+                    PlainText("span", shortened(text, MOST_TEXT))
                     if state:
-                        Words("small", state, f"state state-{state}")
+                        PlainText("small", state, f"state state-{state}")
 
     def _take(self, text: str) -> None:
         self._text.value = visible_lines(text)

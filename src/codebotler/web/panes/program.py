@@ -1,4 +1,4 @@
-"""The second pane: the program, what is wrong with it, and what the robot would do."""
+"""The program pane: the editor, the problems, what the robot would do, and the approval."""
 
 from __future__ import annotations
 
@@ -18,9 +18,8 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError, State
 from codebotler.missions.session import SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
-from codebotler.web.elements import Press, Words, scroll_up, warn
-from codebotler.web.sceneview import draw_scene
-from codebotler.web.strip import Strip, strips
+from codebotler.web.elements import Button, PlainText, scroll_up, warn
+from codebotler.web.storyboard import draw_strips
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")
 MOST_MARKS, MOST_ESCAPES = 400, 2_000
@@ -29,11 +28,7 @@ SCRIPT = '<script src="/static/editor.js"></script>'
 
 
 class ProgramPane:
-    """Shows the program of the mission at hand, takes another one, and somebody's word for it.
-
-    Args:
-        console: on which it lies.
-    """
+    """Shows the program of the mission at hand; takes edits and the approval."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -44,43 +39,43 @@ class ProgramPane:
         ui.on("program-typed", self._typed)
         with ui.element("section").classes("pane program").props("aria-labelledby=h-program"):
             with ui.element("div").classes("head"):
-                Words("h2", "Program").props("id=h-program")
-                self._busy = Words("span", "", "busy").props("role=status")
-            self._writer = Words("p", "", "quiet")
+                PlainText("h2", "Program").props("id=h-program")
+                self._busy = PlainText("span", "", "busy").props("role=status")
+            self._writer = PlainText("p", "", "quiet")
             # Its own properties stay as they are: each update of one would bring its text along, over what
             # is being typed. The script sets what changes.
             self._editor = ui.codemirror("", language="Python", line_wrapping=True).classes("editor")
             self._editor.on("update:value", js_handler="() => programEditor.typed()")
-            self._verdict = Words("p", "", "verdict").props("role=status")
+            self._verdict = PlainText("p", "", "verdict").props("role=status")
             self._problems = ui.element("ul").classes("problems")
-            self._word = ui.element("div").classes("word")
-            with self._word:
+            self._approval = ui.element("div").classes("word")
+            with self._approval:
                 self._despite = ui.checkbox("Run it despite the problems", on_change=self._ticked)
-                self._run = Press("Run it on the robot", self._approve, "go")
-                self._repair = Press("Have it mended", lambda: self._again(repair=True), "plain")
-                self._again_button = Press("Ask again", lambda: self._again(repair=False), "plain")
+                self._run = Button("Run it on the robot", self._approve, "go")
+                self._repair = Button("Repair", lambda: self._again(repair=True), "plain")
+                self._again_button = Button("Ask again", lambda: self._again(repair=False), "plain")
             self._board = ui.element("div").classes("storyboard")
         self._view = console.view
         ui.run_javascript(f"programEditor.start({self._editor.id})")
 
     def show(self, view: SessionView) -> None:
-        """Show the program that is at hand."""
+        """Show a view."""
         self._view = view
         shown = _for_editor(view.program)
         self._tell(view, shown)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
         author = view.author
-        what = "Recorded: people wrote this." if author.startswith("recorded") else f"Written by {author}."
+        what = "Recorded: written by people." if author.startswith("recorded") else f"Written by {author}."
         self._writer.say(what if author and view.program else "")
         self._show_verdict(view)
-        self._show_word(view)
+        self._show_approval(view)
         drawn = (view.check, view.problems, view.unknown_rooms, shown)
         if drawn != self._drawn:
             self._drawn = drawn
             self._draw(view)
 
     def _tell(self, view: SessionView, shown: str, *, anyway: bool = False) -> None:
-        """Have the browser show a program and its marks; it does not where something newer is typed there."""
+        """Send the browser a program and its marks; it keeps what was typed there meanwhile."""
         told: dict[str, object] = {
             "program": shown,
             "marks": [*_skills(shown), *_escapes(shown), *_marks(view.check, shown)],
@@ -93,24 +88,24 @@ class ProgramPane:
             ui.run_javascript(f"programEditor.show({json.dumps(told)})")
 
     def _typed(self, event: GenericEventArguments) -> None:
-        """Have the console check what was typed, unless somebody else was quicker."""
+        """Have typed text checked, unless another person changed the program first."""
         typed, self._heard = event.args["text"], int(event.args["number"])
         current = _for_editor(self._console.view.program)
         if typed is None:
-            self._restore(f"A program has at most {MOST_PROGRAM:,} characters; this one was longer.")
+            self._restore(f"A program has at most {MOST_PROGRAM:,} characters.")
         elif event.args["base"] != current:
-            self._restore("Somebody else changed the program meanwhile; what you just typed is left out.")
+            self._restore("Another person changed the program meanwhile; your last edit was dropped.")
         elif typed != current:
             self._try(lambda: self._console.edit(typed))
         self.show(self._console.view)
 
     def _restore(self, why: str) -> None:
-        """Have the browser show what the console has, and say why."""
+        """Have the browser show the console's program, and say why."""
         view = self._console.view
         self._tell(view, _for_editor(view.program), anyway=True)
         warn(why, 10.0)
 
-    # --- somebody's word
+    # --- the approval
 
     def _show_verdict(self, view: SessionView) -> None:
         count = len(view.problems)
@@ -119,23 +114,21 @@ class ProgramPane:
             return
         many = f"{count} problems" if count > 1 else "1 problem"
         self._verdict.classes(add="bad" if count else "good", remove="good" if count else "bad")
-        told = f"{many}. The robot should not run this." if count else "The check found no problem."
+        told = f"{many}. The robot should not run this." if count else "Checked: no problems."
         if view.check.rooms_are_guessed:
-            told += " The robot does not tell its rooms; they were taken from the program."
+            told += " The robot does not list its rooms; they were taken from the program."
         self._verdict.say(told)
 
-    def _show_word(self, view: SessionView) -> None:
+    def _show_approval(self, view: SessionView) -> None:
         open_ = view.state in {State.DRAFTING, State.CHECKED} and not view.is_over and bool(view.program)
         may_again = view.may_be_approved and bool(view.order.model)
-        self._word.set_visibility(open_ or self._may_rerun(view))
+        self._approval.set_visibility(open_ or self._may_rerun(view))
         self._despite.set_visibility(open_ and bool(view.problems))
         if not view.problems:
             self._despite.value = False
         self._repair.set_visibility(may_again and bool(view.problems))
         self._again_button.set_visibility(may_again)
-        self._run.text = (
-            "Check it again, to run it once more" if self._may_rerun(view) else "Run it on the robot"
-        )
+        self._run.text = "Run again" if self._may_rerun(view) else "Run it on the robot"
         self._ticked()
 
     def _may_rerun(self, view: SessionView) -> bool:
@@ -161,14 +154,14 @@ class ProgramPane:
                 scroll_up()
 
     async def _is_seen(self, view: SessionView) -> bool:
-        """Whether this browser shows that very program; two people may type at the same time."""
+        """Whether this browser shows that very program: two people may type at the same time."""
         seen = await ui.run_javascript("programEditor.settle()", timeout=5.0)
         if seen["text"] == _for_editor(view.program):
             return True
         if seen["number"] > self._heard or seen["text"] == _for_editor(self._console.view.program):
-            ui.notify("What was just typed is checked first.", position="top")
+            ui.notify("Your last edit is checked first.", position="top")
         else:
-            self._restore("The program was changed meanwhile; look at it again.")
+            self._restore("The program has changed; look at it again.")
         return False
 
     def _again(self, *, repair: bool) -> None:
@@ -189,15 +182,15 @@ class ProgramPane:
         with self._problems:
             for sentence in (*view.problems, *view.unknown_rooms)[:MOST_PROBLEMS]:
                 kind = "problem" if sentence in view.problems else "unsure"
-                Words("li", shortened(sentence), kind)
+                PlainText("li", shortened(sentence), kind)
         self._board.clear()
         if view.check is not None:
             with self._board:
-                _draw_strips(strips(view.check))
+                draw_strips(view.check)
 
 
 def _for_editor(program: str) -> str:
-    """A program as an editor shows it: it knows one kind of line break, and JSON no half characters."""
+    """A program as the editor takes it: with one kind of line break, and no half characters."""
     return re.sub("\r\n?", "\n", program).encode(errors="replace").decode()
 
 
@@ -207,7 +200,7 @@ def _skills(program: str) -> list[dict[str, Any]]:
 
 
 def _escapes(program: str) -> list[dict[str, Any]]:
-    """What nobody sees, or what turns letters round: written out before it, and kept apart from the rest."""
+    """Characters that are invisible or change the direction of text, written out."""
     odd = ((at, one) for at, one in enumerate(program) if not (one.isprintable() or one in "\t\n"))
     marks: list[dict[str, Any]] = []
     for at, one in islice(odd, MOST_ESCAPES):
@@ -217,7 +210,7 @@ def _escapes(program: str) -> list[dict[str, Any]]:
 
 
 def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
-    """Problems at their lines: the line is coloured, and the words stand after it."""
+    """Problems at their lines: the line is coloured, and the message follows it."""
     if found is None:
         return []
     lines = program.split("\n")
@@ -230,15 +223,3 @@ def _marks(found: Check | None, program: str) -> list[dict[str, Any]]:
         words = f"  ◂ {shortened(problem.message, 160)}"
         marks.append({"kind": "widget", "position": end, "text": words, "class": "problem-words"})
     return marks
-
-
-def _draw_strips(shown: list[Strip]) -> None:
-    Words("h3", "What the robot would do" if shown else "")
-    for strip in shown:
-        with ui.element("article").classes("strip"):
-            if strip.world:
-                Words("p", f"{strip.world}:", "world")
-            with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
-                for scene in strip.scenes:
-                    draw_scene(scene)
-            Words("p", strip.ending, "ending good" if strip.ends_well else "ending bad")

@@ -1,38 +1,31 @@
-"""What the robot asks on its face just now, so that an operator sees it, and can answer as well."""
+"""The question that waits on the robot's face, which an operator can answer too."""
 
 from __future__ import annotations
 
 from nicegui import ui
 
 from codebotler.core.terminal import shortened
+from codebotler.core.words import counted
 from codebotler.robots.face import AnswerError, Face, Question
-from codebotler.web.elements import Press, Words, warn
+from codebotler.web.elements import Button, PlainText, warn
 
 MOST_OPTIONS, MOST_TEXT = 50, 200
 
 
-class Asking:
-    """Shows the question that waits for an answer, and whether anybody can see it.
-
-    Args:
-        face: on which it is asked.
-    """
+class QuestionPane:
+    """Shows the question, and whether any face is open."""
 
     def __init__(self, face: Face) -> None:
         self._face = face
         self._drawn: Question | None = None
-        self._screens = Words("p", "", "quiet")
+        self._screens = PlainText("p", "", "quiet")
         self._box = ui.element("div").classes("asking").props('role=group aria-label="What the robot asks"')
 
     def show(self, *, is_over: bool) -> None:
-        """Show it as it is now.
-
-        Args:
-            is_over: whether no mission is at hand.
-        """
+        """Show the face as it is now; without a mission at hand, nobody need open one."""
         screens = self._face.screens
-        shown = f"{screens} {'face shows' if screens == 1 else 'faces show'} what the robot says."
-        nobody = "" if is_over else "No face is open, so that nobody sees what the robot says and asks."
+        shown = f"The robot's face is open on {counted(screens, 'screen')}."
+        nobody = "" if is_over else "Open the robot's face so people can see what it says and asks."
         self._screens.say(shown if screens else nobody)
         self._screens.classes(add="" if screens else "unsure", remove="unsure" if screens else "")
         question = self._face.shown.question
@@ -45,12 +38,12 @@ class Asking:
                     self._draw(question)
 
     def _draw(self, question: Question) -> None:
-        Words("p", f"Waits for an answer by {shortened(question.person, MOST_TEXT)}:", "quiet")
-        Words("p", shortened(question.text), "question")
+        PlainText("p", f"Waiting for an answer from {shortened(question.person, MOST_TEXT)}:", "quiet")
+        PlainText("p", shortened(question.text), "question")
         with ui.element("div").classes("word"):
             for position, option in enumerate(question.options[:MOST_OPTIONS]):
-                words = shortened(option, MOST_TEXT).strip() or "(without words)"
-                Press(words, lambda at=position: self._answer(question, at), "plain")
+                words = shortened(option, MOST_TEXT).strip() or "(blank)"
+                Button(words, lambda at=position: self._answer(question, at), "plain")
 
     def _answer(self, question: Question, position: int) -> None:
         try:

@@ -1,4 +1,4 @@
-"""The third pane: what the robot does, where it is, and what it said and was told."""
+"""The status pane: what the robot does, where it is, what it said and heard."""
 
 from __future__ import annotations
 
@@ -9,32 +9,28 @@ from codebotler.missions.mission import State
 from codebotler.missions.progress import Moment
 from codebotler.missions.session import SessionView
 from codebotler.web.console import Console
-from codebotler.web.elements import Press, Words
+from codebotler.web.elements import Button, PlainText
 from codebotler.web.floorplan import floorplan
-from codebotler.web.panes.question import Asking
+from codebotler.web.panes.question import QuestionPane
 
 HEADLINES = {
-    None: "Nothing is asked for",
+    None: "No mission yet",
     State.DRAFTING: "The program is being written",
-    State.CHECKED: "Waits for your word",
-    State.APPROVED: "About to start",
+    State.CHECKED: "Ready: waiting for your approval",
+    State.APPROVED: "Starting",
     State.RUNNING: "Running",
     State.DONE: "Done",
     State.FAILED: "Failed",
-    State.STOPPING: "Told to stop; has not stopped yet",
+    State.STOPPING: "Stopping",
     State.STOPPED: "Stopped",
     State.INTERRUPTED: "Interrupted",
 }
-SPOKEN = {"says": "said", "asks": "asked", "hears": "was told"}
+SPOKEN = {"says": "said", "asks": "asked", "hears": "heard"}
 MOST_MOMENTS = 60
 
 
-class Status:
-    """Shows how far the mission at hand has come.
-
-    Args:
-        console: whose mission.
-    """
+class RobotPane:
+    """Shows how far the mission at hand has come."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -42,32 +38,32 @@ class Status:
         self._mapped: object = None
         with ui.element("section").classes("pane status").props("aria-labelledby=h-status"):
             with ui.element("div").classes("head"):
-                Words("h2", "Status").props("id=h-status")
-                Words("span", console.robot.name, "robot-name")
+                PlainText("h2", "Status").props("id=h-status")
+                PlainText("span", console.robot.name, "robot-name")
             self._gone = ui.element("div").classes("interrupted")
-            self._state = Words("p", "", "headline").props("role=status aria-live=polite")
-            self._doing = Words("p", "", "doing")
-            self._where = Words("p", "", "quiet")
-            self._asking = None if console.face is None else Asking(console.face)
-            self._reason = Words("p", "", "reason")
+            self._state = PlainText("p", "", "headline").props("role=status aria-live=polite")
+            self._doing = PlainText("p", "", "doing")
+            self._where = PlainText("p", "", "quiet")
+            self._asking = None if console.face is None else QuestionPane(console.face)
+            self._reason = PlainText("p", "", "reason")
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
         self._tell_interrupted()
 
     def show(self, view: SessionView) -> None:
-        """Show how far it has come."""
+        """Show a view."""
         progress = view.progress
         state = view.state
         headline = HEADLINES[state]
         if state is None and view.busy and not view.is_over:
-            headline = "About to begin"
+            headline = "Starting"
         self._state.say(headline)
         self._state.classes(replace=f"headline {state or 'none'}")
         doing = progress.doing
         self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
         where = [f"line {progress.line}"] if progress.line is not None else []
         where += (
-            [f"{progress.clock:.1f} s by the robot's clock"] if progress.moments and progress.clock else []
+            [f"{progress.clock:.1f} s on the robot's clock"] if progress.moments and progress.clock else []
         )
         self._where.say(" · ".join(where))
         self._reason.say(view.reason)
@@ -77,23 +73,23 @@ class Status:
         self._draw_moments(progress.moments)
 
     def _draw_map(self, view: SessionView) -> None:
-        progress, plan = view.progress, view.room_map
+        progress, room_map = view.progress, view.room_map
         world = self._console.world
-        if world is None and plan is not None:
-            world = World(tuple(map(Room, plan.rooms)), plan.start)
+        if world is None and room_map is not None:
+            world = World(tuple(map(Room, room_map.rooms)), room_map.start)
         if world is None:
             return
-        room = (plan.room(progress.room) if plan and progress.room else None) or world.robot
+        room = (room_map.room(progress.room) if room_map and progress.room else None) or world.robot
         at = progress.at
         if at is None:
             at = next((one.stand_at for one in laid_out(world).rooms if one.name == room), None)
-        what = (id(self._console.world), plan, at, room)
+        what = (id(self._console.world), room_map, at, room)
         if what != self._mapped:
             self._mapped = what
             self._map.set_content(floorplan(world, at, room))
 
     def _draw_moments(self, moments: tuple[Moment, ...]) -> None:
-        """Put what is new on top; all anew where it is another mission."""
+        """Put new moments on top; redraw all for another mission."""
         if moments == self._drawn:
             return
         known = len(self._drawn)
@@ -104,19 +100,19 @@ class Status:
         with self._log:
             for moment in moments[known:]:
                 with ui.element("li").classes(f"moment moment-{moment.kind}") as row:
-                    Words("time", f"{moment.clock:.1f} s")
+                    PlainText("time", f"{moment.clock:.1f} s")
                     if moment.kind in SPOKEN:
-                        Words("small", SPOKEN[moment.kind])
-                    Words("span", moment.text, "text")
+                        PlainText("small", SPOKEN[moment.kind])
+                    PlainText("span", moment.text, "text")
                 row.move(target_index=0)
 
     def _tell_interrupted(self) -> None:
         self._gone.set_visibility(bool(self._console.interrupted))
         with self._gone:
             for summary in self._console.interrupted:
-                Words("p", f"Mission {summary.id} was interrupted: {summary.reason}")
-            Press("I have seen it", self._seen, "plain")
+                PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
+            Button("Dismiss", self._dismiss, "plain")
 
-    def _seen(self) -> None:
+    def _dismiss(self) -> None:
         self._console.interrupted = ()
         self._gone.set_visibility(False)

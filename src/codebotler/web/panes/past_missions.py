@@ -1,4 +1,4 @@
-"""The pages about past missions: all of them, and one with what happened when."""
+"""The pages about past missions: the list, and the timeline of one."""
 
 from __future__ import annotations
 
@@ -15,44 +15,39 @@ from codebotler.missions.mission import State
 from codebotler.missions.store import find, missions, summary_of
 from codebotler.missions.wording import event_text
 from codebotler.web.console import Console
-from codebotler.web.elements import Words
+from codebotler.web.elements import PlainText
 from codebotler.web.frame import Frame
 
 MOST, MOST_EVENTS = 200, 1_000
 STEPS: Mapping[str, str] = {
-    State.DRAFTING: "A program is there",
-    State.CHECKED: "The program is checked",
-    State.APPROVED: "Somebody lets the robot run it",
-    State.RUNNING: "The robot begins",
-    State.DONE: "The robot is done",
-    State.FAILED: "The program broke off",
-    State.STOPPING: "The robot is being stopped",
-    State.STOPPED: "The mission is stopped",
-    State.INTERRUPTED: "The mission was interrupted",
+    State.DRAFTING: "Program written",
+    State.CHECKED: "Checked",
+    State.APPROVED: "Approved",
+    State.RUNNING: "Started",
+    State.DONE: "Done",
+    State.FAILED: "Failed",
+    State.STOPPING: "Stopping",
+    State.STOPPED: "Stopped",
+    State.INTERRUPTED: "Interrupted",
 }
-"""What it means that a mission comes to a state."""
+"""How the timeline names the states of a mission."""
 
 
 def add(console: Console, frame: Frame) -> None:
-    """Put the pages at their addresses.
-
-    Args:
-        console: whose missions.
-        frame: what all pages have.
-    """
+    """Add the pages."""
 
     @ui.page("/missions")
     async def list_missions() -> None:
         frame("Missions", "/missions")
         with ui.element("div").classes("past"):
-            Words("h1", "Missions")
+            PlainText("h1", "Missions")
             try:
                 known = await asyncio.to_thread(missions, console.home)
             except UserError as error:
-                Words("p", str(error), "trouble")
+                PlainText("p", str(error), "trouble")
                 return
             if not known:
-                Words("p", "There is none yet.", "quiet")
+                PlainText("p", "No missions yet.", "quiet")
             with ui.element("ol").classes("rows"):
                 for summary in reversed(known[-MOST:]):
                     _row(summary)
@@ -64,22 +59,17 @@ def add(console: Console, frame: Frame) -> None:
             try:
                 summary, events = await asyncio.to_thread(_read, console, mission)
             except UserError as error:
-                Words("p", error.sentence, "trouble")
+                PlainText("p", error.sentence, "trouble")
                 return
             _show(summary, events)
 
 
 def in_words(line: Line, *, is_first: bool) -> str:
-    """What happened, as one tells it to a person; empty where there is nothing to tell.
-
-    Args:
-        line: the event.
-        is_first: whether the mission begins with it.
-    """
+    """An event in the timeline; empty if it is not shown."""
     event = line["event"]
     if event == "state":
         state, reason = line["state"], shortened(line.get("reason", ""))
-        step = "The mission begins" if is_first else STEPS.get(state, visible(state))
+        step = "Mission created" if is_first else STEPS.get(state, visible(state))
         return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
     text = "" if event == "feedback" else event_text(line)
     return text[:1].upper() + text[1:]
@@ -92,35 +82,35 @@ def _read(console: Console, mission: str) -> tuple[Summary, list[Line]]:
 
 def _row(summary: Summary) -> None:
     with ui.element("li"), html.a(href=f"/missions/{summary.id}"):
-        Words("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
-        Words("span", shortened(summary.instruction or "a program written by hand", 160), "text")
-        Words("small", summary.state, f"state state-{summary.state}")
+        PlainText("time", f"{datetime.fromtimestamp(summary.created).astimezone():%d %b %Y, %H:%M}")
+        PlainText("span", shortened(summary.instruction or "a program without an instruction", 160), "text")
+        PlainText("small", summary.state, f"state state-{summary.state}")
 
 
 def _show(summary: Summary, events: list[Line]) -> None:
     began = datetime.fromtimestamp(summary.created).astimezone()
-    Words("h1", shortened(summary.instruction, 300) or "A program written by hand")
+    PlainText("h1", shortened(summary.instruction, 300) or "A program without an instruction")
     with ui.element("p").classes("facts"):
-        Words("small", summary.state, f"state state-{summary.state}")
-        by = f" · written by {summary.model}" if summary.model else ""
-        Words("span", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}")
+        PlainText("small", summary.state, f"state state-{summary.state}")
+        by = f" · program by {summary.model}" if summary.model else ""
+        PlainText("span", f"{began:%d %b %Y, %H:%M:%S} · robot: {summary.robot}{shortened(by)}")
     if summary.reason:
-        Words("p", shortened(summary.reason), "reason")
+        PlainText("p", shortened(summary.reason), "reason")
     with ui.element("p").classes("downloads"):
         for kind, name in (("jsonl", "Events (JSON lines)"), ("mcap", "MCAP, for Foxglove")):
             html.a(name, href=f"/api/missions/{summary.id}/events.{kind}").props("download")
     for problem in summary.problems:
-        Words("p", shortened(problem), "trouble")
-    Words("h2", "What happened")
+        PlainText("p", shortened(problem), "trouble")
+    PlainText("h2", "What happened")
     with ui.element("ol").classes("timeline"):
         for number, line in enumerate(events[:MOST_EVENTS]):
             words = in_words(line, is_first=number == 0)
             if words:
                 with ui.element("li").classes(f"event event-{line['event']}"):
-                    Words("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
-                    Words("small", f"{line['clock']:.1f} s" if line["clock"] else "")
-                    Words("span", words, "text")
+                    PlainText("time", f"{datetime.fromtimestamp(line['time']).astimezone():%H:%M:%S}")
+                    PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")
+                    PlainText("span", words, "text")
     if len(events) > MOST_EVENTS:
-        Words("p", f"{len(events) - MOST_EVENTS:,} more; all of them are in the files.", "quiet")
-    Words("h2", "Program")
-    Words("pre", summary.program, "source").props("tabindex=0")
+        PlainText("p", f"{len(events) - MOST_EVENTS:,} more are in the files.", "quiet")
+    PlainText("h2", "Program")
+    PlainText("pre", summary.program, "source").props("tabindex=0")

@@ -12,15 +12,15 @@ import pytest
 
 from pageserver import PageServer
 
-GOOD = """from codebotler.web.further import Pages
-from codebotler.web.elements import Words
+GOOD = """from codebotler.web.frame import Pages
+from codebotler.web.elements import PlainText
 from nicegui import ui
 
 def add(site):
     @ui.page("/hello")
     def hello():
         site.frame("Hello", "/hello")
-        Words("h1", str(site.runs))
+        PlainText("h1", str(site.runs))
     site.app.get("/api/hello")(lambda: "hello")
 
 PAGES = Pages("Hello", "Hello", "/hello", add)
@@ -57,6 +57,6 @@ def test_a_package_adds_pages_and_a_broken_one_is_left_out(
 
 def test_codebotler_needs_no_benchmark() -> None:
     """The pages of the benchmark come by the entry point alone."""
-    code = "import codebotler.web.serving, sys; print(any(m.startswith('roboeval') for m in sys.modules))"
+    code = "import codebotler.web.server, sys; print(any(m.startswith('roboeval') for m in sys.modules))"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout == "False\n"

@@ -1,11 +1,12 @@
-"""What `codebotler serve` does: puts the page and its API on a port, behind a guard, and says how to open."""
+"""Serves the page and its API on a port, behind the guard, and prints the link that opens it."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import socket
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from functools import partial
 from http import HTTPStatus
@@ -21,50 +22,50 @@ from fastapi.responses import HTMLResponse, JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
 from starlette.routing import BaseRoute, Match, Mount
-from starlette.types import ASGIApp
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from codebotler import __version__
 from codebotler.core.terminal import note
 from codebotler.core.words import listed
-from codebotler.web import api, apipage, facepage, operate
-from codebotler.web.access import Access
+from codebotler.web import api, api_page, face, page
+from codebotler.web.access import Access, Place, Role
 from codebotler.web.console import Console
-from codebotler.web.frame import FACE, ROBOT, Frame
-from codebotler.web.further import Further, Site
-from codebotler.web.guard import MOST_BYTES, REFUSAL, Guard
-from codebotler.web.place import Place
-from codebotler.web.presence import Presence
+from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
+from codebotler.web.guard import MOST_BYTES, NO_PAGE, REFUSAL, Guard
 
 STATIC = Path(__file__).with_name("static")
-LEAVING = "the leaving of the last operator"
+LEAVING = "the last operator, who left"
 RUNS = Path("runs")
 METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
+SOCKETS = "/_nicegui_ws/"
+"""Where the page of an operator holds a websocket open for as long as it is shown."""
+
 LINGER = 3
-"""Seconds that streams have to end when the tool does."""
+"""Seconds that streams have to end when the server stops."""
 
 
 def serve(
     console: Console | None,
     place: Place,
     access: Access,
-    further: Further = (),
+    further: Sequence[Pages] = (),
     runs: Path = RUNS,
     *,
     alone_for: float | None = None,
 ) -> None:
-    """Serve the page until Ctrl-C; a robot that runs is stopped then.
+    """Serve the page until Ctrl-C, which stops a running robot.
 
     Args:
         console: not yet entered; None where there are only further pages, and no robot.
-        place: where the page is.
-        access: who may open it.
-        further: pages that other packages add.
+        place: the address of the page.
+        access: its tokens.
+        further: pages of other packages.
         runs: the folder of runs for those.
-        alone_for: a robot that runs is stopped so many seconds after the last operator left; None: never.
+        alone_for: stop a running robot so many seconds after the last operator left; None: never.
 
     Raises:
-        UserError: nobody can listen there.
-        OSError: the missions cannot be written.
+        UserError: the port is in use.
+        OSError: missions cannot be written.
     """
     with place.listening() as bound, console or nullcontext():
         port = bound.getsockname()[1]
@@ -75,7 +76,7 @@ def serve(
         guard = Guard(app, place.rules(access, port), partial(_has_page, pages))
         settings = uvicorn.Config(
             guard,
-            log_config=None,  # what it logs is noted like all else
+            log_config=None,  # its log is noted like all else
             log_level=logging.WARNING,
             access_log=False,
             proxy_headers=False,
@@ -85,7 +86,7 @@ def serve(
         )
         for summary in console.interrupted if console else ():
             note(f"mission {summary.id} was interrupted: {summary.reason}")
-        note(_links(place, port, access, console))  # at once, for those who read it through a pipe
+        note(_links(place, port, access, console))
         _Server(settings, console).run([bound])
 
 
@@ -96,33 +97,27 @@ def _links(place: Place, port: int, access: Access, console: Console | None) -> 
     def query(token: str) -> str:
         return "" if access.operator is None else f"?{urlencode({'token': token})}"
 
-    ends = "ends the page and stops the robot" if console else "ends the page"
-    told = [
-        f"open this link in a browser; Ctrl-C {ends}:\n",
+    ends = "stops the robot and closes the page" if console else "closes the page"
+    lines = [
+        f"Open this link in a browser; Ctrl-C {ends}:\n",
         f"    {address}{query(access.operator or '')}\n",
     ]
     if not place.is_loopback:
-        told.append(
-            "other machines get in as well, by this link only; what they send and see is not encrypted\n"
+        lines.append(
+            "Other machines can open it too, with this link only. The connection is not encrypted.\n"
         )
     if console and console.face is not None:
-        where = "here; --host lets other machines in" if place.is_loopback else "on the robot's tablet"
-        told.append(f"the robot's face, which can run nothing, to be opened {where}:\n")
-        told.append(f"    {address}face{query(access.face)}\n")
-    return "\n".join(told)
+        where = "here (--host lets other machines in)" if place.is_loopback else "on the robot's tablet"
+        lines.append(f"The robot's face cannot run anything. Open it {where}:\n")
+        lines.append(f"    {address}face{query(access.face)}\n")
+    return "\n".join(lines)
 
 
-def application(console: Console | None, further: Further = (), runs: Path = RUNS) -> FastAPI:
-    """The page and its API, without the guard.
-
-    Args:
-        console: what they show; None where there is no robot.
-        further: pages that other packages add.
-        runs: the folder of runs for those.
-    """
+def application(console: Console | None, further: Sequence[Pages] = (), runs: Path = RUNS) -> FastAPI:
+    """The page and its API, without the guard."""
     links = tuple((pages.name, pages.address) for pages in further)
-    face = (FACE,) if console and console.face else ()
-    frame = Frame((*ROBOT, *face, *links)) if console else Frame(links, further[0].brand, has_robot=False)
+    to_face = (FACE,) if console and console.face else ()
+    frame = Frame((*ROBOT, *to_face, *links)) if console else Frame(links, further[0].brand, has_robot=False)
     app = FastAPI(
         title="CodeBotler",
         version=__version__,
@@ -134,14 +129,14 @@ def application(console: Console | None, further: Further = (), runs: Path = RUN
     if console:
         app.include_router(api.router(console))
         if console.face is not None:
-            app.include_router(facepage.router(console, console.face))
-        operate.add(console, frame)
+            app.include_router(face.router(console, console.face))
+        page.add(console, frame)
     for pages in further:
         pages.add(Site(app, frame, runs))
     app.add_exception_handler(RequestValidationError, api.refused)
-    apipage.add(app)
+    api_page.add(app)
     app.mount("/static", StaticFiles(directory=STATIC))
-    core.sio.eio.cors_allowed_origins = []  # NiceGUI invites all pages; the guard lets in ours alone
+    core.sio.eio.cors_allowed_origins = []  # NiceGUI allows all origins; the guard allows ours alone
     nicegui.app.config.socket_io_js_transports = ["websocket"]
     nicegui.app.add_exception_handler(HTTPStatus.NOT_FOUND.value, partial(_not_found, app))
     ui.run_with(
@@ -152,19 +147,17 @@ def application(console: Console | None, further: Further = (), runs: Path = RUN
         language="en-US",
         tailwind=False,
         reconnect_timeout=20.0,
-        gzip_middleware_factory=None,  # the guard marks the page's own scripts, which it has to read for that
+        gzip_middleware_factory=None,  # the guard reads pages to mark their scripts
         show_welcome_message=False,
     )
     return app
 
 
 def _not_found(app: FastAPI, request: Request, _error: Exception) -> Response:
-    """In a sentence, as a person or a program wants it.
-
-    NiceGUI takes every address that the API does not, and so also each that the API has for another method.
-    """
-    status, sentence, headers = HTTPStatus.NOT_FOUND, "there is no such page", {}
-    if allowed := _methods(app, request):
+    """404, or 405 where NiceGUI took an address that the API has for another method."""
+    status, sentence, headers = HTTPStatus.NOT_FOUND, NO_PAGE, {}
+    allowed = [method for method in METHODS if _is_taken(app.routes, method, request.scope["path"])]
+    if allowed:
         status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address takes {listed(allowed)} only"
         headers = {"allow": ", ".join(allowed)}
     if "text/html" in request.headers.get("accept", ""):
@@ -172,13 +165,7 @@ def _not_found(app: FastAPI, request: Request, _error: Exception) -> Response:
     return JSONResponse({"detail": sentence}, status, headers)
 
 
-def _methods(app: FastAPI, request: Request) -> list[str]:
-    """The methods that the API takes at an address; none where it has no such address."""
-    return [method for method in METHODS if _is_taken(app.routes, method, request.scope["path"])]
-
-
 def _has_page(app: FastAPI, path: str) -> bool:
-    """Whether something answers at a path, of the pages or of what is beside them."""
     return _is_taken([*app.routes, *nicegui.app.routes], "GET", path)
 
 
@@ -187,15 +174,45 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
     return any(route.matches(scope)[0] is Match.FULL for route in routes if not isinstance(route, Mount))
 
 
+class Presence:
+    """ASGI middleware behind the guard that notices when no operator's page has been open for a while.
+
+    Args:
+        app: the page and its API.
+        seconds: how long no page may be open, above 0; a page that is reloaded is away for a moment.
+        alone: called then; must return at once.
+    """
+
+    def __init__(self, app: ASGIApp, seconds: float, alone: Callable[[], object]) -> None:
+        self._app, self._seconds, self._alone = app, seconds, alone
+        self._pages = 0
+        self._leaving: asyncio.TimerHandle | None = None
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass a request on, and count the pages that are open."""
+        is_operator = scope.get("state", {}).get("role") is Role.OPERATOR
+        if not is_operator or scope["type"] != "websocket" or not scope["path"].startswith(SOCKETS):
+            await self._app(scope, receive, send)
+            return
+        self._pages += 1
+        if self._leaving is not None:
+            self._leaving.cancel()
+        try:
+            await self._app(scope, receive, send)
+        finally:
+            self._pages -= 1
+            if not self._pages:
+                self._leaving = asyncio.get_running_loop().call_later(self._seconds, self._alone)
+
+
 class _Server(uvicorn.Server):
-    """Stops the robot as soon as somebody wants to end the tool, before anything else ends."""
+    """Stops the robot at a signal, before anything else ends."""
 
     def __init__(self, config: uvicorn.Config, console: Console | None) -> None:
         super().__init__(config)
         self._console = console
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
-        """Called for a signal."""
         if self._console:
             threading.Thread(target=self._console.stop, args=("the end of the page",), daemon=True).start()
         super().handle_exit(sig, frame)

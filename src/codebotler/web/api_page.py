@@ -1,4 +1,4 @@
-"""The page about the API, made from its OpenAPI description, without anything from elsewhere."""
+"""The page about the API, made from its OpenAPI description."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from fastapi.responses import HTMLResponse
 PAGE = """<!doctype html><html lang="en"><head><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>CodeBotler: the API</title>
 <link rel="stylesheet" href="/static/api.css"></head><body><main><h1>The API</h1>
-<p>Everything the page does. Show the token with each request: <code>Authorization: Bearer TOKEN</code>.
+<p>Everything the page does. Send the token with each request: <code>Authorization: Bearer TOKEN</code>.
 For machines: <a href="/api/openapi.json">openapi.json</a>. <a href="/">Back to the page</a></p>
 {calls}</main></body></html>"""
 
 
 def add(app: FastAPI) -> None:
-    """Put the page at /api."""
+    """Add the page /api."""
 
     @app.get("/api", include_in_schema=False)
     def page() -> HTMLResponse:

@@ -24,7 +24,7 @@ from codebotler.robots.face import Face, Question
 from codebotler.robots.simulated import Simulated
 from codebotler.web.access import SHORTEST_TOKEN
 from codebotler.web.console import Console
-from codebotler.web.facepage import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
+from codebotler.web.face import MOST_OPTIONS, MOST_TEXT, face_data, question_data, words
 from codebotler.web.guard import MOST_BYTES
 from command_line import ENVIRONMENT
 from forked import Forked
@@ -269,7 +269,7 @@ def test_there_is_no_face_unless_one_is_asked_for(tmp_path: Path) -> None:
     [
         (["--face-token", "short"], f"{SHORTEST_TOKEN} characters"),
         (["--token", "x" * 20, "--face-token", "x" * 20], "operator's page"),
-        (["--no-token", "--face-token", "x" * 20], "only for this machine"),
+        (["--no-token", "--face-token", "x" * 20], "this machine only"),
         (["--face-timeout", "0"], "'--face-timeout'"),
         (["--stop-when-alone", "0"], "'--stop-when-alone'"),
     ],

@@ -1,4 +1,4 @@
-"""The robot's face: its page, and what it needs of the API. Nobody runs or reads a program by it."""
+"""The robot's face: its page and its part of the API. It cannot run or read programs."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'"
 )
-"""Stricter than that of other pages, since there is no NiceGUI: no script can make markup of a text."""
+"""Stricter than that of other pages, since there is no NiceGUI: no script can turn a text into markup."""
 
-STOPS = "somebody at the face"
+STOPS = "a person at the face"
 MOST_TEXT, MOST_OPTION, MOST_OPTIONS = 2_000, 300, 50
 """Characters and options that people can read on a screen."""
 
 
-class Answer(BaseModel):
-    """What somebody answers."""
+class FaceAnswer(BaseModel):
+    """A person's answer to the robot's question."""
 
     model_config = ConfigDict(extra="forbid")
     question: int = Field(strict=True, ge=1, description="The number of the question.")
@@ -39,12 +39,7 @@ class Answer(BaseModel):
 
 
 def router(console: Console, face: Face) -> APIRouter:
-    """The addresses of the face.
-
-    Args:
-        console: whose robot speaks there.
-        face: on which it speaks.
-    """
+    """The addresses of the face."""
     here = APIRouter(tags=["face"])
 
     @here.get("/face", include_in_schema=False)
@@ -54,12 +49,12 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @here.get("/api/face")
     def show() -> dict[str, Any]:
-        """What the face shows: what the robot does, said and asks. `question` has the number to answer."""
+        """What the face shows: what the robot does, says and asks. `question` has the number to answer."""
         return face_data(console, face)
 
     @here.post("/api/face/answer")
-    def answer(given: Answer) -> dict[str, Any]:
-        """Answer the question; the first answer counts, and one that is too late is refused."""
+    def answer(given: FaceAnswer) -> dict[str, Any]:
+        """Answer the question; the first answer counts, and one that comes too late is refused."""
         try:
             face.answer(given.question, given.option)
         except AnswerError as error:
@@ -68,37 +63,34 @@ def router(console: Console, face: Face) -> APIRouter:
 
     @here.post("/api/face/stop", status_code=202)
     async def stop() -> dict[str, Any]:
-        """Stop a robot that runs, and nothing else; whether there is one."""
+        """Stop a robot that runs, and nothing else; says whether there is one."""
         return {"stopping": console.stop_soon(STOPS, only_moving=True)}
 
     @here.websocket("/api/face/live")
     async def live(socket: WebSocket) -> None:
-        """Send what the face shows, again at each change. Nothing that comes from there is heeded."""
+        """Send what the face shows, again at each change; messages from there are ignored."""
         await socket.accept()
         with face.watched():
-            telling = asyncio.create_task(_tell(socket, console, face))
+            sending = asyncio.create_task(_send_changes(socket, console, face))
             try:
-                with suppress(WebSocketDisconnect, KeyError):  # it sent something else than text
+                with suppress(WebSocketDisconnect, KeyError):  # a message that is no text
                     while True:
                         await socket.receive_text()
             finally:
-                telling.cancel()
+                sending.cancel()
 
     return here
 
 
-async def _tell(socket: WebSocket, console: Console, face: Face) -> None:
-    """Whoever reads slowly is sent what there is by then; nothing queues up."""
+async def _send_changes(socket: WebSocket, console: Console, face: Face) -> None:
     sent: object = None
     with suppress(WebSocketDisconnect, RuntimeError):  # it is gone
-        while True:
-            seen = console.notifier.version
+        async for _ in console.notifier.changes():
             data = face_data(console, face)
-            told = {**data, "seconds_left": None}
-            if told != sent:
-                sent = told
+            shown = {**data, "seconds_left": None}
+            if shown != sent:
+                sent = shown
                 await socket.send_json(data)
-            await console.notifier.until(lambda: console.notifier.version != seen)  # noqa: B023 - looked at before the next round
 
 
 def face_data(console: Console, face: Face) -> dict[str, Any]:
@@ -112,7 +104,7 @@ def face_data(console: Console, face: Face) -> dict[str, Any]:
         "to": words(view.progress.room, MOST_OPTION) if is_moving else "",
         "said": [{"number": said.number, "text": words(said.text)} for said in shown.said],
         "question": None if question is None else question_data(question),
-        "seconds_left": None if question is None else _left(question),
+        "seconds_left": None if question is None else _seconds_left(question),
         "ended": None if shown.ended is None else _ended_data(shown.ended),
         "screens": face.screens,
         "state": view.state,
@@ -121,8 +113,7 @@ def face_data(console: Console, face: Face) -> dict[str, Any]:
     }
 
 
-def _left(question: Question) -> float | None:
-    """Seconds in which it can be answered; None for ever."""
+def _seconds_left(question: Question) -> float | None:
     left = question.until - time.monotonic()
     return round(max(0.0, left), 1) if math.isfinite(left) else None
 
@@ -139,7 +130,7 @@ def question_data(question: Question) -> dict[str, Any]:
 
 
 def words(text: str, most: int = MOST_TEXT) -> str:
-    """A text as people read it: with its lines, but without what hides or turns its letters."""
+    """A text with its lines, cut after so many characters, and with hidden characters written out."""
     left = len(text) - most
     shown = visible_lines(text[:most])
     return shown if left <= 0 else f"{shown}... {left:,} more characters"

@@ -1,0 +1,63 @@
+"""The operator's page: its three panes, updated at each change."""
+
+from __future__ import annotations
+
+import asyncio
+
+from nicegui import background_tasks, ui
+
+from codebotler.missions.session import SessionView
+from codebotler.web.console import Console
+from codebotler.web.elements import PlainText
+from codebotler.web.frame import PATIENCE, Frame
+from codebotler.web.panes.instruction import InstructionPane
+from codebotler.web.panes.past_missions import add as add_past_missions
+from codebotler.web.panes.program import ProgramPane
+from codebotler.web.panes.robot import RobotPane
+
+PARTS = (("Instruct", "#h-instruct"), ("Program", "#h-program"), ("Status", "#h-status"))
+PAUSE = 0.1
+"""Seconds between two updates of a page, however often something changes."""
+
+
+def add(console: Console, frame: Frame) -> None:
+    """Add the operator's pages."""
+
+    @ui.page("/", response_timeout=PATIENCE)
+    async def operate() -> None:
+        frame("Robot", "/", PARTS)
+        PlainText("h1", "Operate the robot", "unseen")
+        with ui.element("div") as box:
+            instruction = InstructionPane(console)
+            panes = (instruction, ProgramPane(console), RobotPane(console))
+
+        def show() -> None:
+            view = console.view
+            box.classes(replace=f"operate to-{_next(view)}")
+            for pane in panes:
+                pane.show(view)
+
+        show()
+        client = ui.context.client
+        await client.connected()
+
+        async def follow() -> None:
+            async for _ in console.notifier.changes():
+                with box:
+                    show()
+                await asyncio.sleep(PAUSE)
+
+        following = background_tasks.create(follow())
+        client.on_delete(following.cancel)
+        await instruction.load()
+
+    add_past_missions(console, frame)
+
+
+def _next(view: SessionView) -> str:
+    """What an operator does next, by which a small screen orders its panes."""
+    if view.is_running:
+        return "watch"
+    if not view.is_over:
+        return "decide"
+    return "ask" if view.state is None or view.trouble else "see"

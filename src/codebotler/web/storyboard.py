@@ -1,0 +1,191 @@
+"""What a robot would do in sampled worlds, drawn room by room."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from nicegui import ui
+
+from codebotler.checking.problems import Check, Sample
+from codebotler.checking.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, steps_of
+from codebotler.core.skills import SKILLS
+from codebotler.core.terminal import shortened
+from codebotler.core.words import listed
+from codebotler.simulator.sampled_robot import SOMEBODY, Fact, Reply, Whereabouts, brief
+from codebotler.web.elements import PlainText
+
+MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
+VERBS = SKILLS.verbs
+SPOKEN = frozenset({"say", "ask", "answer"})
+PLAIN = re.compile(r"[\w' -]+")
+"""Names of rooms that need no quotes; others could be read as part of the sentence."""
+
+
+@dataclass(frozen=True)
+class Deed:
+    """Something that the robot does in a room."""
+
+    kind: str  # `say`, `ask` and `answer` for what is spoken; else the event's
+    text: str
+    step: int = field(default=0, compare=False)  # in the trace, from 1; 0 for an answer
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A stay in a room."""
+
+    room: str  # for a drive that fails, the room that was asked for
+    deeds: tuple[Deed, ...] = ()
+    is_found: bool = True  # whether there is such a room
+    step: int = field(default=0, compare=False)  # of the drive there, from 1; 0 where the robot started
+
+
+@dataclass(frozen=True)
+class Strip:
+    """The scenes of one sampled world."""
+
+    world: str  # what it is like, as the first half of a sentence
+    scenes: tuple[Scene, ...]
+    ending: str
+    ends_well: bool
+
+
+def draw_strips(check: Check) -> None:
+    """Draw what a robot would do, as far as a check found."""
+    shown = strips(check)
+    PlainText("h3", "What the robot would do" if shown else "")
+    for strip in shown:
+        with ui.element("article").classes("strip"):
+            if strip.world:
+                PlainText("p", f"{strip.world}:", "world")
+            with ui.element("ol").classes("scenes").props('aria-label="Room by room"'):
+                for scene in strip.scenes:
+                    draw_scene(scene)
+            PlainText("p", strip.ending, "ending good" if strip.ends_well else "ending bad")
+
+
+def draw_scene(scene: Scene, wrong: Container[int] = frozenset()) -> None:
+    """Draw a stay in a room, and mark the steps whose numbers are wrong."""
+    kind = "scene" if scene.deeds or not scene.is_found else "scene passing"
+    with ui.element("li").classes(f"{kind} wrong" if scene.step in wrong else kind):
+        PlainText("b", scene.room, "room")
+        if not scene.is_found:
+            PlainText("span", "there is no such room", "deed missing")
+        for deed in scene.deeds:
+            look = f"deed deed-{deed.kind}" if deed.kind in SPOKEN else "deed"
+            PlainText("span", deed.text, f"{look} wrong" if deed.step in wrong else look)
+
+
+# --- which strips and scenes
+
+
+def strips(check: Check) -> list[Strip]:
+    """One strip for each kind of world that makes a difference; those that end well first."""
+    different: dict[tuple[tuple[Scene, ...], str], Strip] = {}
+    for sample in check.samples:
+        strip = _strip(sample, check)
+        different.setdefault((strip.scenes, strip.ending), strip)
+    return sorted(different.values(), key=lambda strip: not strip.ends_well)[:MOST_STRIPS]
+
+
+def _strip(sample: Sample, check: Check) -> Strip:
+    error = sample.outcome.error
+    if sample.in_vain:
+        ending = "The robot waits or searches in vain, which is not counted as a problem."
+    elif error is not None:
+        ending = f"Fails: {shortened(error.message, MOST_TEXT)} ({shortened(error.kind)})"
+    else:
+        ending = "Done."
+    world = shortened(supposed(sample.facts), MOST_WORLD)
+    shown = scenes(steps_of(sample.outcome.trace, check.plan.room), check.plan.start)
+    return Strip(world, shown, ending, error is None or sample.in_vain)
+
+
+def scenes(
+    steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int] = frozenset()
+) -> tuple[Scene, ...]:
+    """The scenes of a trace; of a long one its ends, and the steps that are needed.
+
+    Args:
+        steps: of the trace, with the rooms to which drives lead.
+        start: the room where the robot starts.
+        needed: numbers of steps that are not left out.
+    """
+    found: list[Scene] = [Scene(shortened(start, MOST_TEXT))]
+    is_long = len(steps) > MOST_STEPS
+    hidden = 0
+    for number, step in enumerate(steps):
+        if is_long and FIRST_STEPS <= number < len(steps) - LAST_STEPS and step["step"] not in needed:
+            hidden += 1
+            continue
+        if hidden:
+            found.append(Scene("…", (Deed("more", f"{hidden:,} more steps"),)))
+        hidden = 0
+        if step["kind"] == "goto":
+            to = step["to"]
+            room = shortened(to or step["text"], MOST_TEXT)
+            found.append(Scene(room, is_found=to is not None, step=step["step"]))
+        else:
+            found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_deeds(step)))
+    return tuple(found)
+
+
+def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
+    kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
+    verb = VERBS[kind].third if kind in VERBS else shortened(kind)
+    match kind:
+        case "ask":
+            answer = step["answer"]
+            heard = "no answer" if answer is None else shortened(str(answer), MOST_TEXT)
+            return (Deed("ask", text, number), Deed("answer", heard))
+        case "check":
+            seen = "and finds it" if step.get("found") else "but does not find it"
+            return (Deed("check", f"{verb} {text}, {seen}", number),)
+        case "say":
+            return (Deed("say", text, number),)
+    return (Deed(kind, f"{verb} {text}", number),)
+
+
+# --- what a world is like
+
+
+def supposed(facts: Sequence[Fact]) -> str:
+    """What is special about a world, such as `If the robot finds “mug” in kitchen, but not in hall`."""
+    clauses = list(dict.fromkeys(_clauses([fact.about for fact in facts])))
+    if not clauses:
+        return ""
+    first, rest = clauses[0], [f"it {clause}" for clause in clauses[1:]]
+    return f"If {listed([f'the robot {first}', *rest])}"
+
+
+def _clauses(known: Sequence[Whereabouts | Reply]) -> Iterator[str]:
+    for one in known:
+        if isinstance(one, Reply):
+            yield f"is told {_quoted(one.answer)} when it asks {_quoted(one.question)} in {_room(one.room)}"
+        else:
+            same = [other for other in known if isinstance(other, Whereabouts) and other.name == one.name]
+            yield _found(one.name, same)
+
+
+def _found(name: str, known: Sequence[Whereabouts]) -> str:
+    there, lacking = (_rooms(known, is_there=is_there) for is_there in (True, False))
+    is_person = name == SOMEBODY
+    if not there:
+        return f"finds nobody in {lacking}" if is_person else f"does not find {_quoted(name)} in {lacking}"
+    but = f", but {'nobody in' if is_person else 'not in'} {lacking}" if lacking else ""
+    return f"finds {'somebody' if is_person else _quoted(name)} in {there}{but}"
+
+
+def _rooms(known: Sequence[Whereabouts], *, is_there: bool) -> str:
+    return listed(list(dict.fromkeys(_room(one.room) for one in known if one.is_there is is_there)))
+
+
+def _room(name: str) -> str:
+    return brief(name) if PLAIN.fullmatch(name) else _quoted(name)
+
+
+def _quoted(text: str) -> str:
+    return f"“{brief(text)}”"
