@@ -1,5 +1,5 @@
 # Everything a person or a machine does with this project. PYTHON chooses the interpreter, PACKAGE what is
-# installed (this folder, or a wheel), VENV where.
+# installed (this folder, or a wheel), VENV where, EXTRAS with which extras.
 #
 #   make test       what to run before each commit; TESTS names files or folders to run instead of all
 #   make test-all   that, and everything below
@@ -21,6 +21,7 @@
 PYTHON ?= python3
 PACKAGE ?= .
 VENV ?= .venv
+EXTRAS ?= [all]
 EXTRAS_VENV ?= .venv-extras
 FUZZ_EXAMPLES ?= 5000
 BIN = $(VENV)/bin
@@ -150,7 +151,7 @@ $(VENV)/made:
 
 $(VENV)/installed: $(SOURCES) | $(VENV)/made
 	@printf "installing into $(VENV) "
-	@$(PIP) install --constraint constraints.txt --upgrade $(PACKAGE) | { $(DOTS); }
+	@$(PIP) install --constraint constraints.txt --upgrade "$(PACKAGE)$(EXTRAS)" | { $(DOTS); }
 	@touch $@
 
 $(VENV)/tested: $(VENV)/installed
@@ -165,7 +166,7 @@ $(EXTRAS_VENV)/tested: $(SOURCES) constraints-extras.txt
 	@$(PYTHON) -m venv --clear $(EXTRAS_VENV)
 	@$(EXTRAS_VENV)/bin/python -m pip install --quiet --disable-pip-version-check --upgrade "pip>=25.1"
 	@$(EXTRAS_VENV)/bin/python -m pip --disable-pip-version-check install --no-compile --constraint constraints.txt \
-		--constraint constraints-extras.txt "$(PACKAGE)[inspect,pyrobosim,ray,transformers]" --group test | { $(DOTS); }
+		--constraint constraints-extras.txt "$(PACKAGE)[all,inspect,pyrobosim,ray,transformers]" --group test | { $(DOTS); }
 	@touch $@
 
 $(VENV)/linted: $(VENV)/tested

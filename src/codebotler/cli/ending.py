@@ -18,6 +18,14 @@ STOPPED = 130  # the status after Ctrl-C, as shells have it
 USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
 ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
 
+EXTRAS = {
+    **dict.fromkeys(("anthropic", "google", "httpx", "openai", "pydantic_ai", "tenacity"), "models"),
+    **dict.fromkeys(("fastapi", "nicegui", "starlette", "uvicorn"), "page"),
+    **dict.fromkeys(("PIL", "mcap", "websockets"), "robots"),
+    "matplotlib": "report",
+}
+"""The extra of this distribution that brings each package."""
+
 _command = cache(get_command)
 
 
@@ -58,7 +66,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 
 
 def _ending(error: Exception) -> tuple[int, str] | None:
-    """The status and the sentence for an error; None for one that a user cannot cause."""
+    """The status and the sentence for an error; None for a fault of ours."""
     from codebotler.core.errors import UserError
     from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.robots.base import NotReadyError, RobotLostError
@@ -72,6 +80,8 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 1, str(error)
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence
+    if isinstance(error, ModuleNotFoundError) and (extra := EXTRAS.get((error.name or "").split(".")[0])):
+        return 2, f"{error.name} is not installed; `pip install 'codebotler[{extra}]'` brings it"
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None

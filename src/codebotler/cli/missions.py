@@ -1,29 +1,24 @@
-"""What `codebotler missions` does: lists missions, shows one, writes one for other tools."""
+"""`codebotler missions`: lists missions, shows one, writes one as MCAP."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from codebotler.cli.views import list_view, mission_view
 from codebotler.core.terminal import note, print_json, print_rich, visible
 from codebotler.missions.log import events_of
-from codebotler.missions.mcap import Clock, export
 from codebotler.missions.pictures import FOLDER, picture_of
 from codebotler.missions.store import find, missions, recover, summary_of
 
+if TYPE_CHECKING:
+    from codebotler.missions.mcap import Clock
+
 
 def show_missions(home: Path, *, json: bool) -> None:
-    """Print all missions, the last one last.
-
-    Args:
-        home: the folder of missions.
-        json: whether for machines.
-
-    Raises:
-        UserError: one cannot be read.
-    """
+    """Print all missions, the last one last."""
     note_interrupted(home)
     known = missions(home)
     if json:
@@ -33,16 +28,7 @@ def show_missions(home: Path, *, json: bool) -> None:
 
 
 def show_mission(home: Path, name: str, *, json: bool) -> None:
-    """Print what happened in a mission.
-
-    Args:
-        home: the folder of missions.
-        name: its name, or `last`.
-        json: whether for machines.
-
-    Raises:
-        UserError: there is none of that name, or it cannot be read.
-    """
+    """Print what happened in a mission; `last` names the last one."""
     note_interrupted(home)
     folder = find(home, name)
     summary, events = summary_of(folder), events_of(folder)
@@ -55,18 +41,9 @@ def show_mission(home: Path, name: str, *, json: bool) -> None:
 
 
 def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
-    """Write a mission as an MCAP file.
+    """Write a mission as an MCAP file."""
+    from codebotler.missions.mcap import export
 
-    Args:
-        home: the folder of missions.
-        name: its name, or `last`.
-        path: the file.
-        clock: by which its messages are timed.
-
-    Raises:
-        UserError: there is none of that name, or it cannot be read.
-        OSError: the file cannot be written.
-    """
     note_interrupted(home)
     folder = find(home, name)
     summary, events = summary_of(folder), events_of(folder)
@@ -75,12 +52,7 @@ def write_mission(home: Path, name: str, path: Path, *, clock: Clock) -> None:
 
 
 def note_interrupted(home: Path) -> None:
-    """Close the missions that a tool left behind when it died, and say so.
-
-    Raises:
-        UserError: the folder of missions is none.
-        OSError: that folder cannot be read.
-    """
+    """Close the missions that a dead tool left behind, and say so."""
 
     def unclosed(mission: str, error: OSError) -> None:
         where = f"{visible(os.fsdecode(error.filename))}: " if error.filename else ""
