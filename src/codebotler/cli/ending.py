@@ -72,10 +72,8 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     from codebotler.robots.base import NotReadyError, RobotLostError
     from codebotler.simulator.engine import EngineError
 
-    if isinstance(error, USAGE):
-        return 2, _usage_sentence(error)
-    if isinstance(error, UserError):
-        return 2, str(error)
+    if isinstance(error, USAGE | UserError):
+        return 2, str(error) if isinstance(error, UserError) else _usage_sentence(error)
     if isinstance(error, EngineError | BudgetSpentError | NotReadyError | RobotLostError):
         return 1, str(error)
     if isinstance(error, ModelError):
