@@ -55,13 +55,13 @@ def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, opened: Op
         expect(face.locator("#doing")).to_have_text("Hello. I have nothing to do just now.")
         operator.locator("textarea").fill(instruction)
         operator.get_by_role("button", name="Write the program").click()
-        expect(operator.get_by_text("The check found no problem.")).to_be_visible()
+        expect(operator.get_by_text("Checked: no problems.")).to_be_visible()
         assert operator.locator(".strip .scene").count() > 1
         operator.get_by_role("button", name="Run it on the robot").click()
         expect(face.locator("#question")).to_have_text("Would you like a stapler?")
         expect(face.locator("#person")).to_have_text("For alice")
         expect(operator.locator(".asking .question")).to_have_text("Would you like a stapler?")
-        expect(operator.get_by_text("1 face shows what the robot says.")).to_be_visible()
+        expect(operator.get_by_text("The robot's face is open on 1 screen.")).to_be_visible()
         option(face, "No").click()
         expect(operator.locator(".headline")).to_have_text("Done")
         expect(operator.locator(".moment-hears .text")).to_have_text("No")
@@ -81,7 +81,7 @@ def test_what_the_robot_does_is_seen(server: PageServer, opened: OpenPage) -> No
     expect(face.locator("#stop-told")).to_have_text("The robot has stopped.")
     expect(face.locator("#doing")).not_to_have_text("On my way: kitchen")
     expect(face.locator("body[data-doing=idle]")).to_be_visible()
-    assert server.call("GET", "/api/robot").data["reason"] == "stopped by somebody at the face"
+    assert server.call("GET", "/api/robot").data["reason"] == "stopped by a person at the face"
 
 
 def test_stop_needs_nothing_of_the_rest_of_the_face(server: PageServer, opened: OpenPage) -> None:
@@ -148,7 +148,7 @@ def test_a_question_that_nobody_answers_ends(tmp_path: Path, opened: OpenPage) -
 def test_the_operator_sees_that_no_face_is_open_and_can_answer(server: PageServer, opened: OpenPage) -> None:
     operator = opened(server)
     server.run(ASKS)
-    expect(operator.get_by_text("No face is open, so that nobody sees")).to_be_visible()
+    expect(operator.get_by_text("Open the robot's face")).to_be_visible()
     operator.locator(".asking").get_by_role("button", name="Yes").click()
     expect(operator.locator(".moment-hears .text")).to_have_text("Yes")
     expect(operator.locator(".asking")).to_be_hidden()

@@ -88,7 +88,7 @@ def test_from_an_instruction_to_an_answer_on_a_real_graph(
         face = opened(server, link=server.face_link, size=TABLET, script=SPEAKING)
         operator.locator("textarea").fill("Ask ann in the study whether she would like tea.")
         operator.get_by_role("button", name="Write the program").click()
-        expect(operator.get_by_text("The check found no problem.")).to_be_visible()
+        expect(operator.get_by_text("Checked: no problems.")).to_be_visible()
         expect(operator.get_by_role("button", name="Run it on the robot")).to_be_enabled()
         operator.get_by_role("button", name="Run it on the robot").click()
         expect(face.locator("#doing")).to_have_text("On my way: study")

@@ -51,7 +51,7 @@ def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, 
     second.context.close()
     expect(face.locator("#doing")).to_have_text("I was stopped.")
     until_over(server)
-    assert missions(server.home)[-1].reason == "stopped by the leaving of the last operator"
+    assert missions(server.home)[-1].reason == "stopped by the last operator, who left"
 
 
 def test_who_comes_back_in_time_finds_it_running(server: PageServer, opened: OpenPage) -> None:
@@ -69,7 +69,7 @@ def test_a_mission_that_only_waits_is_left_alone(server: PageServer, opened: Ope
     page = opened(server)
     expect(page.locator(".headline")).to_be_visible()
     server.call("POST", "/api/missions", {"program": FAR})
-    expect(page.locator(".headline")).to_have_text("Waits for your word")
+    expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
     page.context.close()
     time.sleep(GRACE + 1)
     assert state(server) == "checked"

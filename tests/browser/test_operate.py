@@ -50,7 +50,7 @@ def checked(page: Page, program: str) -> None:
         mark,
     )
     expect(page.locator(".cm-content")).to_contain_text(mark)
-    expect(page.get_by_text("The check found no problem.")).to_be_visible()
+    expect(page.get_by_text("Checked: no problems.")).to_be_visible()
 
 
 def run(page: Page, program: str) -> None:
@@ -76,12 +76,12 @@ def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> Non
         page = opened(server)
         page.locator(".picks .pick").first.click()
         page.get_by_role("button", name="Write the program").click()
-        expect(page.get_by_text("Recorded: people wrote this.")).to_be_visible()
-        expect(page.get_by_text("The check found no problem.")).to_be_visible()
+        expect(page.get_by_text("Recorded: written by people.")).to_be_visible()
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         assert page.locator(".strip .scene").count() > 3
         assert "def task_program" in text_of(page)
         assert page.locator(".cm-content .skill").count() > 2
-        expect(page.locator(".headline")).to_have_text("Waits for your word")
+        expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
         page.get_by_role("button", name="Run it on the robot").click()
         expect(page.locator(".headline")).to_have_text("Done")
         assert page.locator(".moment").count() > 5
@@ -126,7 +126,7 @@ def test_every_tab_and_every_reload_shows_the_same(server: PageServer, opened: O
     checked(first, TEA)
     second, elsewhere = opened(server, beside=first), opened(server, size=PHONE)
     for page in (second, elsewhere):
-        expect(page.get_by_text("The check found no problem.")).to_be_visible()
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         expect(page.locator(".cm-content")).to_contain_text("Tea for ann, please")
         assert TEA in text_of(page)
     write(elsewhere, FAR)
@@ -154,7 +154,7 @@ def test_an_edit_is_checked_and_problems_stand_at_their_lines(server: PageServer
     page.get_by_text("Run it despite the problems").click()
     expect(button).to_be_enabled()
     write(page, BAD.replace("cellar", "kitchen"))
-    expect(page.get_by_text("The check found no problem.")).to_be_visible()
+    expect(page.get_by_text("Checked: no problems.")).to_be_visible()
     expect(page.locator(".problem-line")).to_have_count(0)
 
 
@@ -173,7 +173,7 @@ def test_only_what_this_browser_shows_is_approved(server: PageServer, opened: Op
         button.click();
     }""")
     expect(page.get_by_text("look at it again")).to_be_visible()
-    expect(page.locator(".headline")).to_have_text("Waits for your word")
+    expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
     expect(page.locator(".cm-content")).not_to_contain_text("something else")
 
 
@@ -185,7 +185,7 @@ def test_checks_take_nothing_away_that_is_typed_meanwhile(server: PageServer, op
     for number, letter in enumerate(typed):
         page.keyboard.type(letter)
         page.wait_for_timeout(400 if number % 8 == 0 else 30)
-    expect(page.get_by_text("The check found no problem.")).to_be_visible()
+    expect(page.get_by_text("Checked: no problems.")).to_be_visible()
     assert text_of(page).endswith(typed)
     while not server.call("GET", "/api/missions/current").data["program"].endswith(typed):
         page.wait_for_timeout(50)
@@ -231,11 +231,11 @@ def test_who_was_slower_at_the_same_moment_is_told(server: PageServer, opened: O
         page.keyboard.press("Control+End")
     second.evaluate("programEditor.show = () => {}")  # what the tool says comes too late
     first.keyboard.insert_text("# of the first\n")
-    expect(first.get_by_text("The check found no problem.")).to_be_visible()
+    expect(first.get_by_text("Checked: no problems.")).to_be_visible()
     while "# of the first" not in server.call("GET", "/api/missions/current").data["program"]:
         first.wait_for_timeout(50)
     second.keyboard.insert_text("# of the second\n")
-    expect(second.get_by_text("Somebody else changed the program meanwhile")).to_be_visible()
+    expect(second.get_by_text("Another person changed the program meanwhile")).to_be_visible()
     assert "# of the second" not in server.call("GET", "/api/missions/current").data["program"]
 
 
@@ -248,12 +248,12 @@ def test_what_was_typed_just_before_a_click_is_checked_and_kept(server: PageServ
     page.keyboard.press("Control+End")
     page.keyboard.insert_text("# one more")
     button.evaluate("button => button.click()")
-    expect(page.get_by_text("What was just typed is checked first.")).to_be_visible()
+    expect(page.get_by_text("Your last edit is checked first.")).to_be_visible()
     until(
         page,
         "fetch('/api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))",
     )
-    expect(page.locator(".headline")).to_have_text("Waits for your word")
+    expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
     expect(page.locator(".cm-content")).to_contain_text("# one more")
 
 
@@ -306,7 +306,7 @@ def test_escape_leaves_a_program_alone_that_waits(server: PageServer, opened: Op
     checked(page, TEA)
     page.keyboard.press("Escape")
     page.wait_for_timeout(500)
-    expect(page.locator(".headline")).to_have_text("Waits for your word")
+    expect(page.locator(".headline")).to_have_text("Ready: waiting for your approval")
 
 
 def test_stop_needs_nothing_of_the_rest_of_the_page(server: PageServer, opened: OpenPage) -> None:
@@ -460,8 +460,8 @@ def test_past_missions_are_told_and_downloaded(server: PageServer, opened: OpenP
     expect(page.locator(".rows .state-done").first).to_be_visible()
     page.locator(".rows a").first.click()
     expect(page.locator(".timeline")).to_contain_text("Would you like tea?")
-    expect(page.locator(".timeline .text").first).to_have_text("The mission begins")
-    expect(page.locator(".timeline .text").last).to_have_text("The robot is done")
+    expect(page.locator(".timeline .text").first).to_have_text("Mission created")
+    expect(page.locator(".timeline .text").last).to_have_text("Done")
     assert not re.search(r"drafting|^checked$|\(\)", page.locator(".timeline").inner_text(), re.MULTILINE)
     expect(page.locator(".source")).to_contain_text("task_program")
     for link, begins in (("Events", b'{"time"'), ("MCAP", b"\x89MCAP")):
@@ -480,7 +480,7 @@ def test_what_became_of_a_mission_is_said_after_the_tool_died(tmp_path: Path, op
     with PageServer(tmp_path) as server:
         page = opened(server)
         expect(page.locator(".interrupted").first).to_contain_text("the tool died during go_to")
-        page.get_by_role("button", name="I have seen it").click()
+        page.get_by_role("button", name="Dismiss").click()
         expect(page.locator(".interrupted").first).to_be_hidden()
         page.context.close()
 

@@ -140,7 +140,7 @@ def test_a_huge_program_does_not_hold_the_page_up(tmp_path: Path, opened: OpenPa
         page = opened(server)
         expect(page.locator(".headline")).to_be_visible()
         assert server.call("POST", "/api/missions", {"program": huge}).status == 201
-        expect(page.get_by_text("The check found no problem.")).to_be_visible()
+        expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         began = time.monotonic()
         page.locator("#stop").click()
         expect(page.locator(".headline")).to_have_text("Stopped")

@@ -1,4 +1,4 @@
-"""A robot as a running program meets it: each skill is noted as it happens, and none starts after a stop."""
+"""The robot that a running program calls: logs each skill, and starts none after a stop."""
 
 from __future__ import annotations
 
@@ -16,20 +16,16 @@ from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, Rules
 
 BEGINS = frozenset({"goto", "ask", "say"})
-"""Kinds of events that happen by being tried; of all others there is an event only when they succeed."""
+"""Kinds of events that count when tried; all others count only when they succeed."""
 
 RETURNS: Mapping[str, type] = {"str": str, "bool": bool, "list[str]": list, "None": type(None)}
 
 
 class Note(Protocol):
-    """Takes down what happens; called from any thread."""
+    """Logs an event, from any thread; the `picture` of one is bytes."""
 
     def __call__(self, event: str, /, **data: object) -> None:
-        """Take down one event; the `picture` of one is bytes.
-
-        Raises:
-            OSError: it cannot be written.
-        """
+        """Log an event."""
 
 
 class StoppedError(Exception):
@@ -37,14 +33,14 @@ class StoppedError(Exception):
 
 
 class LiveRobot:
-    """What `Worker.run_live` asks of a robot, answered by a real or simulated one.
+    """Answers what `Worker.run_live` asks of a robot, by a real or simulated one.
 
     Args:
         robot: connected.
-        note: takes down each skill, how it goes on and how it ends.
-        place: the room it is in, as far as that is known.
-        clock_starts: what the program's clock shows at its start; by default what a clock on the wall shows
-            now, since programs speak of the time to people.
+        note: logs events.
+        place: the room it is in, if known.
+        clock_starts: the program's clock at its start; by default the time of day here, since programs speak
+            of the time to people.
     """
 
     is_live = True
@@ -72,13 +68,13 @@ class LiveRobot:
 
     @property
     def trace(self) -> Trace:
-        """What the robot has done so far."""
+        """The robot's trace so far."""
         return tuple(self._events)
 
     def stop(self) -> None:
-        """Have the robot end what it does, and nothing started any more; from any thread, again and again.
+        """Cancel what the robot does and start nothing more; from any thread, any number of times.
 
-        The robot is told before anything else, so that nothing slow can delay it.
+        The robot is told first, so that nothing slow can delay it.
         """
         self._stopped.set()
         try:
@@ -93,28 +89,28 @@ class LiveRobot:
             StoppedError: the robot was stopped.
             OSError: that cannot be taken down.
         """
-        self._go_on()
+        self._check_end()
         seconds = max(0.0, now - self.now)
         self._note("sleep", seconds=round(seconds, 3))
         self.robot.clock.wait(seconds)
-        self._go_on()
+        self._check_end()
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Have the robot execute one skill.
+        """Execute one skill.
 
         Raises:
-            RobotError: it cannot.
+            RobotError: the robot cannot.
             StoppedError: it was stopped.
-            RobotLostError: it is gone, or gives an answer that the skill does not have.
-            OSError: what happens cannot be taken down.
+            RobotLostError: it is gone, or its answer does not fit the skill.
+            OSError: an event cannot be logged.
         """
-        self._go_on()
+        self._check_end()
         row = self.skills[skill]
         event = _event(row, arguments)
         event = event and replace(event, place=self._place, time=self.now)
         if event and event.kind in BEGINS:
             self._events.append(event)
-        result = self._taken_down(row, [_text(argument) for argument in arguments], event)
+        result = self._logged(row, [_text(argument) for argument in arguments], event)
         if event is None:
             return result
         if event.kind in BEGINS:
@@ -124,8 +120,8 @@ class LiveRobot:
             self._place = event.text
         return _position(result, event) if event.options else result
 
-    def _taken_down(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
-        """The robot's answer or its error, each taken down."""
+    def _logged(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
+        """The robot's answer or its error, logged."""
         self._number += 1
         which = {"number": self._number, "skill": skill.name}
         named = dict(zip((p.name for p in skill.parameters), given, strict=True))
@@ -137,14 +133,14 @@ class LiveRobot:
                 _position(result, event)
         except RobotError as error:
             self._note("error", **which, kind=error.kind, message=str(error))
-            self._go_on()
+            self._check_end()
             raise
         except CancelledError:
             self._note("cancelled", **which, seconds=round(self.now - started, 3))
-            self._go_on()
+            self._check_end()
             raise RobotLostError("somebody else stopped the robot") from None
         self._note("late" if self._stopped.is_set() else "result", **which, result=result)
-        self._go_on()
+        self._check_end()
         return result
 
     def _done(self, skill: Skill, given: list[base.Argument]) -> base.Result:
@@ -156,7 +152,7 @@ class LiveRobot:
                     self._note("picture", **which, picture=what.data)
                 else:
                     self._note("feedback", **which, text=what)
-            except OSError as error:  # on a thread of the robot's, where nobody would see it
+            except OSError as error:  # on a thread of the robot, where it would be lost
                 self._fault = error
                 self.stop()
 
@@ -164,8 +160,8 @@ class LiveRobot:
             raise RobotError("AskEmptyOptions", f'the question "{given[-2]}" offers no options')
         return answered(skill, self.robot.perform(skill.name, given, told))
 
-    def _go_on(self) -> None:
-        """Let the program go on, unless it is to end."""
+    def _check_end(self) -> None:
+        """Raise what ends the program, if anything does."""
         if self._began is None:
             self._began = self.robot.clock.now
         if self._fault is not None:
@@ -175,11 +171,7 @@ class LiveRobot:
 
 
 def answered(skill: Skill, result: base.Result) -> base.Result:
-    """What a robot answers to a skill, if it can be an answer to it.
-
-    Raises:
-        RobotLostError: it cannot.
-    """
+    """A robot's answer; raises RobotLostError if it does not fit the skill."""
     is_one = isinstance(result, RETURNS.get(skill.returns, object))
     if not is_one or (isinstance(result, list) and not all(isinstance(text, str) for text in result)):
         raise RobotLostError(f"the robot answers {skill.name} with {result!r:.100}, no {skill.returns}")
@@ -201,18 +193,14 @@ def _event(skill: Skill, arguments: Sequence[Argument]) -> Event | None:
 
 
 def _seen(skill: Skill, result: base.Result) -> dict[str, Any]:
-    """What the robot's answer adds to an event."""
+    """The fields of an event that come from the answer."""
     if isinstance(result, bool):
         return {"found": result}
     return {"answer": result} if skill.recording and skill.recording.options else {}
 
 
 def _position(result: base.Result, event: Event) -> int:
-    """Which option was chosen; a robot that hears people may write it in other letters.
-
-    Raises:
-        RobotError: none of them.
-    """
+    """The number of the chosen option; its case and blanks may differ. Raises RobotError if it is none."""
     heard = str(result)
     for same in (str, lambda text: text.strip().casefold()):
         for number, option in enumerate(event.options):

@@ -1,4 +1,4 @@
-"""A mission as an MCAP file, which Foxglove and other tools of roboticists open."""
+"""Missions as MCAP files, for Foxglove and other tools of roboticists."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ SECOND = 1_000_000_000
 LATEST = 2**63 - 1024  # nanoseconds since 1970 that every reader can hold
 STATES, NOTES = "/mission/state", "/mission/log"
 DETAILS = ("text", "message", "reason", "by", "file")
-"""Where an event that is no skill's has what it says."""
+"""The keys of events that hold text."""
 IMAGE = "foxglove.CompressedImage"
-"""By this name of their schema Foxglove knows messages that are pictures, wherever they come from."""
+"""The schema by whose name Foxglove recognises pictures."""
 WHOLE: Schema = {"type": "integer"}
 TIME: Schema = {"type": "object", "title": "time", "properties": {"sec": WHOLE, "nsec": WHOLE}}
 IMAGE_SCHEMA: Mapping[str, Schema] = {
@@ -59,7 +59,7 @@ def write_mcap(
     clock: Clock = "wall",
     skills: SkillTable = SKILLS,
 ) -> None:
-    """Write a mission: a channel for each skill, one for its pictures, one for states and one for the rest.
+    """Write a mission: a channel for each skill and its pictures, one for states, one for the rest.
 
     The program is attached.
 
@@ -99,24 +99,14 @@ def write_mcap(
 
 
 class Channels:
-    """The channels of a file, each with a schema of its own.
-
-    Args:
-        writer: of the file.
-    """
+    """The channels of a file, each with a schema of its own."""
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
         self._numbers: dict[str, int] = {}
 
     def channel(self, topic: str, properties: Mapping[str, Schema], name: str = "") -> int:
-        """The channel of a topic.
-
-        Args:
-            topic: such as `/skill/go_to`.
-            properties: of its messages, with their types.
-            name: of the schema, where others know it by one.
-        """
+        """The channel of a topic such as `/skill/go_to`, made if it is new."""
         if topic not in self._numbers:
             name = name or "codebotler." + topic.strip("/").replace("/", ".")
             schema = {"type": "object", "properties": properties}
@@ -126,7 +116,7 @@ class Channels:
 
 
 def schema_of(skill: Skill) -> dict[str, Schema]:
-    """What messages about a skill may hold: its arguments, what it gave back, and how it went on."""
+    """The properties of messages about a skill: arguments, result and feedback."""
     arguments = {f"{p.name}": TYPES[p.annotation] for p in skill.parameters}
     result = {"result": TYPES[skill.returns]} if skill.returns in TYPES else {}
     return {**GOES_ON, **arguments, **result}
@@ -160,7 +150,7 @@ def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema],
 
 
 def _image(kind: str, data: bytes, at: int) -> dict[str, object]:
-    """A picture as Foxglove has it."""
+    """A picture as a message for Foxglove."""
     return {
         "timestamp": {"sec": at // SECOND, "nsec": at % SECOND},
         "frame_id": "",
@@ -186,19 +176,7 @@ def _about(summary: Summary) -> dict[str, str]:
 def export(
     path: Path, summary: Summary, events: Sequence[Line], clock: Clock, folder: Path | None = None
 ) -> None:
-    """Write a mission as an MCAP file, whole or not at all; what is no file, such as a pipe, is written into.
-
-    Args:
-        path: the file, or a link to it.
-        summary: of the mission.
-        events: in their order.
-        clock: by which the messages are timed.
-        folder: of the mission, for its pictures; None to leave them out.
-
-    Raises:
-        UserError: the file holds something else.
-        OSError: it cannot be written.
-    """
+    """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
     if path.exists() and not path.is_file():

@@ -1,4 +1,4 @@
-"""A mission: one instruction's life, from its program to the end of the robot's work, and its stop."""
+"""The state machine of a mission: drafted, checked, approved, run on a robot, stopped at any moment."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from codebotler.robots.reservation import Reservation
 from codebotler.simulator.worker import EngineError, Worker
 
 GRACE = 10.0
-"""Real seconds in which a robot has to end what it does once it was told to stop."""
+"""Real seconds that a robot has to confirm a stop."""
 
 UNCONFIRMED = (
     "the robot was told to stop and has not confirmed it; go and look, and use its emergency stop if it moves"
@@ -32,7 +32,7 @@ UNCONFIRMED = (
 
 
 class State(StrEnum):
-    """Where a mission stands."""
+    """The states of a mission."""
 
     DRAFTING = "drafting"
     CHECKED = "checked"
@@ -54,50 +54,50 @@ STEPS: dict[State, frozenset[State]] = {
     State.RUNNING: frozenset({State.DONE, State.FAILED, State.STOPPING}),
     State.STOPPING: frozenset({State.STOPPED, State.FAILED}),
 }
-"""From each state to which; a tool that dies leaves any of these as interrupted. The others are ends."""
+"""The states that may follow each state; the others are final. A tool that dies leaves it interrupted."""
 
 
 class MissionError(Exception):
-    """A mission cannot do that now.
+    """A mission cannot do that now."""
 
-    Args:
-        sentence: why.
-    """
-
-    def __init__(self, sentence: str) -> None:
-        super().__init__(sentence)
-        self.sentence = sentence
+    @property
+    def sentence(self) -> str:
+        """Why."""
+        return str(self)
 
 
 Told: TypeAlias = Callable[[Line], None]
-"""Told each event after it was written; one at a time, from any thread."""
+"""Called with each event after it was written, one at a time, from any thread."""
 
 
 def untold(_line: Line) -> None:
-    """Tell nobody."""
+    """Do nothing with an event."""
 
 
 class Mission:
-    """One mission; as a context manager it ends on leaving, if it has not ended before.
+    """One mission; leaving it as a context manager ends it.
 
     Args:
         home: the folder of missions.
         robot: the kind of robot.
-        instruction: what somebody asks for; empty where the program came as it is.
-        told: told each event.
+        instruction: in plain words; empty where the program did not come from one.
+        told: called with each event.
 
     Raises:
-        OSError: nothing can be written there.
+        OSError: the folder cannot be written.
     """
 
     def __init__(self, home: Path, robot: str, instruction: str = "", told: Told = untold) -> None:
         self.folder = _new_folder(home / "missions")
         self._log, self._pictures = Log(self.folder), Pictures(self.folder)
         self.told = told
-        self._book = threading.RLock()  # held while something is written and told; a stop waits for it last
+        self._writing = threading.RLock()  # held while an event is written; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
         self._stopped_by: str | None = None
-        self._asked, self._passed_on = 0.0, math.inf  # when it was first to stop, and when the robot knew
+        self._asked, self._passed_on = (
+            0.0,
+            math.inf,
+        )  # when a stop was first asked for, and when the robot knew
         self._live: LiveRobot | None = None
         self._worker: Worker | None = None
         self._over, self._wake = threading.Event(), threading.Event()
@@ -120,81 +120,81 @@ class Mission:
 
     @property
     def id(self) -> str:
-        """Its name, by which it is found."""
+        """Its name."""
         return self.summary.id
 
     @property
     def state(self) -> State:
-        """Where it stands."""
+        """Its state."""
         return State(self.summary.state)
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing can happen any more."""
+        """Whether its state is final."""
         return self.state not in STEPS
 
     def draft(self, program: str, model: str = "") -> None:
-        """Take a program, the first one or another; it has to be checked.
+        """Take a program, the first one or another, which is not checked yet.
 
         Args:
             program: its source.
-            model: who wrote it, if a model did.
+            model: the model that wrote it, if one did.
 
         Raises:
             MissionError: it is too late for that.
         """
-        with self._book:
+        with self._writing:
             self._step(State.DRAFTING, "take another program", program=program, model=model, problems=())
 
     def check(self, problems: Sequence[str]) -> None:
-        """Take what a check of the program found, each in a sentence.
+        """Take the problems that a check found, in sentences.
 
         Raises:
             MissionError: there is no program, or it is too late for that.
         """
-        with self._book:
+        with self._writing:
             if not self.summary.program:
                 raise MissionError(f"mission {self.id} has no program that could be checked")
             self._step(State.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
-        """Take somebody's word that the program may be run.
+        """Take a person's approval of the program.
 
         Args:
-            despite_problems: whether they say so although the check found problems.
+            despite_problems: whether they approve it although the check found problems.
 
         Raises:
             MissionError: the program was not checked, or has problems.
         """
-        with self._book:
+        with self._writing:
             if self.state is State.CHECKED and self.summary.problems and not despite_problems:
                 raise MissionError(
-                    f"the program of mission {self.id} has problems; approve it despite them, or mend it"
+                    f"the program of mission {self.id} has problems; approve it despite them, or change it"
                 )
             self._step(State.APPROVED, "be approved")
 
     def fail(self, reason: str) -> None:
-        """End it before it runs.
+        """Fail before running.
 
         Raises:
             MissionError: it runs, or has ended.
         """
-        with self._book:
+        with self._writing:
             if self.state in {State.RUNNING, State.STOPPING}:
                 raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
             self._step(State.FAILED, "fail", reason=reason)
 
     def note(self, text: str) -> None:
-        """Take down a sentence, such as what a check of the robot's rooms found."""
+        """Log a sentence."""
         self._write("log", text=text)
 
     def stop(self, by: str = "somebody") -> None:
-        """Stop it, from any thread: end what the robot does, start nothing more, and end the program.
+        """Stop the robot and the program, from any thread; nothing else starts.
 
-        Back when the robot was told so; `run` comes back when it has ended what it did.
+        Returns when the robot was told; `run` returns when the robot has ended what it did.
 
         Args:
-            by: who wants it, in words, such as `Ctrl-C`.
+            by: who stops it, in words such as `Ctrl-C`.
 
         Raises:
             MissionError: it has ended.
@@ -204,7 +204,7 @@ class Mission:
             if self._stopped_by is None:
                 self._stopped_by, self._asked = by, asked
             live, worker = self._live, self._worker
-        self._wake.set()  # a robot that cannot be told must not keep anybody from hearing so
+        self._wake.set()  # wakes `run` even if the robot cannot be told
         try:
             if live is not None:
                 live.stop()
@@ -212,7 +212,7 @@ class Mission:
             self._passed_on = min(self._passed_on, time.monotonic())
             if worker is not None:
                 worker.stop()
-        with self._book:
+        with self._writing:
             if self.state is State.STOPPED and not had_ended:
                 return  # by this very stop, whose end was written first
             if self.has_ended:
@@ -223,13 +223,13 @@ class Mission:
                 self._step(State.STOPPED, "be stopped", reason=f"stopped by {by} before it ran")
 
     def run(self, reserved: Reservation, place: str = "") -> State:
-        """Run the program on a robot, and come back when all has ended.
+        """Run the program on a robot, and return when all has ended.
 
-        It is back even if a robot that was stopped does not end what it does; then the mission has failed.
+        If a robot that was stopped does not confirm it within `GRACE` seconds, the mission fails.
 
         Args:
             reserved: the robot.
-            place: the room in which it is, as far as that is known.
+            place: the room it is in, if known.
 
         Returns:
             done, failed or stopped.
@@ -237,10 +237,10 @@ class Mission:
         Raises:
             MissionError: it is not approved.
             NotReadyError: the robot is on another mission, or was.
-            OSError: what happens could not be written or told, and so the robot was stopped.
+            OSError: an event could not be written or printed, so the robot was stopped.
         """
         live = LiveRobot(reserved.robot, self._write, place=place)
-        with self._book:
+        with self._writing:
             if self.state is State.APPROVED:
                 reserved.use()
                 self._live = live
@@ -260,7 +260,7 @@ class Mission:
         return self.state
 
     def _execute(self, live: LiveRobot) -> None:
-        """Run the program; on a thread of its own, since a robot may never come back from a skill."""
+        """Run the program, on a thread of its own: a robot may never return from a skill."""
         try:
             outcome = self._outcome(live)
         except BaseException as error:  # noqa: BLE001 - whatever it is, the robot must not go on
@@ -287,9 +287,9 @@ class Mission:
             worker.close()
 
     def _end(self, state: State, reason: str = "", line: int | None = None) -> None:
-        """Come to an end, the first that is told; what ends because it was stopped is stopped."""
+        """End, unless it has ended; a mission that ends after a stop is stopped."""
         try:
-            with self._book:
+            with self._writing:
                 if self.has_ended:
                     return
                 if self._live is not None:
@@ -299,14 +299,14 @@ class Mission:
                 if self._stopped_by is not None and self.state is State.RUNNING:
                     self._be_stopping()
                 self._step(state, "end", reason=reason, line=line)
-        except Exception as error:  # noqa: BLE001 - thrown where somebody hears it
+        except Exception as error:  # noqa: BLE001 - raised by `run`
             self._fault = error
         finally:
             self._over.set()
             self._wake.set()
 
     def _be_stopping(self) -> None:
-        """Write who stopped it; the robot may have ended before whoever told it so is back."""
+        """Log who stopped it; the robot may have ended before the stop returned."""
         passed_on = min(self._passed_on, time.monotonic())
         self._write("stop", by=self._stopped_by, seconds_to_cancel=round(passed_on - self._asked, 6))
         self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
@@ -315,12 +315,12 @@ class Mission:
         if self.state in {State.RUNNING, State.STOPPING}:
             self.stop("the end of the tool")
         elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
-            self.stop("whoever began it")
+            self.stop("its creator")
         else:
             self.fail(visible(str(error)) or type(error).__name__)
 
     def _step(self, to: State, what: str, **changes: object) -> None:
-        """Go to a state, and write so; the caller has the book."""
+        """Go to a state and log it; the caller has the lock."""
         if to not in STEPS.get(self.state, ()):
             raise MissionError(f"mission {self.id} is {self.state}, and cannot {what}")
         self.summary.state = to
@@ -334,9 +334,9 @@ class Mission:
             self._log.close()
 
     def _write(self, event: str, /, **data: object) -> None:
-        """Write an event and tell it; of what comes after the end there is nothing to tell."""
+        """Log an event and report it; events after the end are dropped."""
         clock = 0.0 if self._live is None else self._live.now
-        with self._book:
+        with self._writing:
             if not self._log.is_open:
                 return
             if isinstance(picture := data.pop("picture", None), bytes):
@@ -355,7 +355,7 @@ def _reason(error: BaseException) -> str:
 
 
 def _new_folder(missions: Path) -> Path:
-    """A folder that no mission has, named by the time."""
+    """A new folder, named by the time."""
     make_folder(missions)
     name = f"{datetime.now().astimezone():%Y%m%d-%H%M%S}"
     number = 1

@@ -1,4 +1,4 @@
-"""The pictures of a mission, each in a file of its own; what a robot calls a picture may be anything."""
+"""The pictures of a mission, each in a file of its own."""
 
 from __future__ import annotations
 
@@ -11,31 +11,19 @@ FOLDER = "pictures"
 MOST_BYTES = 2_000_000  # of one picture
 MOST_IN_ALL = 200_000_000  # bytes of all pictures of a mission
 KINDS: Mapping[str, bytes] = {"jpg": b"\xff\xd8\xff", "png": b"\x89PNG\r\n\x1a\n"}
-"""What files of each kind begin with, by the end of their names."""
+"""The first bytes of each kind of file."""
 NAME = re.compile(rf"{FOLDER}/\d+\.(?:{'|'.join(KINDS)})")
 
 
 class Pictures:
-    """Keeps the pictures of a mission, as they came; nothing but their first bytes is looked at.
-
-    Args:
-        folder: of the mission.
-    """
+    """Keeps the pictures of a mission as they came; only their first bytes are read."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._count = self._bytes = 0
 
     def keep(self, data: bytes) -> dict[str, str]:
-        """Write a picture.
-
-        Returns:
-            what an event tells of it: the `file` as seen from the mission's folder, or a `text` that says why
-            it was not kept.
-
-        Raises:
-            OSError: it cannot be written.
-        """
+        """Write a picture, and return its event's `file`, or a `text` that says why it was not kept."""
         kind = next((kind for kind, start in KINDS.items() if data.startswith(start)), None)
         if kind is None:
             return _left_out(f"its {len(data):,} bytes are neither JPEG nor PNG")
@@ -62,12 +50,7 @@ def _left_out(why: str) -> dict[str, str]:
 
 
 def picture_of(folder: Path, line: Mapping[str, Any]) -> tuple[str, bytes] | None:
-    """The kind and the bytes of the picture that an event names; None if it names none that is there.
-
-    Args:
-        folder: of the mission.
-        line: the event.
-    """
+    """The kind and the bytes of an event's picture, if there is one."""
     name = line.get("file")
     if line["event"] != "picture" or not isinstance(name, str) or not NAME.fullmatch(name):
         return None

@@ -1,4 +1,4 @@
-"""What a robot is doing and has said, as far as the events of its mission tell."""
+"""What a robot is doing, where it is, and what was spoken, by the events of its mission."""
 
 from __future__ import annotations
 
@@ -24,50 +24,28 @@ HEARD = {"say": "says", "ask": "asks"}
 
 @dataclass(frozen=True)
 class Moment:
-    """Something that happened, in words.
+    """Something that happened, in words."""
 
-    Args:
-        clock: seconds by the robot's clock since the program began.
-        kind: of the event; `says`, `asks` and `hears` for what is spoken.
-        text: what happened; any text.
-    """
-
-    clock: float
-    kind: str
+    clock: float  # seconds by the robot's clock since the program began
+    kind: str  # of the event; `says`, `asks` and `hears` for what is spoken
     text: str
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a mission has come.
+    """How far a mission has come."""
 
-    Args:
-        doing: what the robot does just now, in words; empty while it does nothing.
-        skill: the name of the skill that goes on.
-        line: of the program, where only one call can be meant.
-        clock: seconds by the robot's clock since the program began.
-        room: to which it drove last, in the program's words; empty before it drove.
-        at: where it is in metres, as far as it tells.
-        is_driving: whether it is on its way to `room`.
-        moments: what happened, the last 200.
-    """
-
-    doing: str = ""
-    skill: str = ""
-    line: int | None = None
-    clock: float = 0.0
-    room: str = ""
-    at: Point | None = None
-    is_driving: bool = False
-    moments: tuple[Moment, ...] = ()
+    doing: str = ""  # now, in words
+    skill: str = ""  # the skill under way
+    line: int | None = None  # of the program, where only one call can be meant
+    clock: float = 0.0  # seconds by the robot's clock since the program began
+    room: str = ""  # the last destination, in the program's words
+    at: Point | None = None  # the position in metres, if known
+    is_driving: bool = False  # to `room`
+    moments: tuple[Moment, ...] = ()  # the last 200
 
     def after(self, line: Line, program: str) -> Progress:
-        """How far it has come with one more event.
-
-        Args:
-            line: the event.
-            program: which runs.
-        """
+        """The progress after one more event of a program."""
         event = line["event"]
         now = replace(self, clock=max(self.clock, line["clock"]))
         if event == "feedback":
@@ -83,7 +61,7 @@ class Progress:
         return replace(now, moments=(*now.moments, _moment(line, text))[-MOST:])
 
     def with_skill(self, line: Line, program: str) -> Progress:
-        """As a skill begins."""
+        """The progress when a skill begins."""
         name = line["skill"]
         drives = name in SKILLS and getattr(SKILLS[name].recording, "kind", "") == "goto"
         now = replace(
@@ -114,13 +92,7 @@ def _plain(argument: object) -> object:
 
 
 def line_of(program: str, skill: str, given: Sequence[object]) -> int | None:
-    """The line of the only call in a program that can be meant; None where several can, or none.
-
-    Args:
-        program: its source.
-        skill: which is called.
-        given: the arguments, in order.
-    """
+    """The line of a program that calls a skill with these arguments; None where several can be meant."""
     lines = {line for line, fixed in _calls(program).get(skill, ()) if _fits(fixed, given)}
     return lines.pop() if len(lines) == 1 else None
 
@@ -134,7 +106,7 @@ def _fits(fixed: Sequence[object], given: Sequence[object]) -> bool:
 
 @lru_cache(maxsize=16)
 def _calls(program: str) -> Mapping[str, Sequence[tuple[int, tuple[object, ...]]]]:
-    """For each skill the calls with what their arguments surely are."""
+    """The calls of each skill, with the arguments that are constants."""
     tree = parsed(program)
     if not isinstance(tree, ast.Module):
         return {}

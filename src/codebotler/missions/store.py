@@ -1,4 +1,4 @@
-"""Missions as they lie on the disk: found, listed, and closed where the tool died."""
+"""Past missions on the disk: listed, found, and closed if the tool died."""
 
 from __future__ import annotations
 
@@ -18,28 +18,12 @@ ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
 
 def missions(home: Path) -> list[Summary]:
-    """All missions in the order in which they began.
-
-    Args:
-        home: the folder of missions.
-
-    Raises:
-        UserError: one cannot be read, or the folder is none.
-        OSError: the folder cannot be read.
-    """
+    """All missions, oldest first; raises UserError if one cannot be read."""
     return sorted(map(summary_of, _folders(home)), key=lambda summary: (summary.created, summary.id))
 
 
 def find(home: Path, name: str) -> Path:
-    """The folder of a mission.
-
-    Args:
-        home: the folder of missions.
-        name: the mission's own, or `last`.
-
-    Raises:
-        UserError: there is none of that name.
-    """
+    """The folder of a mission, by its name or `last`; raises UserError if there is none."""
     if name == "last" and (known := missions(home)):
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
@@ -50,12 +34,7 @@ def find(home: Path, name: str) -> Path:
 
 
 def summary_of(folder: Path) -> Summary:
-    """The summary of a mission.
-
-    Raises:
-        UserError: it is none.
-        OSError: it cannot be read.
-    """
+    """The summary of a mission; raises UserError if the file is something else."""
     summary = Summary.read(folder)
     if summary.state not in tuple(State):
         raise UserError("this is no summary of a mission; remove its folder", file=folder / SUMMARY)
@@ -63,23 +42,18 @@ def summary_of(folder: Path) -> Summary:
 
 
 def untold(_mission: str, _error: OSError) -> None:
-    """Tell nobody."""
+    """Do nothing with a mission that cannot be closed."""
 
 
 def recover(home: Path, unclosed: Callable[[str, OSError], None] = untold) -> list[Summary]:
-    """Close the missions that a tool left behind when it died: they were interrupted.
+    """Close the missions that were interrupted because the tool died.
 
     Args:
         home: the folder of missions.
-        unclosed: told each mission that cannot be closed, such as one on a disk that is full, and why.
+        unclosed: called with each mission that cannot be closed, and why: a full disk stops no robot.
 
     Returns:
-        those that were not known to be before; what cannot be read is left to `missions` to complain about,
-        so that it keeps no robot from working.
-
-    Raises:
-        UserError: the folder is none.
-        OSError: the folder cannot be read.
+        the missions closed now; unreadable ones are left to `missions`.
     """
     found = []
     for folder in _folders(home):
@@ -93,7 +67,7 @@ def recover(home: Path, unclosed: Callable[[str, OSError], None] = untold) -> li
 
 
 def _folders(home: Path) -> list[Path]:
-    """The folders of missions; none where there has been no mission yet."""
+    """The folders of missions."""
     folder = home / "missions"
     try:
         found = sorted(folder.iterdir())
@@ -101,13 +75,13 @@ def _folders(home: Path) -> list[Path]:
         return []
     except NotADirectoryError:
         raise UserError(
-            "this cannot be a folder of missions; name another by CODEBOTLER_HOME", file=folder
+            "this is a file, not a folder of missions; set CODEBOTLER_HOME to another folder", file=folder
         ) from None
     return [path for path in found if os.path.exists(path / SUMMARY)]  # noqa: PTH110 - raises nothing
 
 
 def _interrupted(folder: Path) -> list[Summary]:
-    """The mission, if it was, and nobody had noticed."""
+    """The mission, if it was interrupted and not closed."""
     if State(summary_of(folder).state) not in STEPS:
         return []
     try:
@@ -134,7 +108,7 @@ def _interrupted(folder: Path) -> list[Summary]:
 
 
 def _last_told(events: list[Line]) -> Line | None:
-    """The last event that tells of a state."""
+    """The last event with a state."""
     return next((line for line in reversed(events) if line["event"] == "state"), None)
 
 

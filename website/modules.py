@@ -1,0 +1,48 @@
+"""Writes the list of all modules, each with the first line of its docstring, into docs/architecture.md."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+PAGE = ROOT / "docs" / "architecture.md"
+HEAD = "## All modules\n"
+
+
+def section() -> str:
+    """The section, a table for each room."""
+    parts = [HEAD.strip(), "The first line of each module; `python website/modules.py` writes this list."]
+    for package in ("codebotler", "roboeval"):
+        source = ROOT / "src" / package
+        rooms = [source, *sorted(path for path in source.rglob("*") if (path / "__init__.py").exists())]
+        parts += [table for room in rooms if (table := _table(room))]
+    return "\n\n".join(parts) + "\n"
+
+
+def _table(room: Path) -> str:
+    rows = list(_rows(room))
+    if not rows:
+        return ""
+    name = str(room.relative_to(ROOT / "src"))
+    return "\n".join([f"| `{name}/` | {_first_line(room / '__init__.py')} |", "|---|---|", *rows])
+
+
+def _rows(room: Path) -> Iterator[str]:
+    for path in sorted(room.glob("*.py")):
+        if path.name not in {"__init__.py", "__main__.py"}:
+            yield f"| `{path.name}` | {_first_line(path)} |"
+
+
+def _first_line(path: Path) -> str:
+    return (ast.get_docstring(ast.parse(path.read_text())) or "").split("\n")[0].replace("|", "\\|")
+
+
+def page() -> str:
+    """The page with the section as it should be."""
+    return PAGE.read_text().partition(HEAD)[0] + section()
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page())
