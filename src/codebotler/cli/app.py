@@ -1,4 +1,4 @@
-"""The commands of CodeBotler, each with its options; what is long about one has a module beside this one."""
+"""The commands of CodeBotler and their options; longer commands have modules of their own."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 
 
 def robot_names(incomplete: str) -> list[str]:
-    """What a shell completes where a kind of robot belongs."""
+    """Shell completion of kinds of robots."""
     from codebotler.robots.open import KINDS
 
     return [name for name in KINDS if name.startswith(incomplete)]
@@ -155,7 +155,9 @@ def run(
     ],
     robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file of a simulated robot.")] = None,
-    model: Annotated[str, typer.Option(help="Who writes the program for an instruction.")] = "recorded",
+    model: Annotated[
+        str, typer.Option(help="The model that writes the program for an instruction.")
+    ] = "recorded",
     yes: Annotated[bool, typer.Option("--yes", help="Run it without asking.")] = False,
     despite_problems: Annotated[
         bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
@@ -223,7 +225,7 @@ def robots(
 ) -> None:
     """List the kinds of robots, and which of them work here.
 
-    For the others it says what is missing, and the mend.
+    For the others it says what is missing, and how to get it.
     """
     from dataclasses import asdict
 
@@ -241,14 +243,14 @@ def robots(
 @app.command()
 def serve(
     host: HostOption = "127.0.0.1",
-    port: PortOption = 8080,
+    port: PortOption = None,
     name: NameOption = None,
     token: TokenOption = None,
     no_token: NoTokenOption = False,
     robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file, for the robot and for the map.")] = None,
     model: Annotated[
-        list[str] | None, typer.Option(help="Who may write programs; more than one may be named.")
+        list[str] | None, typer.Option(help="A model that may write programs; may be given several times.")
     ] = None,
     base_url: BaseUrlOption = None,
     speed: SpeedOption = 1.0,

@@ -1,4 +1,4 @@
-"""What `codebotler check` reads and shows."""
+"""`codebotler check`: reads a program, and shows what a check found."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a command line ends: its status, and one sentence for whatever a user can cause."""
+"""How a command line ends: the exit status, and one sentence for an error that a user can cause."""
 
 from __future__ import annotations
 

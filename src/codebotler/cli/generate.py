@@ -1,4 +1,4 @@
-"""What `codebotler generate` does: asks a model, checks, asks again, and says what is going on."""
+"""`codebotler generate`: asks a model for a program, and again while there are problems."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that several commands have: which model is asked and how, and which Python has ROS."""
+"""Options shared by several commands."""
 
 from __future__ import annotations
 
@@ -30,7 +30,12 @@ SpeedOption = Annotated[
 ]
 AddressOption = Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
-PortOption = Annotated[int, typer.Option(min=0, max=65535, help="The port; 0 takes a free one.")]
+PortOption = Annotated[
+    int | None,
+    typer.Option(
+        min=0, max=65535, help="The port, by default the first free one from 8080; 0: any free one."
+    ),
+]
 NameOption = Annotated[
     list[str] | None, typer.Option(help="A name by which the page is called, besides its address.")
 ]

@@ -1,4 +1,4 @@
-"""Missions and robots as a person sees them: as they go on, in a list, one by one."""
+"""Missions and robots, drawn on a terminal."""
 
 from __future__ import annotations
 

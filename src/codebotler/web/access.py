@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import hmac
 import ipaddress
@@ -21,6 +22,7 @@ TRIES, WINDOW = 10, 60.0
 MOST_ADDRESSES = 10_000
 SHORTEST_TOKEN = 16
 LOOPBACK = frozenset({"localhost", "127.0.0.1", "::1"})
+PORTS = range(8080, 8100)
 QUEUE = 128  # connections that wait to be accepted
 
 
@@ -123,7 +125,7 @@ class Place:
     """The address of the page."""
 
     host: str = "127.0.0.1"
-    port: int = 8080  # 0 takes a free one
+    port: int | None = None  # 0 takes any free one, None the first of `PORTS` that is free
     names: tuple[str, ...] = ()  # further names of the page
 
     @property
@@ -140,19 +142,32 @@ class Place:
         Raises:
             UserError: the port is in use, or the host is not this machine.
         """
+        ports = PORTS if self.port is None else (self.port,)
+        for port in ports:
+            try:
+                return self._bound(port)
+            except OSError as error:
+                if error.errno == errno.EADDRINUSE and port != ports[-1]:
+                    continue
+                raise UserError(
+                    f"port {port} is already in use; choose another --port"
+                    if error.errno == errno.EADDRINUSE
+                    else f"cannot listen on {self.host}, port {port}: {error.strerror}"
+                ) from None
+        raise AssertionError("there are ports")
+
+    def _bound(self, port: int) -> socket.socket:
+        family, kind, protocol, _, address = socket.getaddrinfo(
+            self.host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+        )[0]
+        bound = socket.socket(family, kind, protocol)
         try:
-            family, kind, protocol, _, address = socket.getaddrinfo(
-                self.host, self.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-            )[0]
-            bound = socket.socket(family, kind, protocol)
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             bound.bind(address)
             bound.listen(QUEUE)
-        except OSError as error:
-            raise UserError(
-                f"cannot listen on {self.host}, port {self.port}: {error.strerror}; "
-                "choose another --port, or --host"
-            ) from None
+        except OSError:
+            bound.close()
+            raise
         return bound
 
     def rules(self, access: Access, port: int) -> GuardRules:
@@ -163,13 +178,19 @@ class Place:
 
 
 def entrance(
-    host: str, port: int, names: Sequence[str], token: str | None, face: str | None = None, *, no_token: bool
+    host: str,
+    port: int | None,
+    names: Sequence[str],
+    token: str | None,
+    face: str | None = None,
+    *,
+    no_token: bool,
 ) -> tuple[Place, Access]:
     """The address and the tokens of a page, as the command line has them.
 
     Args:
         host: the address to listen on.
-        port: 0 takes a free one.
+        port: 0 takes any free one; None the first of `PORTS` that is free.
         names: further names of the page.
         token: of operators; a new one by default.
         face: the token of the robot's face; a new one by default.

@@ -124,7 +124,7 @@ def export(
 def serve(
     runs: Annotated[Path, typer.Argument(help="A folder of runs, or one run.")] = Path("runs"),
     host: HostOption = "127.0.0.1",
-    port: PortOption = 8080,
+    port: PortOption = None,
     name: NameOption = None,
     token: TokenOption = None,
     no_token: NoTokenOption = False,

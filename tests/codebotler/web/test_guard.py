@@ -14,6 +14,7 @@ from starlette.types import Message, Receive, Scope, Send
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from codebotler.core.errors import UserError
 from codebotler.web.access import LOOPBACK, TRIES, WINDOW, Access, GuardRules, Place, Role, TooManyTriesError
 from codebotler.web.guard import MOST_BYTES, Guard, _is_same
 from command_line import ENVIRONMENT
@@ -472,3 +473,16 @@ def test_names_by_which_the_page_may_be_called() -> None:
     everywhere = Place("0.0.0.0", names=("Robot.Local",)).rules(Access(), 2)
     assert (everywhere.any_address, "robot.local" in everywhere.hosts) == (True, True)
     assert here.cookie != everywhere.cookie
+
+
+def test_the_default_port_moves_on_and_a_port_that_was_named_does_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    with Place(port=0).listening() as first, Place(port=0).listening() as other:
+        taken, free = first.getsockname()[1], other.getsockname()[1]
+        other.close()
+        monkeypatch.setattr("codebotler.web.access.PORTS", (taken, free))
+        with Place().listening() as found:
+            assert found.getsockname()[1] == free
+        with pytest.raises(UserError, match=f"port {taken} is already in use"):
+            Place(port=taken).listening()
