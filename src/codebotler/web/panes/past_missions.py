@@ -10,6 +10,7 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
+from codebotler.core.words import counted
 from codebotler.missions.log import Line, Summary, events_of
 from codebotler.missions.mission import State
 from codebotler.missions.store import find, missions, summary_of
@@ -70,6 +71,9 @@ def in_words(line: Line, *, is_first: bool) -> str:
     if event == "state":
         state, reason = line["state"], shortened(line.get("reason", ""))
         step = "Mission created" if is_first else STEPS.get(state, visible(state))
+        if state == State.CHECKED:
+            problems = len(line.get("problems", ()))
+            step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"
         return f"{step}: {reason.removeprefix(f'{state} ')}" if reason else step
     text = "" if event == "feedback" else event_text(line)
     return text[:1].upper() + text[1:]
