@@ -78,8 +78,8 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 1, str(error)
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence
-    if isinstance(error, ModuleNotFoundError) and (extra := EXTRAS.get((error.name or "").split(".")[0])):
-        return 2, f"{error.name} is not installed; `pip install 'codebotler[{extra}]'` brings it"
+    if isinstance(error, ModuleNotFoundError) and (package := (error.name or "").split(".")[0]) in EXTRAS:
+        return 2, f"{package} is not installed; `pip install 'codebotler[{EXTRAS[package]}]'` brings it"
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None
