@@ -330,9 +330,8 @@ def test_what_the_architecture_names_is_where_it_says() -> None:
         assert all(any(f"/{path}".endswith(f"/{place}") for path in files) for place in places), named
         text = "\n".join(text for path, text in files.items() if path.endswith(tuple(places)))
         for name in named if places else ():
-            assert not name.isidentifier() or re.search(rf"^ *(async )?(def |class )?{name}\b", text, re.M), (
-                name
-            )
+            line = rf"^ *(async )?(def |class )?{name}\b"
+            assert not name.isidentifier() or re.search(line, text, re.MULTILINE), name
 
 
 @pytest.mark.parametrize("page", ["robots.md"])
