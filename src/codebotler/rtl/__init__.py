@@ -1,6 +1,6 @@
 """The Robot Temporal Logic of the paper: parse a formula, test it on a trace, and say why it fails."""
 
-from codebotler.rtl.explain import Explanation, explain
+from codebotler.rtl.explanation import Explanation, explain
 from codebotler.rtl.formula import (
     ActAtFirst,
     ActAtSome,

@@ -1,16 +1,17 @@
-"""The formulas of RTL as values that print as the text in which people write them."""
+"""The formulas of RTL as immutable values; `str` writes one as text that `parse` reads."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from types import UnionType
 from typing import Literal, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
 
-CutName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
+ScopeName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,7 @@ class Regex:
 
     @cached_property
     def compiled(self) -> re.Pattern[str]:
-        """The regex, ready to search with."""
+        """The compiled regex."""
         return compile_regex(self.pattern)
 
     def matches(self, text: str) -> bool:
@@ -48,7 +49,7 @@ class Without:
 
     @cached_property
     def compiled(self) -> re.Pattern[str]:
-        """The regex between word boundaries, ready to search with."""
+        """The compiled regex, between word boundaries."""
         return whole_word(self.pattern)
 
     def matches(self, text: str) -> bool:
@@ -82,15 +83,15 @@ Text: TypeAlias = Regex | Words | Without | Number | Time | Claim
 
 @dataclass(frozen=True)
 class EventPattern:
-    """What an event may be: a kind with a text and, for a question, an option.
+    """The events of one kind whose text, options, answer and room match.
 
     Args:
         kind: the kind of the event, such as `goto`.
-        text: what the event's text must match; for a mention, the question or one of its options.
-        options: what at least one option must match; None for kinds without options, and for a mention.
-        mention: whether it is a question that has the text anywhere, also among its options.
-        place: a regex for the room in which it must happen, found there as a whole word; None for anywhere.
-        answer: what the option that was chosen must match; None where no answer is meant.
+        text: what the event's text must match.
+        options: what at least one option of a question must match; None if options do not matter.
+        mention: whether `text` may also be found in an option instead of in the question.
+        place: a regex that the room's name must hold as a whole word; None for anywhere.
+        answer: what the answer to a question must match; None if the answer does not matter.
     """
 
     kind: str
@@ -101,55 +102,49 @@ class EventPattern:
     answer: Text | None = None
 
     @cached_property
-    def is_place(self) -> re.Pattern[str] | None:
-        """The regex for the room, ready to search with."""
+    def place_regex(self) -> re.Pattern[str] | None:
+        """The compiled regex for the room."""
         return None if self.place is None else whole_word(self.place)
 
-    def happens_at(self, room: str) -> bool:
-        """Whether what happens in a room may be meant."""
-        return self.is_place is None or self.is_place.search(room) is not None
-
     def __str__(self) -> str:
-        texts = [self.text] if self.options is None else [self.text, self.options]
-        told = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
         if self.answer is not None:
-            told = f"answered({self.answer})"
-        return told if self.place is None else f"at({quote(self.place)}, {told})"
+            written = f"answered({self.answer})"
+        else:
+            texts = [self.text] if self.options is None else [self.text, self.options]
+            written = f"{'mention' if self.mention else self.kind}({', '.join(map(str, texts))})"
+        return written if self.place is None else f"at({quote(self.place)}, {written})"
 
 
 @dataclass(frozen=True)
 class Scope:
-    """A part of a trace: what lies before or after the first or last event that an element matches.
+    """The part of a trace before or after the first or last event that an element matches.
 
     Args:
-        name: which part.
-        element: what is searched for; where nothing matches, the trace stays whole.
+        name: which part; the event itself is in none.
+        element: the event that bounds the part; where none matches, the scope is the whole trace.
     """
 
-    name: CutName
+    name: ScopeName
     element: EventPattern
 
     def __str__(self) -> str:
         return f".{self.name}({self.element})"
 
 
-Cuts: TypeAlias = tuple[Scope, ...]
-
-
 @dataclass(frozen=True)
 class Exists:
-    """Some event of the trace matches.
+    """Some event matches.
 
     Args:
         element: what the event must match.
-        cuts: how the trace is cut before, in order.
+        scopes: where to look, each within the one before.
     """
 
     element: EventPattern
-    cuts: Cuts = ()
+    scopes: tuple[Scope, ...] = ()
 
     def __str__(self) -> str:
-        return f"{_cut_trace(self.cuts)}.Exists({self.element})"
+        return f"{_scoped(self.scopes)}.Exists({self.element})"
 
 
 @dataclass(frozen=True)
@@ -159,20 +154,25 @@ class _ActAtPlace:
     Args:
         place: a regex for the room.
         element: what the event must match.
-        cuts: how the trace is cut before, in order.
+        scopes: where to look, each within the one before.
     """
 
     place: str
     element: EventPattern
-    cuts: Cuts = ()
+    scopes: tuple[Scope, ...] = ()
 
     @cached_property
-    def stay(self) -> Stay:
-        """The moves that begin and end a stay at the place."""
-        return Stay.at(self.place)
+    def arrival(self) -> EventPattern:
+        """The move that begins a stay."""
+        return EventPattern("goto", Regex(self.place))
+
+    @cached_property
+    def departure(self) -> EventPattern:
+        """The move that ends a stay."""
+        return EventPattern("goto", Without(self.place))
 
     def __str__(self) -> str:
-        return f"{_cut_trace(self.cuts)}.{type(self).__name__}({quote(self.place)}, {self.element})"
+        return f"{_scoped(self.scopes)}.{type(self).__name__}({quote(self.place)}, {self.element})"
 
 
 class ActAtFirst(_ActAtPlace):
@@ -185,28 +185,28 @@ class ActAtSome(_ActAtPlace):
 
 @dataclass(frozen=True)
 class _Counting:
-    """How many events of the trace match.
+    """How many events match.
 
     Args:
         element: what the events must match.
         number: how many, 0 or more.
-        cuts: how the trace is cut before, in order.
+        scopes: where to look, each within the one before.
     """
 
     element: EventPattern
     number: int
-    cuts: Cuts = ()
+    scopes: tuple[Scope, ...] = ()
 
     def __str__(self) -> str:
-        return f"{_cut_trace(self.cuts)}.{type(self).__name__}({self.element}, {self.number})"
+        return f"{_scoped(self.scopes)}.{type(self).__name__}({self.element}, {self.number})"
 
 
 class Count(_Counting):
-    """Exactly so many events of the trace match."""
+    """Exactly so many events match."""
 
 
 class AtLeast(_Counting):
-    """So many events of the trace match, or more."""
+    """So many events match, or more."""
 
 
 @dataclass(frozen=True)
@@ -220,7 +220,7 @@ class And:
     parts: tuple[Formula, ...]
 
     def __str__(self) -> str:
-        return " and ".join(_part(part, (And, Or)) for part in self.parts)
+        return " and ".join(_bracketed(part, And | Or) for part in self.parts)
 
 
 @dataclass(frozen=True)
@@ -234,7 +234,7 @@ class Or:
     parts: tuple[Formula, ...]
 
     def __str__(self) -> str:
-        return " or ".join(_part(part, (Or,)) for part in self.parts)
+        return " or ".join(_bracketed(part, Or) for part in self.parts)
 
 
 @dataclass(frozen=True)
@@ -248,34 +248,16 @@ class Not:
     part: Formula
 
     def __str__(self) -> str:
-        return f"not {_part(self.part, (And, Or))}"
+        return f"not {_bracketed(self.part, And | Or)}"
 
 
 Test: TypeAlias = Exists | ActAtFirst | ActAtSome | Count | AtLeast
 Formula: TypeAlias = Test | And | Or | Not
 
 
-@dataclass(frozen=True)
-class Stay:
-    """A stay at a place.
-
-    Args:
-        arrival: the move that begins it.
-        departure: the move that ends it.
-    """
-
-    arrival: EventPattern
-    departure: EventPattern
-
-    @classmethod
-    def at(cls, place: str) -> Stay:
-        """A stay at the place that a regex names."""
-        return cls(EventPattern("goto", Regex(place)), EventPattern("goto", Without(place)))
+def _scoped(scopes: tuple[Scope, ...]) -> str:
+    return "tr" + "".join(map(str, scopes))
 
 
-def _cut_trace(cuts: Cuts) -> str:
-    return "tr" + "".join(map(str, cuts))
-
-
-def _part(formula: Formula, bracketed: tuple[type[Formula], ...]) -> str:
-    return f"({formula})" if isinstance(formula, bracketed) else str(formula)
+def _bracketed(formula: Formula, kinds: type | UnionType) -> str:
+    return f"({formula})" if isinstance(formula, kinds) else str(formula)

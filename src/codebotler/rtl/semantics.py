@@ -1,28 +1,34 @@
 """Whether a formula holds on a trace, in time linear in the trace.
 
-A cut is a pair of positions in the trace, never a copy. Every test and every cut looks at the events from the
-first to the last and at each once, and stops at the event that settles it.
+Scopes are ranges of positions, never copies. A test looks at the events once, from the first to the last, and
+stops at the event that settles it.
 """
 
 from __future__ import annotations
 
-from typing import TypeAlias, assert_never
+from collections.abc import Iterator
+from itertools import islice
+from typing import assert_never
 
-from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, AtLeast, Count, Exists, Not, Or
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from codebotler.core.trace import Event, Option, Trace
-    from codebotler.rtl.formula import Cuts, EventPattern, Formula, Scope, Stay, Test
-
-Span: TypeAlias = tuple[int, int]
-"""The events from the first position on and before the second."""
+from codebotler.core.trace import Event, Option, Trace
+from codebotler.rtl.formula import (
+    ActAtFirst,
+    ActAtSome,
+    And,
+    AtLeast,
+    Count,
+    EventPattern,
+    Exists,
+    Formula,
+    Not,
+    Or,
+    Scope,
+    Test,
+)
 
 
 class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a third verdict
-    """A question was to be judged, but one of its options is no text.
+    """A question had to be judged, but one of its options is no text.
 
     Args:
         event: the question's position in the trace.
@@ -57,29 +63,19 @@ def holds(formula: Formula, trace: Trace) -> bool:
             return any(holds(part, trace) for part in parts)
         case Not(part):
             return not holds(part, trace)
-        case _:
-            return test_holds(formula, trace, cut(formula.cuts, trace))
+    return _test_holds(formula, trace)
 
 
-def test_holds(test: Test, trace: Trace, span: Span) -> bool:
-    """Whether a test is true of a part of a trace.
-
-    Args:
-        test: what to test; its cuts are not applied.
-        trace: what the robot did.
-        span: the part.
-
-    Raises:
-        Inconclusive: an option that is no text had to be compared.
-    """
+def _test_holds(test: Test, trace: Trace) -> bool:
+    span = scoped(test.scopes, trace)
     match test:
         case Exists(element):
             return first(element, trace, span) is not None
         case ActAtFirst(_, element):
-            stay = first_stay(test.stay, trace, span)
+            stay = first_stay(test, trace, span)
             return stay is not None and first(element, trace, stay) is not None
         case ActAtSome(_, element):
-            return any(matches(element, trace, at) for at in at_place(test.stay, trace, span))
+            return any(matches(element, trace, at) for at in during_stays(test, trace, span))
         case AtLeast(element, number):
             return at_least(element, number, trace, span) == number
         case Count(element, number):
@@ -87,23 +83,16 @@ def test_holds(test: Test, trace: Trace, span: Span) -> bool:
     assert_never(test)
 
 
-test_holds.__test__ = False  # type: ignore[attr-defined]  # lest pytest takes it for a test
-
-
 def matches(element: EventPattern, trace: Trace, at: int) -> bool:
-    """Whether an element matches an event.
-
-    Args:
-        element: what the event may be.
-        trace: what the robot did.
-        at: the event's position.
+    """Whether an element matches the event at a position.
 
     Raises:
-        Inconclusive: both are questions, and an option that is no text comes before the first that
-            matches; whether the question's text matches plays no part.
+        Inconclusive: an option that is no text comes before the first that matches, whatever the question is.
     """
     event = trace[at]
-    if event.kind != element.kind or not element.happens_at(event.place):
+    if event.kind != element.kind:
+        return False
+    if element.place_regex is not None and element.place_regex.search(event.place) is None:
         return False
     if element.answer is not None and (event.answer is None or not element.answer.matches(event.answer)):
         return False
@@ -124,131 +113,60 @@ def _offers(element: EventPattern, event: Event, at: int) -> bool:
     return False
 
 
-def first(element: EventPattern, trace: Trace, span: Span) -> int | None:
-    """The position of the first event that matches.
-
-    Args:
-        element: what the event may be.
-        trace: what the robot did.
-        span: where to look.
-
-    Raises:
-        Inconclusive: an option that is no text had to be compared.
-    """
-    return next((at for at in range(*span) if matches(element, trace, at)), None)
+def occurrences(element: EventPattern, trace: Trace, span: range) -> Iterator[int]:
+    """The positions of all events that match, each found when it is asked for."""
+    return (at for at in span if matches(element, trace, at))
 
 
-def last(element: EventPattern, trace: Trace, span: Span) -> int | None:
-    """The position of the last event that matches; all are compared, from the first on.
-
-    Args:
-        element: what the event may be.
-        trace: what the robot did.
-        span: where to look.
-
-    Raises:
-        Inconclusive: an option that is no text had to be compared.
-    """
-    found = None
-    for at in range(*span):
-        if matches(element, trace, at):
-            found = at
-    return found
+def first(element: EventPattern, trace: Trace, span: range) -> int | None:
+    """The position of the first event that matches."""
+    return next(occurrences(element, trace, span), None)
 
 
-def at_least(element: EventPattern, number: int, trace: Trace, span: Span) -> int:
-    """How many events match, counted no further than a number.
-
-    Args:
-        element: what the events may be.
-        number: where to stop.
-        trace: what the robot did.
-        span: where to look.
-
-    Raises:
-        Inconclusive: an option that is no text had to be compared.
-    """
-    found = 0
-    for at in range(*span):
-        if found == number:
-            break
-        found += matches(element, trace, at)
-    return found
+def at_least(element: EventPattern, number: int, trace: Trace, span: range) -> int:
+    """How many events match, up to a number at which counting stops."""
+    return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
 
 
-def cut(cuts: Cuts, trace: Trace) -> Span:
-    """The part of a trace that is left after cuts.
-
-    Args:
-        cuts: applied in order, each to what the one before has left.
-        trace: what the robot did.
-
-    Raises:
-        Inconclusive: an option that is no text had to be compared.
-    """
-    span = (0, len(trace))
-    for one in cuts:
-        span = cut_at(one, find(one, trace, span), span)
+def scoped(scopes: tuple[Scope, ...], trace: Trace) -> range:
+    """The positions of a trace that are within all scopes."""
+    span = range(len(trace))
+    for scope in scopes:
+        span = narrowed(scope, bound(scope, trace, span), span)
     return span
 
 
-def find(one: Scope, trace: Trace, span: Span) -> int | None:
-    """The position at which a cut is made.
-
-    Args:
-        one: the cut.
-        trace: what the robot did.
-        span: the part to be cut.
-
-    Raises:
-        Inconclusive: an option that is no text had to be compared.
-    """
-    search = first if one.name.endswith("First") else last
-    return search(one.element, trace, span)
+def bound(scope: Scope, trace: Trace, span: range) -> int | None:
+    """The position of the event that bounds a scope."""
+    found = occurrences(scope.element, trace, span)
+    return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
-def cut_at(one: Scope, at: int | None, span: Span) -> Span:
-    """What a cut leaves of a part of a trace: all of it where nothing was found.
-
-    Args:
-        one: the cut.
-        at: where it is made.
-        span: the part to be cut.
-    """
+def narrowed(scope: Scope, at: int | None, span: range) -> range:
+    """What is left of a span by a scope whose bound is at a position; all of it without a bound."""
     if at is None:
         return span
-    return (span[0], at) if one.name.startswith("Before") else (at + 1, span[1])
+    return range(span.start, at) if scope.name.startswith("Before") else range(at + 1, span.stop)
 
 
-def first_stay(stay: Stay, trace: Trace, span: Span) -> Span | None:
-    """What happens between the first arrival at a place and the next departure.
-
-    Args:
-        stay: the place.
-        trace: what the robot did.
-        span: where to look.
-    """
-    arrival = first(stay.arrival, trace, span)
+def first_stay(test: ActAtFirst | ActAtSome, trace: Trace, span: range) -> range | None:
+    """The positions between the first arrival at the place of a test and the next departure."""
+    arrival = first(test.arrival, trace, span)
     if arrival is None:
         return None
-    after = (arrival + 1, span[1])
-    departure = first(stay.departure, trace, after)
-    return after if departure is None else (arrival + 1, departure)
+    after = range(arrival + 1, span.stop)
+    departure = first(test.departure, trace, after)
+    return after if departure is None else range(arrival + 1, departure)
 
 
-def at_place(stay: Stay, trace: Trace, span: Span) -> Iterator[int]:
-    """The positions of the events that happen at a place.
+def during_stays(test: ActAtFirst | ActAtSome, trace: Trace, span: range) -> Iterator[int]:
+    """The positions of the events during all stays at the place of a test.
 
-    A move that ends a stay is not in it, and a move that begins one only where it lies in an earlier stay.
-
-    Args:
-        stay: the place.
-        trace: what the robot did.
-        span: where to look.
+    The move that ends a stay is not among them; the one that begins it only if it is part of an earlier stay.
     """
     there = False
-    for at in range(*span):
-        there = there and not matches(stay.departure, trace, at)
+    for at in span:
+        there = there and not matches(test.departure, trace, at)
         if there:
             yield at
-        there = there or matches(stay.arrival, trace, at)
+        there = there or matches(test.arrival, trace, at)

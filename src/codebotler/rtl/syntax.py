@@ -1,14 +1,15 @@
-"""From text to Formula: Python's own parser reads it, nothing is ever evaluated."""
+"""The parser of RTL; it reads a formula as a Python expression and never runs it."""
 
 from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.syntaxtree import parse_expression
 from codebotler.rtl.formula import (
     ActAtFirst,
@@ -16,7 +17,6 @@ from codebotler.rtl.formula import (
     And,
     AtLeast,
     Count,
-    CutName,
     EventPattern,
     Exists,
     Formula,
@@ -24,33 +24,24 @@ from codebotler.rtl.formula import (
     Or,
     Regex,
     Scope,
+    ScopeName,
     Test,
+    Text,
     Without,
     Words,
 )
+from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from codebotler.core.skills import SkillTable
-    from codebotler.rtl.formula import Cuts, Text
-
-CUTS: dict[str, CutName] = {name: name for name in get_args(CutName)}
-TESTS = {"Exists": 1, "ActAtFirst": 2, "ActAtSome": 2, "Count": 2, "AtLeast": 2}
-"""How many arguments each test takes."""
-
-CLAIMS = ("number", "othernumber", "time", "othertime", "affirms", "denies")
-"""What a text may claim."""
-
-ABOUT_QUESTIONS = ("mention", "answered")
-"""Elements that are questions: by a text anywhere in them, and by what was answered."""
+SCOPES: dict[str, ScopeName] = {name: name for name in get_args(ScopeName)}
+TESTS = ("Exists", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
+TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
+QUESTIONS = ("mention", "answered")
 
 DEEPEST = 50
-"""How deep a formula may be nested, and how many cuts may stand in a row; few enough for Python's stack."""
+"""How deep a formula may be nested; few enough for Python's stack wherever it is evaluated."""
 
-LARGEST = 1_000_000_000
-"""The highest number of events that a formula may count to."""
+_LONGEST_SHOWN = 40
 
 
 class RtlSyntaxError(ValueError):
@@ -75,7 +66,7 @@ def parse(text: str, *, skills: SkillTable = SKILLS) -> Formula:
 
     Args:
         text: the formula; a line break counts as a space.
-        skills: whose events are the elements of the language.
+        skills: the skills whose events formulas are about.
 
     Raises:
         RtlSyntaxError: the text is no formula.
@@ -87,151 +78,127 @@ class _Parser:
     def __init__(self, text: str, skills: SkillTable) -> None:
         self.indent = len(text) - len(text.lstrip())
         self.text = re.sub(r"[\r\n\f]", " ", text).strip()
-        self.bytes = self.text.encode(errors="replace")
+        self.bytes = self.text.encode(errors="replace")  # in which `ast` counts columns
         self.recordings = skills.recordings
+        self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
 
     def formula(self) -> Formula:
-        tree = self.tree()
-        rest = self.bytes[tree.end_col_offset :]
-        if b"#" in rest:
-            raise self.error(
-                tree.end_col_offset or 0, "RTL has no comments, yet one begins behind this place"
-            )
-        return self.constraint(tree, 0)
-
-    def tree(self) -> ast.expr:
         if not self.text:
             raise RtlSyntaxError(1, "expected a formula, found nothing")
         try:
-            return parse_expression(self.text)
+            tree = parse_expression(self.text)
         except SyntaxError as error:
             column = self.indent + max(error.offset or 1, 1)
             raise RtlSyntaxError(column, f"this cannot be read ({error.msg})") from None
-        except UnicodeEncodeError as error:
-            raise RtlSyntaxError(self.indent + error.start + 1, "this is no character") from None
         except (RecursionError, MemoryError):
             raise RtlSyntaxError(self.indent + 1, "this is nested too deeply") from None
         except ValueError as error:
             raise RtlSyntaxError(self.indent + 1, f"this cannot be read ({error})") from None
+        end = tree.end_col_offset or 0
+        if b"#" in self.bytes[end:]:  # it would hide all lines that follow
+            raise self.error(end, "RTL has no comments, but one begins after this")
+        return self.constraint(tree, 0)
 
     def constraint(self, node: ast.expr, depth: int) -> Formula:
-        self.limit(node, depth)
+        if depth > DEEPEST:
+            raise self.error(node, f"this is nested more than {DEEPEST} deep")
         match node:
             case ast.BoolOp(op, values):
                 parts = tuple(self.constraint(value, depth + 1) for value in values)
                 return And(parts) if isinstance(op, ast.And) else Or(parts)
             case ast.UnaryOp(ast.Not(), operand):
                 return Not(self.constraint(operand, depth + 1))
-            case ast.Call(ast.Attribute() as function, arguments, keywords):
-                self.no_keywords(keywords)
-                return self.test(function, arguments)
+            case ast.Call(ast.Attribute() as function):
+                return self.test(node, function)
         raise self.expected('a test such as tr.Exists(goto("lobby"))', node)
 
-    def test(self, function: ast.Attribute, arguments: list[ast.expr]) -> Test:
+    def test(self, node: ast.Call, function: ast.Attribute) -> Test:
         name = function.attr
-        if name in CUTS:
+        if name in SCOPES:
             raise self.error(
-                function, f"{name} cuts the trace and must be followed by a test such as .Exists(...)"
+                function, f"{name} is a scope and must be followed by a test such as .Exists(...)"
             )
         if name not in TESTS:
-            raise self.unknown(function, f"test {name}", name, [*TESTS, *CUTS])
-        cuts = self.cuts(function.value)
-        self.count_arguments(function, name, arguments, TESTS[name])
+            raise self.unknown(function, "test", name, [*TESTS, *SCOPES])
+        scopes = self.scopes(function.value)
+        if name == "Exists":
+            (element,) = self.arguments(node, function, name, 1)
+            return Exists(self.element(element), scopes)
+        one, other = self.arguments(node, function, name, 2)
         match name:
-            case "Exists":
-                return Exists(self.element(arguments[0]), cuts)
             case "ActAtFirst":
-                return ActAtFirst(self.without(arguments[0]).pattern, self.element(arguments[1]), cuts)
+                return ActAtFirst(self.word(one), self.element(other), scopes)
             case "ActAtSome":
-                return ActAtSome(self.without(arguments[0]).pattern, self.element(arguments[1]), cuts)
+                return ActAtSome(self.word(one), self.element(other), scopes)
             case "Count":
-                return Count(self.element(arguments[0]), self.number(arguments[1]), cuts)
-            case _:
-                return AtLeast(self.element(arguments[0]), self.number(arguments[1]), cuts)
+                return Count(self.element(one), self.number(other), scopes)
+        return AtLeast(self.element(one), self.number(other), scopes)
 
-    def cuts(self, node: ast.expr) -> Cuts:
-        cuts: list[Scope] = []
+    def scopes(self, node: ast.expr) -> tuple[Scope, ...]:
+        scopes: list[Scope] = []
         while True:
-            self.limit(node, len(cuts))
             match node:
                 case ast.Name("tr"):
-                    return tuple(reversed(cuts))
-                case ast.Call(ast.Attribute(inner, name) as function, arguments, keywords):
+                    return tuple(reversed(scopes))
+                case ast.Call(ast.Attribute(inner, name) as function):
                     if name in TESTS:
                         raise self.error(function, f"{name} is a test, so nothing can follow it")
-                    if name not in CUTS:
-                        raise self.unknown(function, f"cut {name}", name, CUTS)
-                    self.no_keywords(keywords)
-                    self.count_arguments(function, name, arguments, 1)
-                    cuts.append(Scope(CUTS[name], self.element(arguments[0])))
+                    if name not in SCOPES:
+                        raise self.unknown(function, "scope", name, SCOPES)
+                    (element,) = self.arguments(node, function, name, 1)
+                    scopes.append(Scope(SCOPES[name], self.element(element)))
                     node = inner
                 case _:
-                    raise self.expected("tr or a cut of it such as tr.AfterFirst(...)", node)
+                    raise self.expected("tr or a scope such as tr.AfterFirst(...)", node)
 
     def element(self, node: ast.expr) -> EventPattern:
         match node:
-            case ast.Call(ast.Name("at"), arguments, keywords):
-                self.no_keywords(keywords)
-                self.count_arguments(node, "at", arguments, 2)
-                inner = self.element(arguments[1])
-                if inner.place is not None:
-                    raise self.error(arguments[1], "at cannot stand in another at")
-                return replace(inner, place=self.without(arguments[0]).pattern)
-            case ast.Call(ast.Name(kind), arguments, keywords):
-                asking = next((k for k, row in self.recordings.items() if row.options is not None), None)
-                about = kind if kind in ABOUT_QUESTIONS and kind not in self.recordings else ""
-                if (not about or asking is None) and kind not in self.recordings:
-                    raise self.unknown(
-                        node, f"element {kind}", kind, [*self.recordings, *ABOUT_QUESTIONS, "at"]
-                    )
-                self.no_keywords(keywords)
-                asks = not about and self.recordings[kind].options is not None
-                self.count_arguments(node, kind, arguments, 2 if asks else 1)
-                texts = [self.matched(argument, 0) for argument in arguments]
-                if about == "mention" and asking is not None:
-                    return EventPattern(asking, texts[0], mention=True)
-                if about and asking is not None:
-                    return EventPattern(asking, Regex(".*"), answer=texts[0])
-                return EventPattern(kind, texts[0], texts[1] if asks else None)
+            case ast.Call(ast.Name("at")):
+                place, inner = self.arguments(node, node, "at", 2)
+                element = self.element(inner)
+                if element.place is not None:
+                    raise self.error(inner, "at cannot stand in another at")
+                return replace(element, place=self.word(place))
+            case ast.Call(ast.Name(kind)) if kind in self.recordings:
+                if self.recordings[kind].options is None:
+                    (text,) = self.arguments(node, node, kind, 1)
+                    return EventPattern(kind, self.matched(text))
+                text, options = self.arguments(node, node, kind, 2)
+                return EventPattern(kind, self.matched(text), self.matched(options))
+            case ast.Call(ast.Name(kind)) if kind in QUESTIONS and self.question is not None:
+                (text,) = self.arguments(node, node, kind, 1)
+                if kind == "mention":
+                    return EventPattern(self.question, self.matched(text), mention=True)
+                return EventPattern(self.question, Regex(".*"), answer=self.matched(text))
+            case ast.Call(ast.Name(kind)):
+                raise self.unknown(node, "element", kind, [*self.recordings, *QUESTIONS, "at"])
         raise self.expected('an element such as goto("lobby")', node)
 
-    def matched(self, node: ast.expr, depth: int) -> Text:
-        self.limit(node, depth)
+    def matched(self, node: ast.expr) -> Text:
         match node:
             case ast.Constant(str()):
                 return Regex(self.regex(node))
-            case ast.Call(ast.Name("words"), arguments, keywords):
-                self.no_keywords(keywords)
+            case ast.Call(ast.Name(name)) if name not in TEXTS:
+                raise self.unknown(node, "text helper", name, TEXTS)
+            case ast.Call(ast.Name("words")):
+                arguments = self.arguments(node, node, "words")
                 if not arguments:
                     raise self.error(node, "words needs at least one text")
-                return Words(tuple(self.matched(argument, depth + 1) for argument in arguments))
-            case ast.Call(ast.Name("without"), arguments, keywords):
-                self.no_keywords(keywords)
-                self.count_arguments(node, "without", arguments, 1)
-                return self.without(arguments[0])
-            case ast.Call(ast.Name(name), arguments, keywords) if name in CLAIMS:
-                self.no_keywords(keywords)
-                return self.claim(node, name, arguments)
-            case ast.Call(ast.Name(name)):
-                raise self.unknown(node, f"text helper {name}", name, ["words", "without", *CLAIMS])
-        raise self.expected("a string, words(...) or without(...)", node)
-
-    def claim(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Text:
-        match name:
-            case "affirms" | "denies":
-                self.count_arguments(node, name, arguments, 1)
-                return Claim(self.without(arguments[0]).pattern, name == "denies")
-            case "time" | "othertime":
-                self.count_arguments(node, name, arguments, 2)
-                start, end = (self.time(argument) for argument in arguments)
+                return Words(tuple(map(self.matched, arguments)))
+            case ast.Call(ast.Name(name)) if name.endswith("number"):
+                arguments = self.arguments(node, node, name)
+                if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
+                    raise self.error(node, f"{name} takes a number, a thing and perhaps other things")
+                number, (thing, *others) = self.number(arguments[0]), map(self.word, arguments[1:])
+                return Number(number, thing, tuple(others), name == "othernumber")
+            case ast.Call(ast.Name(name)) if name.endswith("time"):
+                start, end = map(self.time, self.arguments(node, node, name, 2))
                 return Time(start, end, name == "othertime")
-        if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
-            raise self.error(node, f"{name} takes a number, a thing and perhaps other things")
-        number, (thing, *others) = (
-            self.number(arguments[0]),
-            [self.without(one).pattern for one in arguments[1:]],
-        )
-        return Number(number, thing, tuple(others), name == "othernumber")
+            case ast.Call(ast.Name(name)):
+                (argument,) = self.arguments(node, node, name, 1)
+                word = self.word(argument)
+                return Without(word) if name == "without" else Claim(word, name == "denies")
+        raise self.expected("a string, words(...) or without(...)", node)
 
     def time(self, node: ast.expr) -> str:
         text = self.regex(node)
@@ -241,13 +208,10 @@ class _Parser:
             raise self.error(node, str(error)) from None
         return text
 
-    def without(self, node: ast.expr) -> Without:
-        text = Without(self.regex(node))
-        try:
-            _ = text.compiled
-        except (re.error, RecursionError) as error:
-            raise self.error(node, f"this regex cannot be searched as a whole word ({error})") from None
-        return text
+    def word(self, node: ast.expr) -> str:
+        pattern = self.regex(node)
+        self.check_regex(node, pattern, whole_word, "this regex cannot be searched as a whole word")
+        return pattern
 
     def regex(self, node: ast.expr) -> str:
         match node:
@@ -256,53 +220,42 @@ class _Parser:
                     raise self.error(
                         node, 'this string holds a backspace; write r"..." so that \\b is the edge of a word'
                     )
-                try:
-                    _ = Regex(pattern).compiled
-                except (re.error, RecursionError, OverflowError) as error:
-                    raise self.error(node, f"this is no valid regex ({error})") from None
+                self.check_regex(node, pattern, compile_regex, "this is no valid regex")
                 return pattern
         raise self.expected("a string", node)
+
+    def check_regex(self, at: ast.expr, pattern: str, compiled: Callable[[str], object], wrong: str) -> None:
+        try:
+            compiled(pattern)
+        except (re.error, RecursionError, OverflowError) as error:
+            raise self.error(at, f"{wrong} ({error})") from None
 
     def number(self, node: ast.expr) -> int:
         match node:
             case ast.Constant(value) if type(value) is int:
-                if value > LARGEST:
-                    raise self.error(node, f"expected a number of at most {LARGEST}")
                 return value
-            case ast.UnaryOp(ast.USub(), ast.Constant(int())):
-                raise self.error(node, "a number of events cannot be negative")
         raise self.expected("a whole number such as 3", node)
 
-    def count_arguments(self, at: ast.expr, name: str, arguments: list[ast.expr], wanted: int) -> None:
-        if len(arguments) != wanted:
-            plural = "" if wanted == 1 else "s"
-            raise self.error(at, f"{name} takes {wanted} argument{plural}, not {len(arguments)}")
-
-    def no_keywords(self, keywords: list[ast.keyword]) -> None:
-        for keyword in keywords:
+    def arguments(self, call: ast.Call, at: ast.expr, name: str, wanted: int | None = None) -> list[ast.expr]:
+        for keyword in call.keywords:
             raise self.error(keyword.col_offset, "arguments have no names in RTL")
-
-    def limit(self, node: ast.expr, depth: int) -> None:
-        if depth > DEEPEST:
-            raise self.error(node, f"this is nested more than {DEEPEST} deep")
+        found = len(call.args)
+        if wanted is not None and found != wanted:
+            raise self.error(at, f"{name} takes {wanted} argument{'s' * (wanted > 1)}, not {found}")
+        return call.args
 
     def unknown(self, at: ast.expr, what: str, name: str, known: Iterable[str]) -> RtlSyntaxError:
         close = get_close_matches(name, known, 1)
         hint = f"did you mean {close[0]}?" if close else f"expected one of {', '.join(known)}"
-        return self.error(at, f"unknown {what}; {hint}")
+        return self.error(at, f"unknown {what} {name}; {hint}")
 
     def expected(self, what: str, node: ast.expr) -> RtlSyntaxError:
         found = ast.get_source_segment(self.text, node) or "something else"
-        found = found if len(found) <= _SHOWN else found[: _SHOWN - 3] + "..."
+        found = found if len(found) <= _LONGEST_SHOWN else found[: _LONGEST_SHOWN - 3] + "..."
         return self.error(node.col_offset, f"expected {what}, found {found}")
 
     def error(self, at: ast.expr | int, problem: str) -> RtlSyntaxError:
-        """What is wrong, at a node or at a position in bytes, which is how `ast` counts."""
         if isinstance(at, ast.Attribute):
             at = (at.end_col_offset or 0) - len(at.attr.encode())
         offset = at if isinstance(at, int) else at.col_offset
-        characters = len(self.bytes[:offset].decode(errors="replace"))
-        return RtlSyntaxError(self.indent + characters + 1, problem)
-
-
-_SHOWN = 40
+        return RtlSyntaxError(self.indent + len(self.bytes[:offset].decode(errors="replace")) + 1, problem)

@@ -1,183 +1,138 @@
-"""What a robot may do, and what it did, in English, for explanations."""
+"""Elements of formulas and events of a robot in English, for explanations."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, TypeAlias
+import re
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from typing import Literal, TypeAlias
 
 from codebotler.core.skills import SKILLS, Verb
+from codebotler.core.trace import Event
 from codebotler.core.words import listed
-from codebotler.rtl.formula import EventPattern, Regex, Text, Without
-from codebotler.rtl.phrases import either, is_any, lacks, literals, quoted, room, room_name, with_texts
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from codebotler.core.trace import Event
+from codebotler.rtl.formula import EventPattern, Regex, Text, Without, Words
+from codebotler.rtl.text.claims import Claim, Number, Time
 
 Form: TypeAlias = Literal["base", "past", "ing"]
-Deed: TypeAlias = tuple[EventPattern, ...]
-"""What one robot may do: any of these elements. Two of them are one text, in a question or in its options."""
 
-_VERBS = SKILLS.verbs
-_OTHER_VERB = Verb("do", "does", "did", "doing")
-_MENTION: dict[Form, str] = {"base": "mention", "past": "mentioned", "ing": "mentioning"}
-_MOST = 5
-
-
-def did(deed: Deed, form: Form, *, never: bool = False) -> str:
-    """A deed as a verb and its object, such as `asked about lunch`.
-
-    Args:
-        deed: what may be done.
-        form: of the verb.
-        never: whether `never` or `not` stands before it, so that it is `anything` rather than `something`.
-    """
-    done, place = _did(deed, form, never=never), deed[0].place
-    return done if place is None else f"{done} in {room(place)}"
+_MOST_LISTED = 5
+_LONGEST_TEXT = 70
+_TEXT = r"[\w ',;:!%@&/-]+"
+_ALTERNATIVES = re.compile(rf"{_TEXT}(?:\|{_TEXT})*")
+_WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
 
 
-def _did(deed: Deed, form: Form, *, never: bool) -> str:  # noqa: PLR0911 - one for each kind
-    element = deed[0]
-    verb = getattr(_VERBS.get(element.kind, _OTHER_VERB), form)
+def deed(element: EventPattern, form: Form, *, negated: bool = False) -> str:
+    """What an element asks for, such as `said something with "hello"`; `anything` after a negation."""
+    thing = "anything" if negated else "something"
     if element.answer is not None:
         got = {"base": "get", "past": "got", "ing": "getting"}[form]
-        return f"{got} an answer {with_texts(element.answer)}".rstrip()
-    if len(deed) > 1 or (element.mention and not is_any(element.text)):
-        return _mentioned(deed, form, verb)
-    if element.kind == "check" and is_any(element.text):
-        return f"{verb.removesuffix(' for')} around"
-    thing = "anything" if never else "something"
-    match element.kind:
-        case "goto":
-            anywhere = "anywhere" if never else "somewhere"
-            return f"{verb.removesuffix(' to')} {_destination(element.text, anywhere)}"
-        case "say":
-            return " ".join(filter(None, [verb, thing, with_texts(element.text)]))
-        case "ask":
-            return f"{verb} {_question(element, 'anything' if never else 'a question')}"
-        case "check" | "pick" | "place":
-            return f"{verb} {_thing(element.text, thing)}"
-        case kind:
-            return " ".join(filter(None, [verb, f"a {kind}", with_texts(element.text)]))
+        done = f"{got} an answer {described(element.answer)}"
+    else:
+        done = f"{getattr(verb(element.kind), form)} {_wanted(element, thing)}"
+    if element.mention:
+        done += " in the question or an option"
+    if element.options is not None and not is_any(element.options):
+        done += f" offering an option {described(element.options)}"
+    return done.rstrip() if element.place is None else f"{done.rstrip()} in {room(Regex(element.place))}"
 
 
-def happened(event: Event, form: Form) -> str:
-    """An event as a verb and its object, such as `said "hello"`.
-
-    Args:
-        event: what the robot did.
-        form: of the verb.
-    """
-    verb = getattr(_VERBS.get(event.kind, _OTHER_VERB), form)
-    if event.kind == "goto":
-        return f"{verb} {room_name(event.text)}"
-    return (
-        f"{verb} {quoted(event.text)}"
-        if event.kind in _VERBS
-        else f"{verb} a {event.kind} {quoted(event.text)}"
-    )
+def _wanted(element: EventPattern, thing: str) -> str:
+    if element.kind == "goto":
+        return room(element.text, "any" if thing == "anything" else "a")
+    match element.text:
+        case Regex(pattern) if element.kind not in {"say", "ask"} and _ALTERNATIVES.fullmatch(pattern):
+            return named(pattern)
+    return f"{thing} {described(element.text)}".rstrip()
 
 
-def offered(event: Event) -> str:
-    """An event in the past, with the options of a question.
-
-    Args:
-        event: what the robot did.
-    """
-    options = f" with the options {_options(event)}" if event.options else ""
-    return f"{happened(event, 'past')}{options}"
-
-
-def pastimes(events: Iterable[Event]) -> str:
-    """What the robot did, by kind only: `spoke and looked around`; empty where it did nothing but move.
-
-    Args:
-        events: what it did.
-    """
-    kinds = dict.fromkeys(event.kind for event in events if event.kind != "goto")
-    return listed([_VERBS[kind].alone if kind in _VERBS else f"did a {kind}" for kind in kinds])
-
-
-def lacking(deed: Deed, event: Event) -> str:
-    """Why an event of the right kind is not the deed: `which lacks "good"`.
-
-    Args:
-        deed: what was wanted.
-        event: what happened instead.
-    """
-    if not deed[0].happens_at(event.place):
-        return f"which was in {room_name(event.place)}"
-    if deed[0].answer is not None:
-        return (
-            "which nobody answered" if event.answer is None else f"and the answer was {quoted(event.answer)}"
+def happening(event: Event, element: EventPattern) -> str:
+    """The object of what the robot did, and whatever else an element compares."""
+    thing = room_name(event.text) if event.kind == "goto" else quoted(event.text)
+    if event.options and (element.mention or not is_any(element.options)):
+        thing += f" with the options {listed(few([quoted(option.text) for option in event.options]))}"
+    if element.answer is not None:
+        thing += (
+            " and got no answer" if event.answer is None else f" and got the answer {quoted(event.answer)}"
         )
-    absent = next((lack for element in deed if (lack := lacks(element.text, event.text))), [])
-    named = len(absent) > 1 or not absent or not absent[0].startswith("does not match")
-    reasons = [f"which {listed(absent) if named else 'does not match'}"] if absent else []
-    if not event.options and deed[0].options is not None:
-        return f"{reasons[0]}, and it had no options" if reasons else "which does not count without options"
-    if len(deed) > 1:
-        return ", and ".join([*reasons, f"none of its options ({_options(event)}) will do"])
-    if not absent and deed[0].options is not None:
-        wanted = with_texts(deed[0].options)
-        is_one = f"has {wanted.removeprefix('with ')}" if wanted.startswith("with ") else f"is one {wanted}"
-        return f"but none of its options ({_options(event)}) {is_one}"
-    return reasons[0]
+    return thing if element.place is None else f"{thing} in {room_name(event.place)}"
 
 
-def _options(event: Event) -> str:
-    names = [quoted(option.text) for option in event.options]
-    return listed(names if len(names) <= _MOST else [*names[:_MOST], f"{len(names) - _MOST:,} more"])
+def verb(kind: str) -> Verb:
+    """The verb for a kind of event, also for one of a further skill."""
+    other = Verb(f"do {kind}", f"does {kind}", f"did {kind}", f"doing {kind}", f"did {kind}")
+    return SKILLS.verbs.get(kind, other)
 
 
-def _destination(text: Text, anywhere: str) -> str:
-    if is_any(text):
-        return anywhere
+def room(text: Text, article: str = "a") -> str:
+    """The room that a text names, such as `the lobby`, `bob's office` or `a room with /[12]/`."""
     match text:
+        case Regex(pattern) if _ALTERNATIVES.fullmatch(pattern):
+            return listed(few([room_name(name) for name in pattern.split("|")]), "or")
+    return f"{article} room {described(text)}".rstrip()
+
+
+def room_name(name: str) -> str:
+    """The name of a room, with an article if it is a common noun."""
+    short = shortened(name)
+    return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else short or '""'
+
+
+def described(text: Text) -> str:
+    """What a text must be like, such as `with "5 or five" and "lobby"`; empty if any text matches."""
+    found = [*_qualities(text)]
+    parts = (
+        (head, [q.removeprefix(head) for q in found if q.startswith(head)]) for head in ("with ", "without ")
+    )
+    return listed([head + listed(few(same)) for head, same in parts if same])
+
+
+def _qualities(text: Text) -> Iterator[str]:
+    match text:
+        case Words(parts):
+            yield from chain.from_iterable(map(_qualities, parts))
         case Regex(pattern):
-            return f"to {room(pattern)}"
+            if not is_any(text):
+                yield f"with {named(pattern)}"
         case Without(pattern):
-            return (
-                f"{anywhere} but to {room(pattern)}"
-                if anywhere == "anywhere"
-                else f"elsewhere than to {room(pattern)}"
-            )
-        case _:
-            return f"to a room {with_texts(text)}"
+            yield f"without the word {named(pattern)}"
+        case Number(number, thing, _, other):
+            yield f"with {'a number other than' if other else 'the number'} {number} for {named(thing)}"
+        case Time(start, end, other):
+            yield f"with a time {'outside' if other else 'from'} {start} to {end}"
+        case Claim(pattern, denied):
+            yield f"with {'a denial' if denied else 'an affirmation'} of {named(pattern)}"
 
 
-def _thing(text: Text, thing: str) -> str:
-    match text:
-        case Regex(pattern) if names := literals(pattern):
-            return f'"{either(names)}"'
-        case _:
-            return f"{thing} {with_texts(text)}".rstrip()
+def is_any(text: Text | None) -> bool:
+    """Whether a text is written to match every string, or there is none."""
+    return text is None or (isinstance(text, Regex) and text.pattern in {"", ".*", "^.*$"})
 
 
-def _mentioned(deed: Deed, form: Form, verb: str) -> str:
-    """A text in a question or in its options."""
-    wanted = with_texts(_wanted(deed))
-    if wanted.startswith("with "):
-        return f"{_MENTION[form]} {wanted.removeprefix('with ')} in a question or its options"
-    return f"{verb} a question or offer{'ed' if form == 'past' else ''} an option {wanted}"
+def named(pattern: str) -> str:
+    """A regex as the plain texts it chooses between, or as it is."""
+    if _ALTERNATIVES.fullmatch(pattern):
+        return f'"{_cut(listed(pattern.split("|"), "or"))}"'
+    if whole := _WHOLE_WORDS.fullmatch(pattern):
+        return f"the word {named(whole[1])}"
+    return f"/{_cut(pattern)}/"
 
 
-def _wanted(deed: Deed) -> Text:
-    options = deed[0].options
-    return options if options is not None and is_any(deed[0].text) else deed[0].text
+def few(parts: Sequence[str]) -> list[str]:
+    """The first parts of an enumeration, and how many more there are."""
+    more = len(parts) - _MOST_LISTED
+    return [*parts[:_MOST_LISTED], f"{more:,} more"] if more > 0 else [*parts]
 
 
-def _question(element: EventPattern, question: str) -> str:
-    text, options = element.text, element.options
-    offered = "" if options is None or is_any(options) else f"with an option {with_texts(options)}"
-    if is_any(text):
-        return f"{question} {offered}".rstrip()
-    return f"{_topic(text, question)} {offered}".rstrip()
+def quoted(text: str) -> str:
+    """A text in quotes, on one line and short enough for a sentence."""
+    return f'"{shortened(text)}"'
 
 
-def _topic(text: Text, question: str) -> str:
-    match text:
-        case Regex(pattern) if names := literals(pattern):
-            return f"about {either(names)}"
-        case _:
-            return f"{question} {with_texts(text)}"
+def shortened(text: str) -> str:
+    """A text on one line and short enough for a sentence."""
+    return _cut(" ".join(text.split()))
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1].rstrip() + "…"

@@ -67,14 +67,14 @@ def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
 def tests_from(patterns: SearchStrategy[str]) -> SearchStrategy[Test]:
     elements = elements_from(patterns)
     names = st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"])
-    cuts = st.lists(st.builds(Scope, names, elements), max_size=3).map(tuple)
+    scopes = st.lists(st.builds(Scope, names, elements), max_size=3).map(tuple)
     numbers = st.integers(0, 3)
     return st.one_of(
-        st.builds(Exists, elements, cuts),
-        st.builds(ActAtFirst, patterns, elements, cuts),
-        st.builds(ActAtSome, patterns, elements, cuts),
-        st.builds(Count, elements, numbers, cuts),
-        st.builds(AtLeast, elements, numbers, cuts),
+        st.builds(Exists, elements, scopes),
+        st.builds(ActAtFirst, patterns, elements, scopes),
+        st.builds(ActAtSome, patterns, elements, scopes),
+        st.builds(Count, elements, numbers, scopes),
+        st.builds(AtLeast, elements, numbers, scopes),
     )
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from codebotler.core.trace import Event, Trace
 from codebotler.rtl import And, Formula, Not, Regex, Without, Words, holds, parse
-from codebotler.rtl.formula import CutName
+from codebotler.rtl.formula import ScopeName
 from codebotler.rtl.reasoning import (
     Reasoner,
     Undecided,
@@ -150,7 +150,10 @@ def test_moves_lead_to_the_rooms_that_there_are() -> None:
 
 # --- automata
 
-CUTS = ("", *(f".{name}({element})" for name in get_args(CutName) for element in ('goto("b")', 'say("x")')))
+SCOPES = (
+    "",
+    *(f".{name}({element})" for name in get_args(ScopeName) for element in ('goto("b")', 'say("x")')),
+)
 TESTS = (
     'Exists(say("x"))',
     'Count(say("x"), 2)',
@@ -162,10 +165,10 @@ TESTS = (
 )
 
 
-@pytest.mark.parametrize("cut", CUTS)
+@pytest.mark.parametrize("scope", SCOPES)
 @pytest.mark.parametrize("test", TESTS)
-def test_automata_judge_all_short_traces_as_formulas_do(test: str, cut: str) -> None:
-    formula = parse(f"tr{cut}.{test}")
+def test_automata_judge_all_short_traces_as_formulas_do(test: str, scope: str) -> None:
+    formula = parse(f"tr{scope}.{test}")
     reasoner = Reasoner([formula], {move: move for move in ("a", "b", "xax", "a b")})
     automaton, letters = reasoner._reading(formula)
     events = {letter: event for event, letter in zip(reasoner.events, letters, strict=True)}
@@ -209,15 +212,15 @@ def single_tests() -> st.SearchStrategy[str]:
     elements = st.sampled_from(
         ['goto("a")', 'goto(without("a"))', 'say("x|y")', 'say(words("x", without("y")))', 'ask("x", "y")']
     )
-    cut = st.builds(
+    scope = st.builds(
         "{}({})".format, st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]), elements
     )
-    cuts = st.lists(cut, max_size=2).map(lambda parts: ".".join(["tr", *parts]))
+    scopes = st.lists(scope, max_size=2).map(lambda parts: ".".join(["tr", *parts]))
     counts = st.builds(
         "{}({}, {})".format, st.sampled_from(["Count", "AtLeast"]), elements, st.integers(0, 3)
     )
     acts = st.builds('{}("a", {})'.format, st.sampled_from(["ActAtFirst", "ActAtSome"]), elements)
-    return st.builds("{}.{}".format, cuts, st.one_of(elements.map("Exists({})".format), counts, acts))
+    return st.builds("{}.{}".format, scopes, st.one_of(elements.map("Exists({})".format), counts, acts))
 
 
 def formulas() -> st.SearchStrategy[Formula]:

@@ -35,7 +35,7 @@ from codebotler.rtl import (
     holds,
     parse,
 )
-from codebotler.rtl.semantics import cut
+from codebotler.rtl.semantics import scoped
 
 Placed = list[tuple[int, Event]]
 """A copied part of a trace, each event with its position in the whole."""
@@ -142,7 +142,7 @@ def count(tr: Placed, e: EventPattern, n: int) -> bool:
     return at_least(tr, e, n) and not at_least(tr, e, n + 1)
 
 
-CUTS: dict[str, Callable[[Placed, EventPattern], Placed]] = {
+SCOPES: dict[str, Callable[[Placed, EventPattern], Placed]] = {
     "BeforeFirst": before_first,
     "BeforeLast": before_last,
     "AfterFirst": after_first,
@@ -160,8 +160,8 @@ def defined(formula: Formula, trace: Trace) -> bool:
             return not defined(part, trace)
         case _:
             tr = list(enumerate(trace))
-            for one in formula.cuts:
-                tr = CUTS[one.name](tr, one.element)
+            for one in formula.scopes:
+                tr = SCOPES[one.name](tr, one.element)
             return defined_test(formula, tr)
 
 
@@ -243,18 +243,18 @@ def test_the_parts_before_and_after_make_up_the_trace(
     element, trace = data.draw(elements), data.draw(traces)
     hits = [at for at in range(len(trace)) if same(element, (at, trace[at]))]
     for which, at in (("First", hits[:1]), ("Last", hits[-1:])):
-        before, after = (cut(parse_cut(side + which, element), trace) for side in ("Before", "After"))
+        before, after = (scoped(parse_scope(side + which, element), trace) for side in ("Before", "After"))
         if not at:
-            assert before == after == (0, len(trace))
+            assert before == after == range(len(trace))
         else:
-            assert before == (0, at[0])
-            assert after == (at[0] + 1, len(trace))
+            assert before == range(at[0])
+            assert after == range(at[0] + 1, len(trace))
 
 
-def parse_cut(name: str, element: EventPattern) -> tuple[Scope, ...]:
+def parse_scope(name: str, element: EventPattern) -> tuple[Scope, ...]:
     formula = parse(f"tr.{name}({element}).Exists(say('x'))")
     assert isinstance(formula, Exists)
-    return formula.cuts
+    return formula.scopes
 
 
 @given(st.data())
@@ -377,7 +377,7 @@ NO_FORMULA = (
         ([goto("alice's office"), say("to the lobby"), ask("lunch?", YES)], False, True),
         ([ask("lunch?", YES), goto("alice's office")], False, False),
         ([], False, False),
-        # The two pitfalls of cutting: what is not found cuts nothing off.
+        # The two pitfalls of scopes: one whose event is not found is the whole trace.
         ([say("to the lobby")], True, False),
     ],
 )

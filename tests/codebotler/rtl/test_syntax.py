@@ -136,17 +136,16 @@ def test_round_trip_of_raw_patterns(pattern: str) -> None:
         ('tr.ActAtFirst("(", say("a"))', 15, "no valid regex"),
         ('tr.Exists(say(without("(?i)a")))', 23, "whole word"),
         ('tr.Exists(say("\\bno"))', 15, 'write r"..."'),
-        ('tr.Count(say("a"), -1)', 20, "cannot be negative"),
+        ('tr.Count(say("a"), -1)', 20, "expected a whole number"),
         ('tr.Count(say("a"), True)', 20, "expected a whole number"),
         ('tr.Count(say("a"), 1.0)', 20, "expected a whole number"),
-        ('tr.Count(say("a"), 10000000000)', 20, "at most"),
         ('tr.AfterFirst(say("a"))', 4, "followed by a test"),
         ('tr.Exists(say("a")).Exists(say("a"))', 4, "Exists is a test"),
         ('tr.After(say("a")).Exists(say("a"))', 4, "After; .*AfterLast"),
-        ('trace.Exists(say("a"))', 1, "expected tr or a cut"),
+        ('trace.Exists(say("a"))', 1, "expected tr or a scope"),
         ('tr.Exists(say("a")) # or\n tr.Exists(say("b"))', 20, "no comments"),
         ('tr.Exists(say("a")', 10, "never closed"),
-        ('tr.Exists(say("\ud800"))', 16, "no character"),
+        ('tr.Exists(say("\ud800"))', 1, "cannot be read"),
         ("\0", 1, "null"),
     ],
 )
@@ -165,9 +164,7 @@ def test_says_what_is_wrong_and_where(text: str, column: int, named: str) -> Non
         "not " * 100_000 + 'tr.Exists(say("a"))',
         "(" * 5_000,
         "-" * 100_000 + "1",
-        "tr" + '.AfterFirst(say("a"))' * 60 + '.Exists(say("a"))',
         "tr" + '.AfterFirst(say("a"))' * 50_000 + '.Exists(say("a"))',
-        "tr.Exists(say(" + "words(" * 60 + '"a"' + ")" * 62,
         'tr.Exists(say("' + "(" * 5_000 + "a" + ")" * 5_000 + '"))',
         'tr.Count(say("a"), ' + "9" * 5_000 + ")",
     ],
@@ -178,21 +175,12 @@ def test_deep_nesting_is_an_error_and_no_crash(text: str) -> None:
         parse(text)
 
 
-@pytest.mark.parametrize(
-    ("pattern", "unit", "column"),
-    [
-        ('{}tr.Exists(say("a"))', "not ", 205),
-        ('tr{}.Exists(say("a"))', '.AfterFirst(say("a"))', 1),
-        ('tr.Exists(say({}"a"{}))', "words(", 321),
-    ],
-)
-def test_50_are_deep_enough_and_51_too_deep(pattern: str, unit: str, column: int) -> None:
-    close = ")" * unit.endswith("(")
-    text = pattern.format(unit * DEEPEST, close * DEEPEST)
+def test_50_are_deep_enough_and_51_too_deep() -> None:
+    text = "not " * DEEPEST + 'tr.Exists(say("a"))'
     assert str(parse(text)) == text
     with pytest.raises(RtlSyntaxError, match="more than 50 deep") as caught:
-        parse(pattern.format(unit * (DEEPEST + 1), close * (DEEPEST + 1)))
-    assert caught.value.column == column
+        parse("not " + text)
+    assert caught.value.column == 205
 
 
 def test_each_part_of_a_constraint_may_be_deep() -> None:
@@ -203,13 +191,10 @@ def test_each_part_of_a_constraint_may_be_deep() -> None:
 
 
 @pytest.mark.parametrize("test", ["Count", "AtLeast"])
-def test_a_number_may_be_the_largest_and_no_larger(test: str) -> None:
-    text = f'tr.{test}(say("a"), 1000000000)'
+def test_a_number_may_be_larger_than_any_trace(test: str) -> None:
+    text = f'tr.{test}(say("a"), {10**30})'
     assert str(parse(text)) == text
     assert not holds(parse(text), (Event("say", "a"),))
-    with pytest.raises(RtlSyntaxError, match="at most 1000000000") as caught:
-        parse(f'tr.{test}(say("a"), 1000000001)')
-    assert caught.value.column == text.index("1000") + 1
 
 
 def test_nothing_is_evaluated() -> None:

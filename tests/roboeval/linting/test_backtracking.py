@@ -25,8 +25,8 @@ Read = Callable[[str], object]
 METHODS = ("match", "fullmatch", "search", "finditer", "sub", "split")
 MODULES = [
     *(
-        importlib.import_module(f"codebotler.rtl.{one.name}")
-        for one in pkgutil.iter_modules(codebotler.rtl.__path__)
+        importlib.import_module(one.name)
+        for one in pkgutil.walk_packages(codebotler.rtl.__path__, "codebotler.rtl.")
     ),
     codebotler.simulator.robot,
 ]
@@ -62,12 +62,9 @@ def slow(read: Read, texts: list[Attack]) -> Attack | None:
 
 
 def test_the_regexes_of_the_judge_take_linear_time() -> None:
-    found = {
-        name: text
-        for name, pattern, read in uses()
-        if (text := slow(read, sampled_attacks(pattern))) is not None
-    }
-    assert not found
+    found = {name: slow(read, sampled_attacks(pattern)) for name, pattern, read in uses()}
+    assert len(found) > 20
+    assert not {name: text for name, text in found.items() if text is not None}
 
 
 FUNCTIONS: dict[str, Read] = {

@@ -1,7 +1,7 @@
 """Reasoning about formulas: can they hold together, does one follow from others, do two mean the same?
 
-The functions here answer one question each; a `Reasoner` answers several, also for the rooms of one world.
-Start with `questions.py`; `satisfiability.py` is the search behind all of them.
+Each function answers one question; a `Reasoner` answers several, also for the rooms of one world. Start with
+`questions.py`; `satisfiability.py` is the search behind all of them.
 """
 
 from codebotler.rtl.reasoning.automaton import Undecided

@@ -1,4 +1,4 @@
-"""The alphabet of formulas: an event for each way in which their elements can match one."""
+"""The alphabet of formulas: one sample event for each way in which their elements can match an event."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from codebotler.rtl.reasoning.sample_strings import distinct_strings
 
 
 def elements(formula: Formula) -> Iterator[EventPattern]:
-    """All elements of a formula in the order of its text; for a stay, the moves that bound it."""
+    """All elements of a formula in the order of its text, and the moves that bound its stays."""
     match formula:
         case And(parts) | Or(parts):
             for part in parts:
@@ -18,28 +18,23 @@ def elements(formula: Formula) -> Iterator[EventPattern]:
         case Not(part):
             yield from elements(part)
         case _:
-            yield from (cut.element for cut in formula.cuts)
+            yield from (scope.element for scope in formula.scopes)
             if isinstance(formula, ActAtFirst | ActAtSome):
-                yield from (formula.stay.arrival, formula.stay.departure)
+                yield from (formula.arrival, formula.departure)
             yield formula.element
 
 
 def alphabet(wanted: Iterable[EventPattern], rooms: Sequence[str] | None = None) -> list[Event]:
-    """Events that match elements in all combinations for which strings were found.
-
-    Args:
-        wanted: what the events are to tell apart.
-        rooms: where they may happen; anywhere by default. If no element names a place, all happen in none.
-    """
+    """Events in given rooms, or any, that match elements in all combinations for which strings were found."""
     kinds: dict[str, list[EventPattern]] = {}
     for element in dict.fromkeys(wanted):
         kinds.setdefault(element.kind, []).append(element)
     places = _places([element for alike in kinds.values() for element in alike], rooms)
     return [
-        Event(kind, text, choice, answer, place=place)
+        Event(kind, text, options, answer, place=place)
         for kind, alike in kinds.items()
         for text in distinct_strings(_distinct(element.text for element in alike))
-        for choice in _choices(alike)
+        for options in _options(alike)
         for answer in _answers(alike)
         for place in (places if kind != "goto" else [""])
     ]
@@ -50,8 +45,8 @@ def _distinct(texts: Iterable[Text | None]) -> tuple[Text, ...]:
 
 
 def _places(wanted: Sequence[EventPattern], rooms: Sequence[str] | None) -> Sequence[str]:
-    """Rooms that match the elements' places in all combinations."""
-    regexes = _distinct(Regex(e.is_place.pattern) for e in wanted if e.is_place is not None)
+    """Rooms that match the elements' places in all combinations; an empty name if no element has a place."""
+    regexes = _distinct(Regex(e.place_regex.pattern) for e in wanted if e.place_regex is not None)
     if not regexes:
         return [""]
     return distinct_strings(regexes) if rooms is None else rooms
@@ -62,12 +57,12 @@ def _answers(wanted: Sequence[EventPattern]) -> list[str | None]:
     return [None, *(distinct_strings(answers, outer=True) if answers else ())]
 
 
-def _choices(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
+def _options(wanted: Sequence[EventPattern]) -> Iterable[tuple[Option, ...]]:
     """Options that match in all combinations; one option may match what another cannot match as well."""
     texts = _distinct([*(e.options for e in wanted), *(e.text for e in wanted if e.mention)])
     found: dict[frozenset[Text], tuple[Option, ...]] = {frozenset(): ()}
     for string in distinct_strings(texts, outer=True):
         matched = frozenset(text for text in texts if text.matches(string))
-        for already, choice in tuple(found.items()):
-            found.setdefault(already | matched, (*choice, Option(string)))
+        for already, options in tuple(found.items()):
+            found.setdefault(already | matched, (*options, Option(string)))
     return found.values()

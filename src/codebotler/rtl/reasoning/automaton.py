@@ -1,4 +1,4 @@
-"""Automata that read a trace from the left and know at each event whether a formula holds so far."""
+"""Formulas as finite automata over the letters of an alphabet."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from codebotler.rtl.formula import (
 )
 
 MOST_STATES = 1_000
-"""States that an automaton may have before it is made as small as possible."""
+"""States that an automaton may have before it is minimized."""
 
 State: TypeAlias = Hashable
 Letter: TypeAlias = frozenset[EventPattern]
@@ -31,34 +31,25 @@ Letter: TypeAlias = frozenset[EventPattern]
 
 
 class Undecided(Exception):  # noqa: N818 - no mistake of the caller
-    """An answer would take too many states to find."""
+    """The answer to a question would take too long to find."""
 
 
 @dataclass(frozen=True)
 class Automaton:
-    """The smallest deterministic automaton of a formula; it starts in state 0.
+    """The smallest deterministic automaton of a formula; it starts in state 0."""
 
-    Args:
-        rows: for each state, where each letter leads.
-        accepts: for each state, whether the formula holds if the trace ends there.
-    """
-
-    rows: tuple[tuple[int, ...], ...]
-    accepts: tuple[bool, ...]
+    rows: tuple[tuple[int, ...], ...]  # for each state, where each letter leads
+    accepts: tuple[bool, ...]  # for each state, whether the formula holds if the trace ends there
 
     @classmethod
     @lru_cache(maxsize=1_000)  # worlds of a task have most requirements in common
     def of(cls, formula: Formula, letters: tuple[Letter, ...]) -> Automaton:
-        """The automaton of a formula, reading these letters.
-
-        Raises:
-            Undecided: it has too many states.
-        """
+        """The automaton of a formula, reading these letters."""
         machine = _machine(formula)
         number: dict[State, int] = {machine.start: 0}
         rows: list[list[int]] = []
         states = [machine.start]
-        for state in states:  # which grows meanwhile
+        for state in states:  # the list grows as the loop runs
             after = [machine.step(state, letter) for letter in letters]
             states += [one for one in dict.fromkeys(after) if one not in number]
             number.update((one, index) for index, one in enumerate(states[len(number) :], len(number)))
@@ -83,7 +74,7 @@ class Automaton:
 
     @cached_property
     def distances(self) -> tuple[int | None, ...]:
-        """For each state, how many events acceptance is away; None where it is out of reach."""
+        """For each state, the fewest events to an accepting one; None if none can be reached."""
         found: list[int | None] = [0 if accepted else None for accepted in self.accepts]
         distance, border = 0, {s for s, accepted in enumerate(self.accepts) if accepted}
         while border:
@@ -110,9 +101,9 @@ def _machine(formula: Formula) -> _Machine:
             start, step, accepts = _machine(part)
             return _Machine(start, step, lambda state: not accepts(state))
         case ActAtFirst():
-            arrival, departure = formula.stay.arrival, formula.stay.departure
-            stay = (*formula.cuts, Scope("AfterFirst", arrival), Scope("BeforeFirst", departure))
-            return _machine(And((Exists(arrival, formula.cuts), Exists(formula.element, stay))))
+            arrival = formula.arrival
+            stay = (*formula.scopes, Scope("AfterFirst", arrival), Scope("BeforeFirst", formula.departure))
+            return _machine(And((Exists(arrival, formula.scopes), Exists(formula.element, stay))))
         case ActAtSome():
             machine = _during_stays(formula)
         case Exists(element):
@@ -123,8 +114,8 @@ def _machine(formula: Formula) -> _Machine:
             machine = _counter(element, number, number + 1)
         case _:
             assert_never(formula)
-    for cut in reversed(formula.cuts):
-        machine = _behind(cut, machine)
+    for scope in reversed(formula.scopes):
+        machine = _within(scope, machine)
     return machine
 
 
@@ -141,21 +132,19 @@ def _counter(element: EventPattern, number: int, most: int) -> _Machine:
 
 
 def _during_stays(test: ActAtSome) -> _Machine:
-    arrival, departure = test.stay.arrival, test.stay.departure
-
     def step(state: str, letter: Letter) -> State:
-        stays = state == "there" and departure not in letter
+        stays = state == "there" and test.departure not in letter
         if state == "done" or (stays and test.element in letter):
             return "done"
-        return "there" if stays or arrival in letter else "away"
+        return "there" if stays or test.arrival in letter else "away"
 
     return _Machine("away", step, lambda state: state == "done")
 
 
-def _behind(cut: Scope, inner: _Machine) -> _Machine:
-    """The machine that lets an inner one read only what a cut leaves: everything where it finds nothing."""
-    at, (start, step, accepts) = cut.element, inner
-    match cut.name:
+def _within(scope: Scope, inner: _Machine) -> _Machine:
+    """The machine that lets an inner one read only the events in a scope."""
+    at, (start, step, accepts) = scope.element, inner
+    match scope.name:
         case "BeforeFirst":  # whether the event has come, and the inner state
             return _Machine(
                 (False, start),
@@ -168,7 +157,7 @@ def _behind(cut: Scope, inner: _Machine) -> _Machine:
                 lambda s, letter: (True, start) if not s[0] and at in letter else (s[0], step(s[1], letter)),
                 lambda s: accepts(s[1]),
             )
-        case "BeforeLast":  # the inner state, and the one in which the event was met last
+        case "BeforeLast":  # the inner state, and what it was when the event last came
             return _Machine(
                 (start, ()),
                 lambda s, letter: (step(s[0], letter), (s[0],) if at in letter else s[1]),
@@ -176,4 +165,4 @@ def _behind(cut: Scope, inner: _Machine) -> _Machine:
             )
         case "AfterLast":
             return _Machine(start, lambda s, letter: start if at in letter else step(s, letter), accepts)
-    assert_never(cut.name)
+    assert_never(scope.name)

@@ -1,6 +1,6 @@
-"""Questions about formulas: can they hold, does one follow from others, do two mean the same?
+"""Whether formulas can hold, whether one follows from others, and whether two mean the same.
 
-A question raises `Undecided` if its answer would take too long to find.
+Each function raises `Undecided` if its answer would take too long to find.
 """
 
 from __future__ import annotations
@@ -11,29 +11,17 @@ from codebotler.rtl.reasoning.satisfiability import Reasoner
 
 
 def is_satisfiable(*formulas: Formula) -> bool:
-    """Whether some trace satisfies all formulas.
-
-    Args:
-        formulas: what must hold at the same time.
-    """
+    """Whether some trace satisfies all formulas."""
     return Reasoner(formulas).trace(formulas) is not None
 
 
 def satisfying_trace(*formulas: Formula) -> Trace | None:
-    """A shortest trace that satisfies all formulas, or None if they contradict each other.
-
-    Args:
-        formulas: what must hold at the same time.
-    """
+    """A shortest trace that satisfies all formulas, or None if they contradict each other."""
     return Reasoner(formulas).trace(formulas, shortest=True)
 
 
 def conflict(*formulas: Formula) -> list[Formula] | None:
-    """Formulas that contradict each other, none of which can be left out, or None if all can hold.
-
-    Args:
-        formulas: what is to hold at the same time.
-    """
+    """Formulas that contradict each other, none of which can be left out, or None if all can hold."""
     return Reasoner(formulas).conflict(formulas)
 
 
@@ -41,29 +29,19 @@ def is_implied(formula: Formula, *premises: Formula) -> bool:
     """Whether a formula holds on every trace on which the premises hold.
 
     Args:
-        formula: what may follow.
-        premises: from what; without any, the formula must always hold.
+        formula: the conclusion.
+        premises: the formulas it may follow from; without any, it must hold on every trace.
     """
     return Reasoner([formula, *premises]).trace([*premises, Not(formula)]) is None
 
 
 def are_equivalent(one: Formula, other: Formula) -> bool:
-    """Whether two formulas hold on the same traces.
-
-    Args:
-        one: a formula.
-        other: a formula.
-    """
+    """Whether two formulas hold on the same traces."""
     return is_implied(one, other) and is_implied(other, one)
 
 
 def distinguishing_trace(one: Formula, other: Formula) -> Trace | None:
-    """A shortest trace on which only one of two formulas holds, or None if they are equivalent.
-
-    Args:
-        one: a formula.
-        other: a formula.
-    """
+    """A shortest trace on which only one of two formulas holds, or None if they are equivalent."""
     reasoner = Reasoner([one, other])
     found = (reasoner.trace([a, Not(b)], shortest=True) for a, b in ((one, other), (other, one)))
     return min((trace for trace in found if trace is not None), key=len, default=None)

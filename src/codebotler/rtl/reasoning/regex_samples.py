@@ -1,4 +1,4 @@
-"""Sample strings of one regex, spelled out from the tree into which Python parses it."""
+"""Sample strings of one regex, spelled out from the syntax tree that Python parses it into."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from codebotler.core.unwarned import unwarned
 from codebotler.rtl.formula import Regex
 
 Tree = Any
-"""A regex as Python parses it, or a part: pairs of an operation and its arguments, of private classes."""
+"""A parsed regex or a part of one: pairs of an operation and its arguments, of private classes of `re`."""
 
 _FLAGS = re.IGNORECASE | re.DOTALL
 _MOST_SAMPLES = 4
@@ -23,13 +23,13 @@ _LONGEST = 10_000
 
 
 def parse_tree(pattern: str) -> Tree:
-    """The tree of a regex, as Python parses it."""
+    """The syntax tree of a regex."""
     with unwarned():
         return import_module("re._parser").parse(pattern, _FLAGS)
 
 
 def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Python's parser made them
-    """The trees within one node of a tree."""
+    """The trees directly inside one node."""
     match op:
         case "BRANCH":
             return list(arguments[1])
@@ -44,7 +44,7 @@ def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Pyt
 
 @cache
 def samples(pattern: str) -> tuple[str, ...]:
-    """Up to four strings in which a regex is found, without outer spaces if possible; may be empty."""
+    """Up to four strings in which a regex is found, if possible without outer spaces; may be empty."""
     words = _spelled_in_all_ways(parse_tree(pattern))
     forms = [form.replace("{}", word) for form in ("{}", "x {}", "x {} x", "x{}x") for word in words]
     tries = (map(str.strip, forms), forms, _guesses(pattern))
@@ -53,32 +53,27 @@ def samples(pattern: str) -> tuple[str, ...]:
 
 
 def counter_samples(pattern: str) -> list[str]:
-    """Strings in the negative lookaheads of a regex, which keep it from being found."""
+    """Strings from the negative lookaheads of a regex, which keep it from being found."""
     denied = (arguments[-1] for op, arguments in parse_tree(pattern) if str(op) == "ASSERT_NOT")
     words = (word.strip() for tree in denied for word in _spelled_in_all_ways(tree)[:_MOST_SPELLED])
     return [*dict.fromkeys(filter(None, words))]
 
 
 def _guesses(pattern: str) -> Iterator[str]:
-    """Short strings of the regex's own characters, drawn at random."""
+    """Short random strings of the characters in a regex."""
     random, letters = Random(pattern), f"{pattern}x1 "  # noqa: S311 - no secret
     return ("".join(random.choices(letters, k=random.randint(0, 8))).strip() for _ in range(3_000))
 
 
 def _spelled_in_all_ways(tree: Tree) -> list[str]:
-    """Spelled close together, apart, and with what lookaheads demand behind all else."""
+    """Spelled without gaps, with gaps, and with gaps and lookaheads last."""
     behind = sorted(tree, key=lambda node: str(node[0]) == "ASSERT")
     ways = zip_longest(spelled(tree), spelled(tree, " "), spelled(behind, " "))
     return [*dict.fromkeys(text for text in chain.from_iterable(ways) if text is not None)]
 
 
 def spelled(tree: Tree, gap: str = "") -> list[str]:
-    """Some strings for which a tree stands.
-
-    Args:
-        tree: the tree of a regex, or a part of it.
-        gap: what to put where any character may stand.
-    """
+    """Some strings that a tree matches, with a gap wherever it allows any character."""
     texts = [""]
     for op, arguments in tree:
         parts = _spelled_node(op, arguments, gap)
@@ -107,7 +102,7 @@ def _spelled_node(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: A
 
 
 def _characters(op: object, arguments: Any, gap: str) -> list[str]:  # noqa: ANN401 - as in `inner_trees`
-    """Some characters that a set holds, what it names first; one where it holds nearly all."""
+    """Some characters of a set, those that it names first; a single one if it holds nearly all."""
     parser = import_module("re._parser")
     one = import_module("re._compiler").compile(parser.SubPattern(parser.State(), [(op, arguments)]), _FLAGS)
     members = arguments if str(op) == "IN" else []

@@ -1,7 +1,7 @@
-"""Sample strings that tell texts of formulas apart: what a program could say, ask or visit.
+"""Sample strings that match some texts of formulas and not others.
 
-They are put together from samples of the texts' regexes, and each is tried. Where no string is found there
-may still be one.
+They are put together from samples of the texts' regexes, and each is tried. A combination for which none was
+found may still have one.
 """
 
 from __future__ import annotations
@@ -21,11 +21,9 @@ _MOST_ALIKE = 2
 
 @cache
 def distinct_strings(texts: tuple[Text, ...], *, outer: bool = False) -> tuple[str, ...]:
-    """One string, a short one, for each combination of texts that match together in some candidate.
+    """A short string for each combination of texts that some candidate matches.
 
-    Args:
-        texts: what the strings are to tell apart.
-        outer: whether they may begin or end with spaces, as options may and texts of events may not.
+    `outer` allows spaces at the ends, which options may have and texts of events may not.
     """
     found: dict[tuple[bool, ...], str] = {}
     for candidate in _candidates(texts, outer=outer):
@@ -35,17 +33,12 @@ def distinct_strings(texts: tuple[Text, ...], *, outer: bool = False) -> tuple[s
 
 @cache
 def can_match(text: Text, *, outer: bool = False) -> bool:
-    """Whether a string was found that matches a text.
-
-    Args:
-        text: the text.
-        outer: whether the string may begin or end with spaces.
-    """
+    """Whether a string was found that matches a text."""
     return any(map(text.matches, _candidates((text,), outer=outer)))
 
 
 def patterns(text: Text) -> Iterator[str]:
-    """The regexes in a text of RTL."""
+    """The regexes in a text of a formula."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(patterns, parts))
@@ -77,7 +70,7 @@ def _candidates(texts: tuple[Text, ...], *, outer: bool) -> tuple[str, ...]:
 
 
 def _claims(text: Text) -> Iterator[str]:
-    """Texts that claim what a text of RTL is about, rightly or wrongly."""
+    """Strings that make the claim a text asks for, or a different one."""
     match text:
         case Words(parts):
             yield from chain.from_iterable(map(_claims, parts))
@@ -92,7 +85,7 @@ def _claims(text: Text) -> Iterator[str]:
 
 
 def _told_apart(words: Iterable[str], texts: Sequence[Text]) -> list[str]:
-    """Of words that the texts, their parts and their regexes all match alike, only the first two."""
+    """The first two of any words that the texts, their parts and their regexes do not tell apart."""
     parts = chain.from_iterable(text.parts if isinstance(text, Words) else (text,) for text in texts)
     wanted = [*dict.fromkeys([*parts, *(Regex(pattern) for text in texts for pattern in patterns(text))])]
     alike: defaultdict[tuple[bool, ...], list[str]] = defaultdict(list)
@@ -106,13 +99,13 @@ def _pairs(words: Sequence[str]) -> Iterator[str]:
 
 
 def _subsets(words: Sequence[str]) -> Iterator[str]:
-    """Three words or more, the most first, in their order and in the opposite one."""
+    """All choices of three or more words, the largest first, forwards and backwards."""
     subsets = chain.from_iterable(combinations(words, size) for size in range(len(words), 2, -1))
     return (" ".join(order) for subset in islice(subsets, _MOST_SUBSETS) for order in (subset, subset[::-1]))
 
 
 def _joined(parts: Sequence[Text]) -> Iterator[str]:
-    """A sample of each part, in several orders."""
+    """Samples of all parts, in several orders."""
     groups = [
         [word for pattern in patterns(part) for word in samples(pattern)] or [""]
         for part in parts

@@ -1,8 +1,8 @@
-"""A search for traces on which formulas hold.
+"""The search for a trace on which formulas hold.
 
-Each formula becomes an automaton, and the product of the automata is searched to its end. So "there is none"
-is a proof for all sequences, of any length, of events of the alphabet. The alphabet is sampled, and that is
-the one gap: a text unlike every sample. Options that are not text are left out.
+Each formula becomes an automaton, and the product of the automata is searched completely. So "there is none"
+is a proof for all sequences, of any length, of events of the alphabet. The only gap is a text unlike every
+sample in the alphabet. Options that are not text are left out.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from codebotler.rtl.reasoning.automaton import Automaton, Undecided
 from codebotler.rtl.semantics import holds, matches
 
 MOST_VISITED = 20_000
-"""States of a product that are visited before a search gives up."""
+"""States of the product that a search visits before it gives up."""
 
 Reading: TypeAlias = tuple[Automaton, list[int]]
-"""An automaton, and which of its letters each event of the alphabet is."""
+"""An automaton, and for each event of the alphabet the letter that it reads."""
 
 
 class Reasoner:
     """What formulas allow a robot to do, anywhere or in the rooms of one world.
 
     Args:
-        formulas: all that questions will be about; their regexes make the alphabet.
-        moves: where each request to move leads; by default any text may lead anywhere.
-        start: the room in which the robot starts, where moves are given.
+        formulas: all that will be asked about; the alphabet is made from their regexes.
+        moves: the room that each request to move leads to; by default any text may lead anywhere.
+        start: the room in which the robot starts; it counts only with `moves`.
     """
 
     def __init__(
@@ -57,20 +57,18 @@ class Reasoner:
             self._driving = _driving(self.events, rooms, moves)
 
     def conflict(self, formulas: Sequence[Formula], denied: Formula | None = None) -> list[Formula] | None:
-        """Formulas that cannot all hold, or not while another fails; none of them can be left out.
+        """The formulas that contradict each other, in their order, or None if all can hold.
 
-        It starts with no formula and adds one that the last trace breaks, so that proofs stay small.
+        None of them can be left out.
 
         Args:
-            formulas: those that may be in it.
-            denied: what must fail; then they imply it.
-
-        Returns:
-            the conflicting formulas, in their order; None if there is no conflict.
+            formulas: what should hold.
+            denied: what should fail at the same time; formulas that contradict this imply it.
 
         Raises:
             Undecided: the search would take too long.
         """
+        # Starting with no formula and adding one that the last trace breaks keeps the proofs small.
         given = [] if denied is None else [Not(denied)]
         wanted = {element for one in given for element in elements(one)}
         nearest = sorted(formulas, key=lambda one: -len(wanted.intersection(elements(one))))
@@ -87,11 +85,11 @@ class Reasoner:
         return [one for one in formulas if one in chosen]
 
     def trace(self, formulas: Iterable[Formula], *, shortest: bool = False) -> Trace | None:
-        """A trace of events of the alphabet on which formulas hold; None if there is none.
+        """A trace of events of the alphabet on which formulas hold, or None if there is none.
 
         Args:
             formulas: what must hold.
-            shortest: whether to find one of the shortest, which takes longer.
+            shortest: whether it must be one of the shortest, which takes longer to find.
 
         Raises:
             Undecided: the search would take too long.
@@ -116,7 +114,7 @@ class Reasoner:
 
 
 def _driving(events: Sequence[Event], rooms: Sequence[str], moves: Mapping[str, str]) -> Reading:
-    """What accepts the traces in which each event happens where the robot is."""
+    """The automaton of the traces in which each event happens where the robot is."""
     lost = len(rooms)
     kinds = [(event.text if event.kind == "goto" else "", event.place) for event in events]
     number = {kind: index for index, kind in enumerate(dict.fromkeys(kinds))}
@@ -135,7 +133,7 @@ States: TypeAlias = tuple[int, ...]
 def _search(
     automata: Sequence[Automaton], letters: Mapping[States, Event], *, shortest: bool
 ) -> Trace | None:
-    """A trace that all automata accept: greedily, where acceptance is near, or the shortest, by A*."""
+    """A trace that all automata accept, found greedily, or a shortest one, found by A*."""
     tables = [automaton.rows for automaton in automata]
     distances = [automaton.distances for automaton in automata]
     start = (0,) * len(automata)

@@ -1,4 +1,4 @@
-"""What a text in plain English says: the numbers, times and things it names, and what it affirms or denies.
+"""What a text in plain English claims: numbers of things, times of day, and what it affirms or denies.
 
-Start with `claims.py`; `codebotler.rtl.semantics` asks it what a spoken text claims.
+Start with `claims.py`: the texts of formulas that use the other modules.
 """

@@ -1,4 +1,4 @@
-"""What a text claims: how many there are of a thing, a time of day, and what it affirms or denies."""
+"""Texts of formulas that match what a sentence claims: a number of things, a time of day, a yes or a no."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Number:
 
     Args:
         number: how many.
-        thing: a regex for it, found as a whole word; in the plural, too.
-        others: regexes for other things, whose numbers are not meant.
-        other: whether the text must give another number of the thing instead.
+        thing: a regex for the thing, found as a whole word, in the singular or the plural.
+        others: regexes for other things, whose numbers do not count.
+        other: whether the text must give a different number of the thing instead.
     """
 
     number: int
@@ -33,21 +33,21 @@ class Number:
     other: bool = False
 
     def matches(self, text: str) -> bool:
-        """Whether the text gives just this number of the thing; or, if that is wanted, another."""
+        """Whether a text gives this number of the thing and no other; if `other` is set, a different one."""
         given = self.given(text)
         return bool(given) and (given != {self.number}) == self.other
 
     def given(self, text: str) -> frozenset[float]:
         """All numbers that a text gives of the thing.
 
-        In each clause a number belongs to the thing next to it: the one that follows, or, where things come
-        first, the one before. A text that does not name the thing gives all numbers that belong to no other.
+        In each clause a number belongs to the thing after it, or, where things come first, to the one before
+        it. A text that does not name the thing gives all numbers that belong to no other.
         """
         return _given(self.kinds, text)
 
     @cached_property
     def kinds(self) -> tuple[re.Pattern[str], ...]:
-        """The regexes for the thing and the others, ready to search with."""
+        """The compiled regexes for the thing and the others."""
         return tuple(map(_word, (self.thing, *self.others)))
 
     def __str__(self) -> str:
@@ -57,26 +57,26 @@ class Number:
 
 @lru_cache(maxsize=256)  # several checks ask for other numbers of the same thing
 def _given(kinds: tuple[re.Pattern[str], ...], text: str) -> frozenset[float]:
-    told = [sentence for sentence in sentences(without_harmless(text)) if not sentence.endswith("?")]
-    parts = [[*_marks(clause, kinds)] for sentence in told for clause in clauses(sentence)]
+    stated = [sentence for sentence in sentences(without_harmless(text)) if not sentence.endswith("?")]
+    parts = [[*_marks(clause, kinds)] for sentence in stated for clause in clauses(sentence)]
     if not any(kind == 0 for part in parts for kind, _ in part):
         no_other = (part for part in parts if not any(kind for kind, _ in part))
         return frozenset(n for part in no_other for _, numbers in part for n in numbers)
     found = frozenset(n for part in parts for n in _paired(part))
-    return found or frozenset(n for sentence in told for n in _paired([*_marks(sentence, kinds)]))
+    return found or frozenset(n for sentence in stated for n in _paired([*_marks(sentence, kinds)]))
 
 
 def _word(pattern: str) -> re.Pattern[str]:
-    """A regex as a whole word, in the singular or the plural; what is no word, such as `%`, may touch one."""
+    """A regex as a whole word, in the singular or the plural; a sign such as `%` may touch a word."""
     return compile_regex(rf"(?:\b|(?=\W))(?:{pattern})(?:e?s)?(?:\b|(?<=\W))")
 
 
 Mark = tuple[int | None, tuple[float, ...]]
-"""A thing, by its number, with no numbers; or None with the numbers that stand together."""
+"""The index of a thing and no numbers, or None and the numbers that stand together."""
 
 
 def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
-    """The things and numbers in a text, in their order; no number is part of the name of a thing."""
+    """The things and numbers in a text, in order; digits in the name of a thing are no number."""
     things = [*_things(text, kinds)]
     starts = [start for start, _, _ in things]
     found: list[tuple[int, Mark]] = [(start, (kind, ())) for start, _, kind in things]
@@ -88,7 +88,7 @@ def _marks(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[Mark]:
 
 
 def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int, int, int]]:
-    """Where which thing is named; of names within others, or of equal ones, the longest that stands first."""
+    """Start, end and index of each thing that is named; of overlapping names the first, then the longest."""
     named = [
         (match.start(), -match.end(), kind)
         for kind, regex in enumerate(kinds)
@@ -102,7 +102,7 @@ def _things(text: str, kinds: tuple[re.Pattern[str], ...]) -> Iterator[tuple[int
 
 
 def _paired(marks: list[Mark]) -> Iterator[float]:
-    """The numbers that belong to the thing: numbers before things, or after, whichever comes first."""
+    """The numbers of the first thing: those before it, or after it if the marks begin with a thing."""
     ordered = marks if marks and marks[0][0] is None else marks[::-1]
     numbers: tuple[float, ...] = ()
     for kind, given in ordered:
@@ -115,12 +115,12 @@ def _paired(marks: list[Mark]) -> Iterator[float]:
 
 @dataclass(frozen=True)
 class Time:
-    """A text that names times of day.
+    """A text that names times of day, all within a span.
 
     Args:
-        start: the earliest, as `11:00`.
+        start: the earliest, such as `11:00`.
         end: the latest.
-        other: whether some time that is named must lie outside instead; else all lie between the two.
+        other: whether some time must lie outside the span instead.
     """
 
     start: str
@@ -128,9 +128,9 @@ class Time:
     other: bool = False
 
     def matches(self, text: str) -> bool:
-        """Whether times are named, and lie between the two; or, if that is wanted, some do not.
+        """Whether a text names times within the span, or one outside if `other` is set.
 
-        A time that may be in the morning or in the afternoon is the one that lies between the two.
+        A time that may be in the morning or in the afternoon is taken for the one within the span.
         """
         named = times_in(text)
         inside = [
@@ -147,14 +147,7 @@ class Time:
 
 
 def minutes(time: str) -> TimeOfDay:
-    """A time such as `11:30` in minutes since midnight.
-
-    Args:
-        time: hours and minutes.
-
-    Raises:
-        ValueError: it is none.
-    """
+    """A time such as `11:30` in minutes since midnight; a ValueError if it is none."""
     match = re.fullmatch(r"(\d\d?):(\d\d)", time)
     if match is None or int(match[1]) > 24 or int(match[2]) > 59:  # noqa: PLR2004 - hours and minutes
         raise ValueError(f'"{time}" is no time of day such as "11:30"')
@@ -163,11 +156,11 @@ def minutes(time: str) -> TimeOfDay:
 
 @dataclass(frozen=True)
 class Claim:
-    """A text in which something is named in a clause that affirms it, or in one that denies something.
+    """A text in which a clause that affirms, or one that denies, names something.
 
     Args:
         pattern: a regex for what is named, found as a whole word.
-        denied: whether it must be denied.
+        denied: whether it must be a clause that denies.
     """
 
     pattern: str
@@ -175,22 +168,23 @@ class Claim:
 
     @cached_property
     def compiled(self) -> re.Pattern[str]:
-        """The regex between word boundaries, ready to search with."""
+        """The compiled regex, between word boundaries."""
         return whole_word(self.pattern)
 
     def matches(self, text: str) -> bool:
-        """Whether some clause names it and denies something, or affirms it, as is wanted."""
+        """Whether some clause of the right polarity names it."""
         wanted = Polarity.DENIES if self.denied else Polarity.AFFIRMS
         return any(
-            said is wanted and self.compiled.search(clause) is not None for clause, said in _told(text)
+            found is wanted and self.compiled.search(clause) is not None
+            for clause, found in _polarities(text)
         )
 
     def __str__(self) -> str:
         return f"{'denies' if self.denied else 'affirms'}({quote(self.pattern)})"
 
 
-@lru_cache(maxsize=64)  # what a robot says is mostly looked at by several checks, one after the other
-def _told(text: str) -> tuple[tuple[str, Polarity], ...]:
-    """The clauses of a text, and what each does with what it names."""
+@lru_cache(maxsize=64)  # several checks in a row read the same text
+def _polarities(text: str) -> tuple[tuple[str, Polarity], ...]:
+    """The clauses of a text, each with its polarity."""
     parts = (clause for sentence in sentences(text) for clause in clauses(sentence, lists=True))
     return tuple((clause, polarity(clause)) for clause in parts)

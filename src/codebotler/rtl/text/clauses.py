@@ -1,4 +1,4 @@
-"""Sentences and clauses of a text."""
+"""A text divided into sentences, and a sentence into clauses."""
 
 from __future__ import annotations
 
@@ -49,24 +49,18 @@ _SUBJECT = re.compile(r"\s*(?:he|she|it|they|we|i|you|there)\b", re.IGNORECASE)
 
 
 def sentences(text: str) -> list[str]:
-    """The sentences of a text, each question with its question mark; `4 p.m.` and `1.5` end none.
-
-    Args:
-        text: any text.
-    """
+    """The sentences of a text, questions with their question marks; `4 p.m.` and `1.5` end none."""
     return [part for part in _END.split(_HALF_DAY.sub(r"\1m", text)) if part.strip().strip("?")]
 
 
 def clauses(sentence: str, *, lists: bool = False) -> list[str]:
-    """The clauses of a sentence: what commas and words such as `but` divide; those that ask end with `?`.
+    """The clauses of a sentence, divided by commas and words such as `but`; those that ask end with `?`.
 
-    Args:
-        sentence: a sentence.
-        lists: whether a clause of a few words and without a verb belongs to the next one that is more, or
-            else to the one before: `Alice and Bob are in` says of both the same.
+    With `lists`, a few words without a verb belong to the next full clause, or else to the one before:
+    `Alice and Bob are in` is one clause.
     """
     sentence = _ASIDE.sub(" ", _TAG.sub("", sentence))
-    if _PROPOSES.match(sentence):  # "How about 75 degrees?" tells which
+    if _PROPOSES.match(sentence):  # "How about 75 degrees?" is no question
         sentence = sentence.rstrip("? ")
     parts = _with_subjects([clause for part in _at_colon(sentence) for clause in _divided(part)])
     if sentence.rstrip().endswith("?"):
@@ -75,13 +69,12 @@ def clauses(sentence: str, *, lists: bool = False) -> list[str]:
 
 
 def _divided(sentence: str) -> list[str]:
-    # "She would love to, but is busy" says what she would do, and not what she does.
-    told = _IN_VAIN.sub("might", sentence)
-    return [part for part in _JOINT.split(told) if part.strip()]
+    # "She would love to, but is busy" does not affirm.
+    return [part for part in _JOINT.split(_IN_VAIN.sub("might", sentence)) if part.strip()]
 
 
 def _at_colon(sentence: str) -> list[str]:
-    """Both sides of a colon where each says something: `You are not alone: Bob comes`; not `Absent: Bob`."""
+    """Both sides of a colon if each is a clause: `You are not alone: Bob comes`, but not `Absent: Bob`."""
     head, colon, tail = sentence.partition(":")
     if colon and denies_something(head) and _VERB.search(_JOINT.split(tail)[0]):
         return [head, tail]
@@ -89,19 +82,19 @@ def _at_colon(sentence: str) -> list[str]:
 
 
 def _with_subjects(parts: list[str]) -> list[str]:
-    """The parts, `no stapler` with what has none: `room 3 has paper, but no stapler`."""
-    told: list[str] = []
+    """The parts, with the subject `room 3` before `no stapler` in `room 3 has paper, but no stapler`."""
+    whole: list[str] = []
     for part in parts:
-        lacks = bool(told) and _NO_THING.fullmatch(part) and _HAS.search(told[-1])
-        told.append(f"{_HAS.split(told[-1])[0]}{part}" if lacks else part)
-    return told
+        lacks = bool(whole) and _NO_THING.fullmatch(part) and _HAS.search(whole[-1])
+        whole.append(f"{_HAS.split(whole[-1])[0]}{part}" if lacks else part)
+    return whole
 
 
 def _gathered(parts: list[str]) -> Iterator[str]:
     waiting: list[str] = []
     done: list[str] = []
     for number, part in enumerate(parts, start=1):
-        if _ASKED.search(part) and number < len(parts):  # what was asked is told by what follows
+        if _ASKED.search(part) and number < len(parts):  # what follows tells the answer
             waiting.append(_WHETHER.sub(" ", part))
             continue
         if _is_item(part):
@@ -111,7 +104,7 @@ def _gathered(parts: list[str]) -> Iterator[str]:
             done.append(" ".join(waiting))  # "Good day, how are you?" asks nothing of the day
             done.append(part)
         elif done and _SUBJECT.match(part) and not _belong(waiting, part):
-            done[-1] = " ".join([done[-1], *waiting])  # the names before it belong to what was said before
+            done[-1] = " ".join([done[-1], *waiting])  # the names before it belong to the clause before
             done.append(part)
         else:
             done.append(" ".join([*waiting, part]))
@@ -122,12 +115,12 @@ def _gathered(parts: list[str]) -> Iterator[str]:
 
 
 def _belong(waiting: list[str], part: str) -> bool:
-    """Whether few words belong to what follows though that has a subject: `in room 3, there is one`."""
+    """Whether the words before a clause with a subject belong to it: `in room 3, there is one`."""
     asked = any(map(_ASKED.search, waiting))
     return asked or (bool(waiting) and bool(_PLACE.match(waiting[-1])) and bool(_THERE.match(part)))
 
 
 def _is_item(part: str) -> bool:
-    """Whether it is a few words that say nothing by themselves, such as a name."""
+    """Whether a part is a few words that claim nothing by themselves, such as a name."""
     says_something = _SUBJECT.match(part) or _VERB.search(part) or denies_something(part)
     return _ITEM.fullmatch(part) is not None and not says_something

@@ -13,9 +13,9 @@ _TENS = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ni
 _WORDS = {word: n for n, word in enumerate(_ONES)} | {word: 20 + 10 * n for n, word in enumerate(_TENS)}
 _NOTHING = r"no one|no-one|noone|nobody|nothing|none|neither|not (?:one|a single)|no"
 
-_NEAR = 60  # characters within which words belong together; without an end, long texts would take for ever
+_NEAR = 60  # characters within which words belong together; without a limit, long texts would take forever
 
-# What a number may be glued to; a single F or C only by two digits or more, for 3C is as well a room.
+# What a number may be glued to; a single F or C needs two digits or more, because 3C may be a room.
 _GLUED = (
     r"x|[ap]m|h|hrs?|hours?|mins?|minutes?|s|secs?|seconds?|k?g|lbs?|oz|m?l|[kcm]m|m|ft|degrees?|percent"
     r"|pcs?|pieces?|people|(?<=\d\d)[fc]"
@@ -34,7 +34,7 @@ _PRONOUN = re.compile(
     r"\b(?:any|some|every|each|which|this|that|the|another|other|sweet|savory|savoury|right|last|first)[ -]$",
     re.IGNORECASE,
 )
-# "2 of 4" tells 2, and "a total of 2" tells it, too; "2 of a total of 4" does not tell 4.
+# "2 of 4" gives 2, and "a total of 2" gives 2 as well; "2 of a total of 4" does not give 4.
 _OF = re.compile(
     r"(?:(?:(?<!\btotal )|(?<=\bof a total )|(?<=\bof the total ))"
     r"\bof(?: the| all| these| those)?(?: other)?\s+|/\s*)$",
@@ -53,31 +53,28 @@ _TOGETHER = re.compile(
 
 
 def numerals(text: str) -> Iterator[tuple[int, int, tuple[float, ...]]]:
-    """The numbers in a text, as positions and values; those between which it leaves the choice are together.
+    """Start, end and values of the numbers in a text; alternatives such as `2 or 3` come together.
 
-    `no`, `nobody` and the like are 0; `x2`, `2x` and `2kg` are 2. Of `2 of 4` only 2 is told, of
-    `a total of 2` the 2; `one` in `the one` is no number, and what is `not 3` or `at least 3` has none.
-
-    Args:
-        text: any text.
+    `no`, `nobody` and the like are 0; `x2`, `2x` and `2kg` are 2. `2 of 4` and `a total of 2` give 2;
+    `the one`, `not 3` and `at least 3` give none.
     """
     together: list[re.Match[str]] = []
     for match in _NUMBER.finditer(text):
-        if _is_none(match, text):
+        if _is_ignored(match, text):
             continue
         if together and not _TOGETHER.fullmatch(text, together[-1].end(), match.start()):
-            yield _told(together)
+            yield _alternatives(together)
             together = []
         together.append(match)
     if together:
-        yield _told(together)
+        yield _alternatives(together)
 
 
-def _told(matches: list[re.Match[str]]) -> tuple[int, int, tuple[float, ...]]:
+def _alternatives(matches: list[re.Match[str]]) -> tuple[int, int, tuple[float, ...]]:
     return matches[0].start(), matches[-1].end(), tuple(map(_value, matches))
 
 
-def _is_none(match: re.Match[str], text: str) -> bool:
+def _is_ignored(match: re.Match[str], text: str) -> bool:
     before = text[max(0, match.start() - _NEAR) : match.start()]
     if match["word"] and match["word"].lower() == "one" and _PRONOUN.search(before):
         return True

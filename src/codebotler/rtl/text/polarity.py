@@ -1,4 +1,4 @@
-"""Whether a clause affirms what it names, denies it, or leaves it open."""
+"""Whether a clause affirms, denies or leaves open."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import Enum
 _WORDS = r"(?:[\w'\u2019]+\s+)"
 _NOT = r"(?:not|never|cannot|cant|dont|doesnt|wont|isnt|\w+n['\u2019]t)"
 
-# Nothing is denied by these, whatever their words: they are taken out of a clause before it is read.
+# Phrases that hold a word of denial but deny nothing; they are taken out before a clause is read.
 _HARMLESS = re.compile(
     r"\bno (?:problem|worr(?:y|ies)|doubt|trouble|questions?|objections?|hurry|rush|matter|wonder|need)\b"
     r"|\b(?:no|not) (?:more|less|fewer|later|earlier|sooner|before|after)\b(?: than\b)?|\bnot (?:only|just)\b"
@@ -17,7 +17,7 @@ _HARMLESS = re.compile(
     rf"|\b{_NOT} (?:even )?(?:worry|mind|forget|hesitate|panic|get lost|be (?:late|afraid|shy))\b"
     r"|\b(?:can(?:no|['\u2019])t|can not) wait\b|\bcould(?:n['\u2019]t| not) be (?:happier|better)\b"
     rf"|\b{_NOT} miss\b|\b(?:nobody|no ?one|nothing) else\b"
-    # What is denied twice is not denied.
+    # A double denial is none.
     rf"|\b(?:no|nothing|nobody|no ?one|none|neither|nowhere|{_NOT})\s+{_WORDS}{{0,4}}"
     r"(?:lack\w*|miss(?:es|ing)|absent|alone|declin\w*|refus\w*|without)\b"
     r"|\b(?:lacking|missing|lacks?|without)\W{1,3}(?:nothing|none|no ?one|nobody)\b",
@@ -36,7 +36,7 @@ _OPEN = re.compile(
     r"|\bmay\b(?! (?:i|we|want|need)\b)|\bhop(?:e|es|ing)\b(?!.{0,60}\b(?:you|your|every\w+|all)\b)"
     rf"|\b{_NOT} (?:yet )?(?:be )?(?:know|knows|sure|certain|clear|decided?|told|tell)\b"
     r"|\bno (?:idea|answer)\b"
-    # Whom somebody asked has not answered yet.
+    # "I asked Alice": she has not answered yet.
     r"|\basked(?:\s+(?!said|declin|refus|accept|agree|is|are|will|has|have|had|does|did|would|want|lack|need)"
     r"\w+){1,4}\W*$",
     re.IGNORECASE,
@@ -52,29 +52,17 @@ class Polarity(Enum):
 
 
 def polarity(clause: str) -> Polarity:
-    """What a clause does: deny (`not`, `nobody`, `declined`), leave open (a question, `maybe`), or affirm.
-
-    Args:
-        clause: a clause; the last one of a question ends with `?`.
-    """
+    """The polarity of a clause: `nobody` and `declined` deny, a question and `maybe` leave open."""
     if clause.rstrip().endswith("?") or _OPEN.search(clause):
         return Polarity.OPEN
     return Polarity.DENIES if denies_something(clause) else Polarity.AFFIRMS
 
 
 def denies_something(clause: str) -> bool:
-    """Whether a clause holds a word that denies, and not as part of a phrase such as `no problem`.
-
-    Args:
-        clause: a clause.
-    """
+    """Whether a clause holds a word of denial that is not part of a phrase such as `no problem`."""
     return _DENIAL.search(without_harmless(clause)) is not None
 
 
 def without_harmless(text: str) -> str:
-    """A text without such phrases as hold a word that denies, but deny nothing.
-
-    Args:
-        text: any text.
-    """
+    """A text without phrases such as `no problem`, which deny nothing."""
     return _HARMLESS.sub(" ", text)

@@ -1,4 +1,4 @@
-"""The times of day that a text names."""
+"""The times of day in a text."""
 
 from __future__ import annotations
 
@@ -34,32 +34,29 @@ _CLOCK = re.compile(
     re.IGNORECASE,
 )
 _ALONE = re.compile(rf"\s*(?:(?:at|around|about)\s+)?{_hour('')}\s*", re.IGNORECASE)
-_BESIDE = re.compile(
+_EXCLUDED = re.compile(
     r"\b(?:before|after|except|(?:any ?(?:thing|time)|all|everything) but|not)\s+(?:at\s+)?$", re.IGNORECASE
 )
-_NEAR = 30  # characters in which such a word stands
+_NEAR = 30  # characters before a time, in which such a word is looked for
 _DAY = 24 * 60
 
 
-@lru_cache(maxsize=64)  # what a robot says is mostly looked at by several checks, one after the other
+@lru_cache(maxsize=64)  # several checks in a row read the same text
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
-    """The times of day in a text; of each both readings where it may be in the morning or the afternoon.
+    """The times of day in a text, each with both readings if it may be in the morning or the afternoon.
 
-    `12 pm`, `12:00`, `noon`, `twelve o'clock` and `half past twelve` are times, and so is a text that is no
-    more than an hour; `before 12 pm` names none.
-
-    Args:
-        text: any text.
+    `12 pm`, `12:00`, `noon`, `twelve o'clock` and `half past twelve` are times, and so is a text that is only
+    an hour; `before 12 pm` is none.
     """
-    told = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
-    if alone := _ALONE.fullmatch(told):
+    plain = ". ".join(sentence.rstrip("? ") for sentence in sentences(text))
+    if alone := _ALONE.fullmatch(plain):
         return (*_readings(alone["hour"], 0, None),)
-    named = [match for match in _CLOCK.finditer(told) if not _is_beside(match)]
+    named = [match for match in _CLOCK.finditer(plain) if not _is_excluded(match)]
     return tuple(time for match in named for time in _of(match))
 
 
-def _is_beside(match: re.Match[str]) -> bool:
-    return _BESIDE.search(match.string, max(0, match.start() - _NEAR), match.start()) is not None
+def _is_excluded(match: re.Match[str]) -> bool:
+    return _EXCLUDED.search(match.string, max(0, match.start() - _NEAR), match.start()) is not None
 
 
 def _of(match: re.Match[str]) -> list[tuple[TimeOfDay, ...]]:
@@ -84,6 +81,6 @@ def _readings(hour: str, minute: int, half: str | None) -> list[tuple[TimeOfDay,
         return []
     if half is not None:
         return [((number % 12 + (12 if half.lower() == "p" else 0)) * 60 + minute,)]
-    told_exactly = number > 12 or number == 0 or hour.startswith("0")  # noqa: PLR2004 - half a day
-    readings = (number,) if told_exactly else (number % 12, number % 12 + 12)
+    is_exact = number > 12 or number == 0 or hour.startswith("0")  # noqa: PLR2004 - half a day
+    readings = (number,) if is_exact else (number % 12, number % 12 + 12)
     return [tuple(reading * 60 + minute for reading in readings)]

@@ -1,0 +1,255 @@
+"""Why a formula does not hold on a trace, in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+from codebotler.core.trace import Trace
+from codebotler.core.words import listed, times
+from codebotler.rtl.formula import (
+    ActAtFirst,
+    ActAtSome,
+    And,
+    AtLeast,
+    Count,
+    EventPattern,
+    Exists,
+    Formula,
+    Not,
+    Or,
+    Scope,
+    Test,
+)
+from codebotler.rtl.semantics import (
+    Inconclusive,
+    bound,
+    during_stays,
+    first_stay,
+    holds,
+    matches,
+    narrowed,
+    scoped,
+)
+from codebotler.rtl.wording import deed, few, happening, is_any, room, shortened, verb
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why a formula fails.
+
+    Args:
+        clause: the smallest part of the formula, or its negation, that makes it fail; all of it where an
+            option is no text.
+        event: the position in the trace of the event that makes it fail; None for an absence.
+        sentence: the reason for a reader, counting steps from 1.
+    """
+
+    clause: Formula
+    event: int | None
+    sentence: str
+
+
+def explain(formula: Formula, trace: Trace) -> Explanation | None:
+    """Why a formula fails on a trace; None if it holds.
+
+    Args:
+        formula: what was required.
+        trace: what the robot did.
+    """
+    try:
+        if holds(formula, trace):
+            return None
+    except Inconclusive as error:
+        option = f"option {error.number + 1} of the question at step {error.event + 1}"
+        problem = f"is no text but {shortened(error.option.text)}, so what was required cannot be judged"
+        return Explanation(formula, error.event, f"{option} {problem}")
+    clause = _failing_part(formula, trace)
+    deciding = _deciding(clause, trace, is_true=False)
+    facts = [_fact(test, trace, is_true=is_true) for test, is_true in deciding]
+    if len(facts) == 1:
+        told = f"{facts[0].told}{facts[0].ending}{facts[0].detail}"
+    else:
+        both = "both" if len(facts) == 2 else "all"  # noqa: PLR2004 - that is what both means
+        told = f"{', and it '.join(fact.told for fact in facts)}; these must not {both} be so"
+    event = max((fact.event for fact in facts if fact.event is not None), default=None)
+    return Explanation(clause, event, " ".join(f"the robot {told}".split()))
+
+
+def _failing_part(formula: Formula, trace: Trace) -> Formula:
+    match formula:
+        case And(parts):
+            return _failing_part(next(part for part in parts if not holds(part, trace)), trace)
+        case Not(Not(part)):
+            return _failing_part(part, trace)
+        case Not(Or(parts)):
+            return _failing_part(Not(next(part for part in parts if holds(part, trace))), trace)
+    return formula
+
+
+def _deciding(formula: Formula, trace: Trace, *, is_true: bool) -> Iterator[tuple[Test, bool]]:
+    """The tests that make a formula true or false, each with whether it is true itself."""
+    mention = _as_mention(formula)
+    if mention is not None and not is_true and not holds(mention, trace):
+        yield mention, False
+        return
+    match formula:
+        case Not(part):
+            yield from _deciding(part, trace, is_true=not is_true)
+        case And(parts) | Or(parts):
+            needs_all = isinstance(formula, And) == is_true
+            deciding = parts if needs_all else [next(one for one in parts if holds(one, trace) == is_true)]
+            for part in deciding:
+                yield from _deciding(part, trace, is_true=is_true)
+        case _:
+            yield formula, is_true
+
+
+def _as_mention(formula: Formula) -> Test | None:
+    """The one test that `ask(t, ".*") or ask(".*", t)` comes to."""
+    match formula:
+        case Or(
+            (Exists() | ActAtFirst() | ActAtSome() as one, Exists() | ActAtFirst() | ActAtSome() as other)
+        ):
+            a, b = one.element, other.element
+            if a.options is None or b.options is None or (a.text, a.options) != (b.options, b.text):
+                return None
+            text = a.options if is_any(a.text) else a.text
+            mention = replace(a, text=text, options=None, mention=True)
+            if replace(one, element=b) == other and is_any(a.text) != is_any(a.options):
+                return replace(one, element=mention)
+    return None
+
+
+class _Fact(NamedTuple):
+    """Whether a test is true, in English; the words `the robot` stand before it."""
+
+    event: int | None
+    told: str
+    ending: str = ""  # what was required instead, unless other facts follow
+    detail: str = ""  # what came nearest
+
+
+def _fact(test: Test, trace: Trace, *, is_true: bool) -> _Fact:
+    match test:
+        case Count(element, 0):
+            return _fact(Exists(element, test.scopes), trace, is_true=not is_true)
+        case AtLeast(element, 1):
+            return _fact(Exists(element, test.scopes), trace, is_true=is_true)
+        case Count() | AtLeast():
+            return _number(test, trace, is_true=is_true)
+    return _presence(test, trace) if is_true else _absence(test, trace)
+
+
+def _presence(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
+    element, here = test.element, _positions(test, trace)
+    at = next(at for at in here if matches(element, trace, at))
+    done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
+    place = "" if isinstance(test, Exists) else f" in {room(test.arrival.text)}"
+    told = f"{did}{place} at step {at + 1}{_where(test.scopes, trace)}"
+    return _Fact(at, told, ", which it must not do", "" if done == did else f": it {done}")
+
+
+def _absence(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
+    element, where = test.element, _where(test.scopes, trace)
+    here = [*_positions(test, trace)]
+    if isinstance(test, Exists):
+        event, detail = _instead(element, trace, here)
+        return _Fact(event, f"never {deed(element, 'past', negated=True)}{where}", detail=detail)
+    span = scoped(test.scopes, trace)
+    arrivals = [at for at in span if matches(test.arrival, trace, at)]
+    if not arrivals:
+        _, detail = _instead(test.arrival, trace, span)
+        told = f"never {deed(test.arrival, 'past', negated=True)}{where}"
+        return _Fact(None, told, f", where it was to {deed(element, 'base')}", detail)
+    first = isinstance(test, ActAtFirst)
+    there = "during that stay" if first and len(arrivals) > 1 else "there"
+    event, detail = _instead(element, trace, here)
+    if not detail:
+        kinds = dict.fromkeys(trace[at].kind for at in here if trace[at].kind != "goto")
+        only = listed([verb(kind).alone for kind in kinds])
+        detail = f": it only {only}" if only else ": it did nothing there"
+    visits = arrivals[:1] if first else arrivals
+    rooms = dict.fromkeys(happening(trace[at], test.arrival) for at in visits)
+    failed = f"did not {deed(element, 'base', negated=True)} {there}{where}"
+    told = f"went to {listed(few([*rooms]))} at {_steps(visits)} but {failed}"
+    return _Fact(arrivals[0] if event is None else event, told, detail=detail)
+
+
+def _number(test: Count | AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
+    where, number, exactly = _where(test.scopes, trace), test.number, isinstance(test, Count)
+    span = scoped(test.scopes, trace)
+    found = [at for at in span if _is_match(test.element, trace, at)]
+    if found:
+        told = f"{deed(test.element, 'past')} {times(len(found))} ({_steps(found)}){where}"
+    else:
+        told = f"never {deed(test.element, 'past', negated=True)}{where}"
+    if is_true:
+        limit = (
+            f"must not do so exactly {times(number)}"
+            if exactly
+            else f"must do so fewer than {number:,} times"
+        )
+        return _Fact(found[-1] if found else None, told, f", but {limit}")
+    if not found:
+        _, detail = _instead(test.element, trace, span)
+        return _Fact(None, told, f", but should have {'' if exactly else 'at least '}{times(number)}", detail)
+    ending = f" instead of {'' if exactly else 'at least '}{times(number)}"
+    return _Fact(found[number] if len(found) > number else None, told, ending)
+
+
+def _positions(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> Iterable[int]:
+    """The positions of the events that a test looks at."""
+    span = scoped(test.scopes, trace)
+    if isinstance(test, Exists):
+        return span
+    return (
+        during_stays(test, trace, span)
+        if isinstance(test, ActAtSome)
+        else first_stay(test, trace, span) or ()
+    )
+
+
+def _where(scopes: tuple[Scope, ...], trace: Trace) -> str:
+    """Scopes in English, such as ` after going to the lobby (step 1)`."""
+    span, parts = range(len(trace)), []
+    for scope in scopes:
+        at = bound(scope, trace, span)
+        when = "after" if scope.name.startswith("After") else "before"
+        if at is None:
+            done = f"{deed(scope.element, 'ing')} (which it did not do, so this sets no limit)"
+        else:
+            done = f"{verb(scope.element.kind).ing} {happening(trace[at], scope.element)} (step {at + 1})"
+        parts.append(f" {when} {done}")
+        span = narrowed(scope, at, span)
+    return " and".join(parts)
+
+
+def _instead(element: EventPattern, trace: Trace, here: Sequence[int]) -> tuple[int | None, str]:
+    """What the robot did instead of an element: the same elsewhere, or other things of this kind here."""
+    done = [at for at in range(len(trace)) if _is_match(element, trace, at)]
+    if done:
+        return done[0], f": it did so only at {_steps(done)}"
+    alike = [at for at in here if trace[at].kind == element.kind]
+    if not alike:
+        return None, "" if trace else ": it did nothing at all"
+    only = f": it only {verb(element.kind).past}"
+    if element.kind == "goto":
+        rooms = dict.fromkeys(happening(trace[at], element) for at in alike)
+        return None, f"{only} {listed(few([*rooms]))}"
+    return alike[
+        0
+    ], f"{only} {listed(few([f'{happening(trace[at], element)} (step {at + 1})' for at in alike]))}"
+
+
+def _is_match(element: EventPattern, trace: Trace, at: int) -> bool:
+    try:
+        return matches(element, trace, at)
+    except Inconclusive:
+        return False
+
+
+def _steps(found: Sequence[int]) -> str:
+    numbers = few([str(at + 1) for at in found])
+    return f"step{'s' * (len(found) > 1)} {listed(numbers)}"
