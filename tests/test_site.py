@@ -1,5 +1,6 @@
 """The documentation as a site: every page is in it, and no page loads anything from elsewhere."""
 
+import re
 import runpy
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -37,7 +38,22 @@ def pages(nav: Nav) -> list[str]:
 
 def test_every_page_is_in_the_navigation_once() -> None:
     nav = pages(yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"])
-    assert sorted(nav) == sorted([*MADE, *(path.name for path in (ROOT / "docs").glob("*.md"))])
+    written = [path.name for path in (ROOT / "docs").glob("*.md")]
+    assert sorted(nav) == sorted([*MADE, *written, "decisions/index.md"])
+
+
+def test_every_decision_is_in_the_index_newest_first_and_its_links_lead_somewhere() -> None:
+    folder = ROOT / "docs" / "decisions"
+    rows = re.findall(r"^\| (\d+) \| \[(.+)\]\((.+)\) \|", (folder / "index.md").read_text(), re.MULTILINE)
+    names = sorted((path.name for path in folder.glob("[0-9]*.md")), reverse=True)
+    assert [name for _, _, name in rows] == names
+    for number, title, name in rows:
+        text = (folder / name).read_text()
+        assert name.startswith(f"{int(number):02}-")
+        assert text.startswith(f"# {title}\n\n**Decision.** ")
+        assert "\n\n**Why.** " in text
+        for target in re.findall(r"\]\((?!https?:)([^)#]+)", text):
+            assert (folder / target).exists(), (name, target)
 
 
 def test_every_command_tells_its_help(build: dict[str, Any]) -> None:

@@ -52,7 +52,7 @@ def main() -> None:
     shutil.copytree(ROOT / "docs", PAGES)
     for name in ("site.css", "iframe-worker.js"):
         shutil.copy(ROOT / "website" / name, PAGES)
-    for path in PAGES.glob("*.md"):
+    for path in PAGES.rglob("*.md"):
         path.write_text(_within(path.read_text()))
     (PAGES / "changes.md").write_text((ROOT / "CHANGELOG.md").read_text())
     (PAGES / "examples.md").write_text(_examples())
