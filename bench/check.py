@@ -17,8 +17,9 @@ from functools import partial
 from pathlib import Path
 
 from codebotler.checking.check import SAMPLES, CheckSettings, Sample, check_on
-from codebotler.simulator.engine import WorkerPool, digest
+from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
 from codebotler.simulator.worker import Worker
 from roboeval.evaluation.judge import evaluate

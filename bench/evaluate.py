@@ -22,7 +22,7 @@ from pathlib import Path
 
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled

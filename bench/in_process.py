@@ -17,14 +17,14 @@ from typing import IO, Any, Protocol, Self, TypeAlias
 
 from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.core.world import World
+from codebotler.simulator.fork_server import WARM_UP_CODE, WARM_UP_RUNS, WARM_UP_WORLD
 from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.sandbox import REFUSED, execution
-from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, BudgetSpentError, Run
+from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fuel import prepared
-from codebotler.simulator.sandbox.preparing import answer
+from codebotler.simulator.sandbox.preparer import answer
 from codebotler.simulator.skill_protocol import described
-from codebotler.simulator.warm_up import LESSONS, PLAY, STAGE
 
 CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
@@ -36,7 +36,7 @@ Execution: TypeAlias = tuple[
 ORDINARY = Path(__file__).with_name("ordinary_process.py")
 
 
-class Bare(Run):
+class Bare(ProgramRun):
     """A program that runs in this process and calls the simulated robot as a function.
 
     Args:
@@ -47,19 +47,19 @@ class Bare(Run):
         super().__init__()
         self.robot, self.limits = robot, robot.rules.limits
         self.provide(described(robot))
-        self.ticks, self.seconds, self.calls = self.limits.ticks, self.limits.seconds, self.limits.calls
+        self.fuel, self.seconds, self.calls = self.limits.ticks, self.limits.seconds, self.limits.calls
 
-    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in Run
+    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
         """Do what the engine would."""
         self.calls -= 1
         if self.calls < 0:
             self.request(name)
         return self.robot.perform(name, for_robot(arguments))
 
-    def request(self, request: str) -> Any:  # noqa: ANN401, ARG002 - as in Run
+    def request(self, request: str) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
         """End the run: a limit is reached."""
         self.spent = True
-        raise BudgetSpentError
+        raise LimitReachedError
 
 
 def for_robot(arguments: list[Any]) -> list[Argument]:
@@ -103,7 +103,7 @@ class Reused(Bare):
         self.robot, self.now, self.spent, self.entered = SimulatedRobot(world), 0.0, False, False
         self.codes.clear()
         self.calls = self.limits.calls
-        self.count_anew()
+        self.refuel()
         namespace = self.provided.copy()
         try:
             exec(code, namespace)
@@ -129,7 +129,7 @@ class Unwalled(Bare):
         self.limit: str | None = None
         self.errors: list[RobotError] = []
 
-    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in Run
+    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
         """Do what the engine would, and find the limits that it would."""
         given = for_robot(arguments)
         self.limit = self.limit or self.reached(given)
@@ -147,7 +147,7 @@ class Unwalled(Bare):
         last = self.errors[-1]
         raise execution.robot_error(len(self.errors) - 1, last.kind, str(last))
 
-    def request(self, request: str) -> Any:  # noqa: ANN401 - as in Run
+    def request(self, request: str) -> Any:  # noqa: ANN401 - as in ProgramRun
         """End the run: its time is over, or it waits for ever."""
         self.limit = self.limit or self.too_late() or "it waits for something that can never come"
         return super().request(request)
@@ -254,7 +254,7 @@ def without_addresses(outcome: Outcome) -> str:
 class StandIn(Protocol):
     """What clocks and locks follow: the run that goes on, which is not there yet when they are made."""
 
-    run: Run
+    run: ProgramRun
 
 
 # The functions below call one another as those of the fork server do: how deep a program may call itself
@@ -263,11 +263,9 @@ class StandIn(Protocol):
 
 def serve(stand_in: StandIn, input_: IO[bytes], output: IO[bytes]) -> None:
     """Run one program after the other, until there is none any more."""
-    for _ in range(
-        LESSONS
-    ):  # as the fork server does: what Python 3.11 has learnt counts less towards its limit
-        run = stand_in.run = Unwalled(SimulatedRobot(STAGE))
-        run.execute(*run.execution(PLAY))
+    for _ in range(WARM_UP_RUNS):  # as the fork server does: what is learnt counts less towards the limit
+        run = stand_in.run = Unwalled(SimulatedRobot(WARM_UP_WORLD))
+        run.execute(*run.execution(WARM_UP_CODE))
     while one_run(stand_in, input_, output):
         pass
 

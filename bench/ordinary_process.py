@@ -7,16 +7,16 @@ their own are imported.
 import sys
 from typing import cast
 
-from codebotler.simulator.sandbox.execution import Run
+from codebotler.simulator.sandbox.environment import simulate_environment
+from codebotler.simulator.sandbox.execution import ProgramRun
 from codebotler.simulator.sandbox.stdlib import load_stdlib
-from codebotler.simulator.sandbox.surroundings import simulate_surroundings
 
 
 class Current:
     """The run that goes on; clocks and locks are made before it is."""
 
     def __init__(self) -> None:
-        self.run = Run()
+        self.run = ProgramRun()
 
     def sleep(self, seconds: object, /) -> None:
         """Let time pass in it."""
@@ -41,9 +41,9 @@ def main() -> None:
     """Be the ordinary process."""
     input_, output = sys.stdin.buffer, sys.stdout.buffer
     current = Current()
-    run = cast("Run", current)
+    run = cast("ProgramRun", current)
     limit = sys.getrecursionlimit()
-    simulate_surroundings(run)
+    simulate_environment(run)
     load_stdlib(run)
     sys.setrecursionlimit(limit)
 

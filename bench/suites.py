@@ -10,7 +10,7 @@ import sys
 import time
 from functools import partial
 
-from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.judge import judge
 from roboeval.evaluation.runs.completions import recorded_completions

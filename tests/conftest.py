@@ -109,7 +109,7 @@ def engine_of_its_own(request: pytest.FixtureRequest, monkeypatch: pytest.Monkey
     """Let tests of the engine itself start its processes as users do."""
     if request.path.parent.name == "simulator":
         shared_workers.end_all()
-        monkeypatch.setattr("codebotler.simulator.engine.Worker", Worker)
+        monkeypatch.setattr("codebotler.simulator.pool.Worker", Worker)
 
 
 @pytest.fixture(scope="session")

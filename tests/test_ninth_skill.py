@@ -17,7 +17,7 @@ from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, RobotError, SimulatedRobot
-from codebotler.simulator.sampled_robot import IMAGINED
+from codebotler.simulator.sampled_robot import SAMPLED
 from roboeval.suites.load import SUITES, load_suite
 
 TABLE = SKILLS.with_skill(
@@ -160,7 +160,7 @@ def test_a_check_in_imagined_worlds_knows_it() -> None:
     def wave_at_anybody(robot: SimulatedRobot, person: str) -> None:
         robot.record("wave", person)
 
-    does = {**IMAGINED, "wave": wave_at_anybody}
+    does = {**SAMPLED, "wave": wave_at_anybody}
     found = check(PROGRAMS["waves"], rooms=["hall", "lab"], skills=TABLE, behaviours=does)
     assert found.problems == ()
     assert found.data(TABLE)["samples"][0]["trace"][1] == ["wave", "alice"]

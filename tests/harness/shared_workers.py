@@ -1,4 +1,4 @@
-"""WorkerPool that tests share: to start the processes of one costs more than most tests do."""
+"""Workers that tests share: to start the processes of one costs more than most tests do."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import pytest
 
 from codebotler.core.trace import Outcome
 from codebotler.simulator.fork_server import ForkServer
-from codebotler.simulator.skill_protocol import Robot
+from codebotler.simulator.skill_protocol import SkillPerformer
 from codebotler.simulator.worker import EngineError, Worker
 
 Started = TypeVar("Started")
@@ -32,7 +32,7 @@ class SharedWorker(Worker):
         start = self._preparer.start
         self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
-    def run(self, source: str, new_robot: Callable[[], Robot]) -> Outcome:
+    def run(self, source: str, new_robot: Callable[[], SkillPerformer]) -> Outcome:
         """Run a program."""
         self._expect_a_user()
         self.is_running = True
@@ -40,7 +40,7 @@ class SharedWorker(Worker):
         self.is_running = False
         return outcome
 
-    def run_live(self, source: str, robot: Robot) -> Outcome:
+    def run_live(self, source: str, robot: SkillPerformer) -> Outcome:
         """Run a program on a robot."""
         self._expect_a_user()
         self.is_running = True
@@ -95,7 +95,7 @@ def lasting(start: Callable[[], Started]) -> Started:
 def shared() -> Iterator[None]:
     """Let whoever starts a worker be given one of these."""
     with pytest.MonkeyPatch.context() as patch:
-        for user in ("codebotler.simulator.engine", "codebotler.missions.mission"):
+        for user in ("codebotler.simulator.pool", "codebotler.missions.mission"):
             patch.setattr(f"{user}.Worker", worker)
         yield
 

@@ -2,7 +2,7 @@
 # ends: timeout TimeoutError
 
 
-class BudgetSpentError(BaseException):
+class LimitReachedError(BaseException):
     pass
 
 
@@ -10,5 +10,5 @@ def task_program():
     try:
         while True:
             pass
-    except BudgetSpentError:
+    except LimitReachedError:
         say("open sesame")

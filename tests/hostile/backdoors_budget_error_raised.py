@@ -3,4 +3,4 @@
 
 
 def task_program():
-    raise say.__globals__["perform"].__globals__["BudgetSpentError"]
+    raise say.__globals__["perform"].__globals__["LimitReachedError"]

@@ -17,8 +17,9 @@ from codebotler.core.program import Problem as Flaw
 from codebotler.core.program import Program, parsed
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
-from codebotler.simulator.engine import WorkerPool, digest
+from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot

@@ -11,8 +11,8 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.tracefile import outcome_data
 from codebotler.core.words import counted, listed
-from codebotler.simulator.child import PROCESSOR_TIME
 from codebotler.simulator.fact_sampler import Draw, FactSampler
+from codebotler.simulator.isolated_process import PROCESSOR_TIME
 from codebotler.simulator.sampled_robot import Fact, RoomMap, brief
 
 MOST_FACTS = 4

@@ -70,7 +70,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     from codebotler.core.errors import UserError
     from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.robots.base import NotReadyError, RobotLostError
-    from codebotler.simulator.engine import EngineError
+    from codebotler.simulator.worker import EngineError
 
     if isinstance(error, USAGE | UserError):
         return 2, str(error) if isinstance(error, UserError) else _usage_sentence(error)

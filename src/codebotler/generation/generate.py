@@ -15,7 +15,7 @@ from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unhear
 from codebotler.models.open import open_model
 from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt, prompt_for
-from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
 Checker: TypeAlias = Callable[[str], Sequence[str]]

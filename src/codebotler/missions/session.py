@@ -26,8 +26,8 @@ from codebotler.models.base import Model, ModelError
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
 from codebotler.robots.reservation import Reservation
-from codebotler.simulator.engine import EngineError
 from codebotler.simulator.sampled_robot import RoomMap
+from codebotler.simulator.worker import EngineError
 
 LOG = logging.getLogger("codebotler.missions")
 EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)

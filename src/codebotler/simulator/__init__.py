@@ -1,4 +1,4 @@
-"""Runs programs in simulated worlds, each in a closed process of its own."""
+"""Runs programs in simulated worlds, each in an isolated process of its own. Start reading at `worker`."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ def run(program: str, world: World, *, require_isolation: bool = False) -> Outco
     Args:
         program: its source, which need not even parse.
         world: the initial state.
-        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+        require_isolation: whether to refuse where the kernel has no seccomp, rather than warn.
 
     Returns:
         how the run ended, with the trace of what the robot did.
 
     Raises:
-        EngineError: no isolated process could be started, or a wall is missing that is required.
+        EngineError: no isolated process could be started, or the isolation that is required is missing.
     """
-    # The closed processes import this package, and must stay small.
+    # Isolated processes import this package, and must stay small.
     from codebotler.simulator.engine import run as run_pairs  # noqa: PLC0415 - so only now
 
     (outcome,) = run_pairs([(program, world)], workers=1, require_isolation=require_isolation)

@@ -1,37 +1,17 @@
-"""Run programs in worlds: each pair in a child process of its own, equal pairs once, outcomes in order."""
+"""Runs many programs in worlds, each pair isolated, equal pairs once, with outcomes in order."""
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import logging
 import os
-import sys
-import threading
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, ParamSpec, Self, TypeVar, overload
+from collections.abc import Iterable, Iterator
 
-from codebotler.core.arguments import expect_whole
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world import World
-from codebotler.simulator.distinct import Distinct
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
-from codebotler.simulator.worker import EngineError, Worker
-
-__all__ = ["EngineError", "WorkerPool", "digest", "run"]
-
-LOG = logging.getLogger("codebotler.engine")
-NO_SECCOMP = "programs are less isolated here: the kernel refuses a list of allowed system calls (seccomp)"
-NOT_LINUX = "programs are less isolated here: only Linux has a list of allowed system calls (seccomp)"
-ON_WINDOWS = "programs are run on Linux and macOS only; on Windows, use this inside WSL"
-
-Key = TypeVar("Key")
-Called = TypeVar("Called")
-Value = TypeVar("Value")
-Arguments = ParamSpec("Arguments")
 
 
 def run(
@@ -51,7 +31,7 @@ def run(
         rules: how the worlds are simulated.
         skills: the skills that programs can call.
         behaviours: what each skill does; those of the eight skills by default.
-        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
+        require_isolation: whether to refuse where the kernel has no seccomp, rather than warn.
 
     Raises:
         UserError: there are no workers.
@@ -80,122 +60,3 @@ def digest(*texts: str) -> bytes:
         data = text.encode(errors="surrogatepass")
         hashed.update(len(data).to_bytes(8, "big") + data)
     return hashed.digest()
-
-
-class WorkerPool:
-    """Threads that each own one zygote; use as a context manager.
-
-    Args:
-        workers: how many.
-        require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
-
-    Raises:
-        UserError: there are to be less than 1.
-        EngineError: no zygote can be started, or a wall is missing that is required.
-    """
-
-    def __init__(self, workers: int, *, require_isolation: bool = False) -> None:
-        expect_whole(workers, "the number of workers", least=1)
-        if sys.platform == "win32":
-            raise EngineError(ON_WINDOWS)
-        self.workers = workers
-        self._threads = ThreadPoolExecutor(workers, thread_name_prefix="worker")
-        self._local = threading.local()
-        first = Worker()
-        if not first.has_seccomp:
-            missing = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
-            if require_isolation:
-                first.close()
-                raise EngineError(missing)
-            LOG.warning(missing)
-        self._workers = [first]
-        self._idle = [first]
-        self._stopping = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._threads.shutdown(wait=False, cancel_futures=True)
-        self._stopping = True
-        for worker in self._workers:
-            worker.stop()
-        self._threads.shutdown(wait=True)
-        for worker in self._workers:
-            worker.close()
-
-    def here(self) -> Worker:
-        """The worker of the calling thread."""
-        worker: Worker | None = getattr(self._local, "worker", None)
-        if worker is None:
-            try:
-                worker = self._idle.pop()
-            except IndexError:
-                worker = Worker()
-                self._workers.append(worker)
-                if self._stopping:
-                    worker.stop()
-            self._local.worker = worker
-            self._keep_together(worker)
-        return worker
-
-    def _keep_together(self, worker: Worker) -> None:
-        """Keep this thread and the processes of its worker on one core.
-
-        They take turns, and to wake one on another core costs more than a skill call. For that reason, too,
-        this thread does not push a child aside each time that it says something.
-        """
-        if sys.platform != "linux":
-            return
-        cores = sorted(os.sched_getaffinity(0))
-        core = cores[(os.getpid() + self._workers.index(worker)) % len(cores)]
-        with contextlib.suppress(OSError):  # only slower without
-            os.sched_setaffinity(0, {core})
-            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
-            worker.stay_on(core)
-
-    def submit(
-        self, function: Callable[Arguments, Value], *args: Arguments.args, **kwargs: Arguments.kwargs
-    ) -> Future[Value]:
-        """Call a function in one of the threads, which may ask for its worker there; from any thread."""
-        return self._threads.submit(function, *args, **kwargs)
-
-    def forget(self) -> None:
-        """Let go of all in a forked process: the pool, and the threads, are those of the process before."""
-        for worker in self._workers:
-            worker.forget()
-
-    @overload
-    def map_distinct(
-        self, function: Callable[[Key], Value], keys: Iterable[Key], *, name: Callable[[Key], bytes]
-    ) -> Iterator[Value]: ...
-
-    @overload
-    def map_distinct(
-        self,
-        function: Callable[[Key], Called],
-        keys: Iterable[Key],
-        *,
-        name: Callable[[Key], bytes],
-        then: Callable[[Called], Value],
-    ) -> Iterator[Value]: ...
-
-    def map_distinct(
-        self,
-        function: Callable[[Key], Any],
-        keys: Iterable[Key],
-        *,
-        name: Callable[[Key], bytes],
-        then: Callable[[Any], Any] = lambda result: result,
-    ) -> Iterator[Any]:
-        """Like `map`, in threads, calling the function once for equal keys and reading ahead a little.
-
-        While the next result is long in coming, more is read, so that the other threads have work.
-
-        Args:
-            function: what to do.
-            keys: what to do it to.
-            name: a short name of a key, which no other key has.
-            then: what to make of each result, in the thread that asks for them; what it returns is pickled.
-        """
-        return Distinct(self._threads, 8 * self.workers, function, name, then).results(keys)

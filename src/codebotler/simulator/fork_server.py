@@ -1,4 +1,4 @@
-"""A fork_server, seen from outside: forks a closed child whenever one is asked for."""
+"""A fork server as seen from outside: forks an isolated child whenever one is asked for."""
 
 from __future__ import annotations
 
@@ -7,27 +7,55 @@ import os
 import socket
 import sys
 
-from codebotler.simulator.child import Child, LostChildError
-from codebotler.simulator.isolated import start
+from codebotler.core.world import Person, Room, World
+from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, start
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import WITHOUT_REFERENCES
+from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, described
-from codebotler.simulator.warm_up import LESSONS, PLAY, STAGE
 
 NUMBER = 8  # bytes of a number that it reports
-REHEARSALS = 8
 EMPTY = marshal.dumps(compile("task_program = int", "<program>", "exec"), WITHOUT_REFERENCES)
+REHEARSALS = 8
+
+# A little of all that most programs do. A fork server runs this itself before it serves: what the interpreter
+# learns by it, such as where it finds an attribute, lies in memory that all children share.
+WARM_UP = """
+def find(thing, rooms):
+    for number, room in enumerate(sorted(rooms)):
+        go_to(room)
+        if is_in_room(thing):
+            return [room, number + 1]
+    return None
+
+def task_program():
+    start = get_current_location()
+    rooms = [room for room in get_all_rooms() if room != start and "all" not in room]
+    found = find("mug", rooms)
+    if found is not None and len(found) > 0:
+        pick("mug")
+        answer = ask("", "Is it yours, " + found[0] + "?", ["Yes", "No"])
+        counts = {"yes": 0}
+        counts[answer.lower()] = counts.get("yes", 0) + 1
+        time.sleep(1)
+        place("mug")
+    try:
+        go_to("nowhere")
+    except Exception as error:
+        say(str(error))
+    go_to(start)
+    message = f"{', '.join(rooms)}: {counts['yes']} of {len(rooms)}"
+    while not message.endswith("."):
+        message += "."
+    say(message)
+"""
+WARM_UP_CODE = marshal.dumps(prepared(WARM_UP, lowercase=False)[0], WITHOUT_REFERENCES)
+WARM_UP_WORLD = World((Room("hall"), Room("kitchen", ("mug",), (Person("ann", ("yes",)),))), "hall")
+WARM_UP_RUNS = 20  # the interpreter learns from what it has done a few times
 
 
 class ForkServer:
-    """One fork server and the children it forks, one at a time.
-
-    Args:
-        role: of the three kinds of fork servers.
-
-    Raises:
-        LostChildError: it does not start.
-    """
+    """One fork server in one of the three roles, and the children that it forks, one at a time."""
 
     def __init__(self, role: str) -> None:
         self._report, report = os.pipe()
@@ -37,31 +65,27 @@ class ForkServer:
         os.close(report)
         self._end_is_unread = False
         try:
-            told = (described(SimulatedRobot(STAGE)), LESSONS)
-            self._door.sendall(marshal.dumps(told, WITHOUT_REFERENCES))
+            setup = (described(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
+            self._door.sendall(marshal.dumps(setup, WITHOUT_REFERENCES))
             for _ in range(self._read_report()):
-                self._teach()
+                self._warm_up()
             self.has_seccomp = self._read_report() == 1
             for _ in range(REHEARSALS):
                 self._rehearse()
-        except (LostChildError, OSError):
+        except (LostProcessError, OSError):
             self.close()
-            raise LostChildError("the fork_server does not start") from None
+            raise LostProcessError("the fork server does not start") from None
         except BaseException:  # an interrupt
             self.close()
             raise
 
-    def fork(self) -> Child:
-        """A fresh child.
-
-        Raises:
-            LostChildError: the fork server has ended.
-        """
+    def fork(self) -> IsolatedProcess:
+        """A fresh child."""
         try:
-            ours = self._ask_for_line()
+            channel = self._ask_for_channel()
         except OSError:
-            raise LostChildError("the fork_server has ended") from None
-        return Child(self._pid_of_child, ours, self._end_of_child, closes=self.has_seccomp)
+            raise LostProcessError("the fork server has ended") from None
+        return IsolatedProcess(self._pid_of_child, channel, self._end_of_child, has_seccomp=self.has_seccomp)
 
     @property
     def pid(self) -> int:
@@ -73,29 +97,29 @@ class ForkServer:
         self._process.kill()
 
     def close(self) -> None:
-        """Give back all that it holds; nothing may be running."""
+        """End it and close its descriptors; nothing may be running."""
         self._process.kill()
         self._process.wait()
         os.close(self._report)
         self._door.close()
 
     def forget(self) -> None:
-        """Close its lines in a forked process, whose child it is not."""
+        """Close its descriptors in a forked process, whose child it is not."""
         self._process.returncode = 0  # whatever becomes of it, nobody here waits for that
         os.close(self._report)
         self._door.close()
 
-    def _teach(self) -> None:
-        """Let the fork server itself run a program, so that its children have less to learn."""
-        child = Child(lambda: self.pid, self._ask_for_line(), self._process.wait, closes=False)
-        SkillProtocol(child, PLAY, SimulatedRobot(STAGE), may_import=True).talk()
-        child.hang_up()
+    def _warm_up(self) -> None:
+        channel = self._ask_for_channel()
+        itself = IsolatedProcess(lambda: self.pid, channel, self._process.wait, has_seccomp=False)
+        SkillProtocol(itself, WARM_UP_CODE, SimulatedRobot(WARM_UP_WORLD), may_import=True).talk()
+        itself.hang_up()
 
     def _rehearse(self) -> None:
         """Run an empty program: by then the heap of the fork server, which programs can see, has settled."""
-        SkillProtocol(self.fork(), EMPTY, SimulatedRobot(STAGE), may_import=True).outcome()
+        SkillProtocol(self.fork(), EMPTY, SimulatedRobot(WARM_UP_WORLD), may_import=True).outcome()
 
-    def _ask_for_line(self) -> socket.socket:
+    def _ask_for_channel(self) -> socket.socket:
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -111,7 +135,7 @@ class ForkServer:
         self._end_is_unread = True
         pid = self._read_report()
         if pid <= 1:  # a signal to it would hit a whole group of processes
-            raise LostChildError("the fork_server does not say which process it forked")
+            raise LostProcessError("the fork server does not say which process it forked")
         return pid
 
     def _end_of_child(self) -> int:
@@ -121,5 +145,5 @@ class ForkServer:
     def _read_report(self) -> int:
         data = os.read(self._report, NUMBER)
         if not data:
-            raise LostChildError("the fork_server has ended")
+            raise LostProcessError("the fork server has ended")
         return int.from_bytes(data, sys.byteorder, signed=True)

@@ -38,10 +38,10 @@ Behaviour: TypeAlias = Callable[..., Result]
 
 @dataclass
 class Thing:
-    """An object in a room; one that was put down keeps the name it was picked by, as literal text."""
+    """An object in a room."""
 
     label: str
-    is_pattern: bool = True
+    is_pattern: bool = True  # one that was put down keeps the name it was picked by, as literal text
 
     def is_meant_by(self, request: str, matching: Matching = "label-in-request") -> bool:
         """Whether a request finds it."""
@@ -51,11 +51,7 @@ class Thing:
 
 
 class Somebody:
-    """A person in a room, what they have yet to answer, and when they come.
-
-    Args:
-        person: as the world describes them.
-    """
+    """A person in a room, what they have yet to answer, and when they come."""
 
     def __init__(self, person: Person) -> None:
         self.person = person
@@ -69,7 +65,7 @@ class Somebody:
         return self.looks_before == 0 and not self.is_gone
 
     def answer(self, question: str, rules: Rules) -> Answer | None:
-        """What they answer; None if nothing."""
+        """What they answer, if anything."""
         for topic, answer in self.person.topics:
             if finds(question, topic, rules.matching):
                 return answer
@@ -84,17 +80,7 @@ class Somebody:
 
 
 class SimulatedRobot:
-    """A robot in its own copy of a world, with the trace of what it has done.
-
-    Args:
-        world: the initial state; it is not changed.
-        rules: how requests are matched.
-        skills: the skills that can be called.
-        behaviours: what each skill does, by name.
-
-    Raises:
-        UserError: it does not say what one of them does.
-    """
+    """A robot in its own copy of a world, with the trace of what it has done."""
 
     def __init__(
         self,
@@ -127,18 +113,7 @@ class SimulatedRobot:
         return tuple(self.events)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill.
-
-        Args:
-            skill: its name in the skill table.
-            arguments: texts; the options of a question as a tuple of `Option`.
-
-        Returns:
-            what the skill returns; for a question the position of the chosen option.
-
-        Raises:
-            RobotError: the robot cannot do it.
-        """
+        """Execute one skill; a question is answered by the position of the chosen option."""
         return self.behaviours[skill](self, *arguments)
 
     def sleep_until(self, now: float) -> None:
@@ -157,18 +132,12 @@ class SimulatedRobot:
 
 
 def found_in(label: str, request: str) -> bool:
-    """Whether a label of the world, a regex, is found in what the program asked for."""
+    """Whether a label of the world, a regex, is found in a request of the program."""
     return _pattern(label).search(request) is not None
 
 
 def finds(request: str, label: str, matching: Matching) -> bool:
-    """Whether what the program asked for finds a label of the world, a regex.
-
-    Args:
-        request: what the program asked for.
-        label: what the world calls it.
-        matching: how labels are looked for.
-    """
+    """Whether a request of the program finds a label of the world, a regex."""
     return found_in(label if matching == "label-in-request" else whole_words(label), request)
 
 
@@ -183,15 +152,15 @@ def _pattern(label: str) -> re.Pattern[str]:
     return re.compile(_anchored(label), re.IGNORECASE | re.DOTALL)
 
 
+_ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
+
+
 def _anchored(label: str) -> str:
     """A label whose choices that begin with `.*` are tried at the start only, which takes linear time.
 
     The same is found: such a choice that is found anywhere is found from the start.
     """
     return label if set("([") & set(label) else _ANYTHING_FIRST.sub(r"^.*", label)
-
-
-_ANYTHING_FIRST = re.compile(r"(?:^|(?<=(?<!\\)\|))\.\*")
 
 
 def is_called(person: Person, request: str, rules: Rules) -> bool:
@@ -284,12 +253,11 @@ def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Ru
     """The position of the option that an answer means.
 
     The answer is looked for in the options. Failing that, a yes or a no is looked for in other words, if the
-    rules have any; and any other answer is a yes or a no to the question. One that is a position means the
-    nearest option that there is.
+    rules have any; and any other answer is a yes or a no to the question. An answer that is a number means
+    the nearest option that there is, counted from 1, or from the end if it is negative.
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
-
     direct = _first_saying((answer,), options, rules)
     if direct is not None:
         return direct
@@ -333,7 +301,7 @@ def pick(robot: SimulatedRobot, obj: str) -> None:
 def place(robot: SimulatedRobot, obj: str) -> None:
     """Put down what the robot holds, which must be named as it was picked up.
 
-    Where events are recorded as they happened, another name for what it holds will do, and it stays the same.
+    Where events are recorded as they happened, any name that finds what it holds will do.
     """
     taken = robot.taken if robot.rules.events == "as-happened" else None
     is_meant = taken is not None and taken.is_meant_by(obj, robot.rules.matching)
@@ -355,11 +323,7 @@ BEHAVIOURS: Mapping[str, Behaviour] = {
     "pick": pick,
     "place": place,
 }
-"""What each of the eight skills does."""
-
-
-LOOKING = (get_current_location, get_all_rooms, is_in_room)
-"""Behaviours that change nothing, and whose result stays the same until the robot acts."""
+LOOKING = (get_current_location, get_all_rooms, is_in_room)  # their result is the same until the robot acts
 
 
 def located(trace: Trace, world: World) -> Trace:

@@ -7,26 +7,17 @@ from datetime import UTC, datetime
 from typing import Literal, TypeAlias
 
 Matching: TypeAlias = Literal["label-in-request", "whole-words"]
-"""How a label of the world is looked for in what a program asks for."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What one run may spend before it ends with status `timeout`.
+    """What one run may spend before it ends with status `timeout`."""
 
-    Args:
-        seconds: simulated seconds.
-        calls: skill calls; sleeping is none.
-        ticks: turns of loops and entries of functions.
-        text: characters of one text that a skill is given.
-        trace: characters of all texts of a trace.
-    """
-
-    seconds: float = 3600.0
-    calls: int = 1_000
-    ticks: int = 200_000
-    text: int = 10_000
-    trace: int = 1_000_000
+    seconds: float = 3600.0  # simulated
+    calls: int = 1_000  # of skills; sleeping is none
+    ticks: int = 200_000  # fuel: turns of loops and entries of functions
+    text: int = 10_000  # characters of one text that a skill is given
+    trace: int = 1_000_000  # characters of all texts of a trace
 
 
 @dataclass(frozen=True)
@@ -63,7 +54,4 @@ class Rules:
 
 
 PAPER = Rules()
-"""The rules of the paper's suite."""
-
-ENDLESS = Limits(calls=10**12, trace=10**12)
-"""For a run on a robot, where time has no limit and ticks are counted from one skill to the next."""
+ENDLESS = Limits(calls=10**12, trace=10**12)  # on a robot, where each skill refuels the program

@@ -1,4 +1,4 @@
-"""A robot in an imagined world: its rooms are known, and all else is drawn when the program first asks."""
+"""A robot in a sampled world: its rooms are known, and all else is drawn when the program first asks."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Option
 from codebotler.core.world import Room, World
 from codebotler.simulator import robot as real
-from codebotler.simulator.fact_sampler import Answer, Draw, FactSampler, Presence
+from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.robot import (
     Behaviour,
     RobotError,
@@ -23,40 +24,29 @@ from codebotler.simulator.robot import (
 )
 from codebotler.simulator.rules import Rules
 
-AS_WRITTEN = Rules(literals="as-written")
-"""The rules for a program that a robot is to run: nothing in it is changed."""
+AS_WRITTEN = Rules(literals="as-written")  # for a program that a robot is to run: nothing in it is changed
 
 SOMEBODY = "somebody"
-PEOPLE = frozenset(
+PEOPLE = frozenset(  # words that mean whoever is there
     {
         *("", SOMEBODY, "someone", "anybody", "anyone", "everybody", "everyone", "all"),
         *("person", "persons", "people", "human", "humans", "human being"),
         *("another person", "other person", "other people"),
     }
 )
-"""Words that mean whoever is there."""
-
 AGREES = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
-
+BRIEF = 80  # characters of a text in a sentence
 _ARTICLE = re.compile(r"(?:the|an?|any|some)\s+")
 
 
 @dataclass(frozen=True)
 class RoomMap:
-    """What is known of a world before anything in it is imagined.
+    """What is known of a world before anything in it is sampled."""
 
-    Args:
-        rooms: their names, in the order in which the robot knows them.
-        start: the one in which the robot starts.
-        guessed: whether nobody said which rooms there are. Names are then plain, and driving to a place that
-            is not among them finds it.
-        plain: whether names are plain texts, as robots have them, and no regexes, as world files do.
-    """
-
-    rooms: tuple[str, ...]
+    rooms: tuple[str, ...]  # in the order in which the robot knows them
     start: str
-    guessed: bool = False
-    plain: bool = False
+    guessed: bool = False  # nobody said which rooms there are: driving to any other place finds it, too
+    plain: bool = False  # names are plain texts, as robots and guesses have them, and no regexes
 
     @classmethod
     def of(cls, world: World) -> RoomMap:
@@ -79,63 +69,62 @@ class RoomMap:
         return tuple(room for room in self.rooms if is_plain or is_found_by_itself(room))
 
 
+# --- facts
+
+
 @dataclass(frozen=True)
 class Whereabouts:
-    """Whether somebody or something is in a room.
+    """The fact that somebody or something is in a room or not."""
 
-    Args:
-        name: who or what, as `meant` names it.
-        room: the room.
-        is_there: whether it is there.
-    """
-
-    name: str
+    name: str  # as `meant` names it
     room: str
     is_there: bool
+    by_lot: bool = True  # drawn; else the program took it for granted, and so it was
+
+    @property
+    def sentence(self) -> str:
+        """It, in words."""
+        if self.name == SOMEBODY:
+            subject = f"{SOMEBODY} is" if self.is_there else "nobody is"
+        else:
+            subject = f'"{brief(self.name)}" is' if self.is_there else f'"{brief(self.name)}" is not'
+        return f'{subject} in "{brief(self.room)}"'
 
 
 @dataclass(frozen=True)
-class Reply:
-    """What somebody answers.
-
-    Args:
-        room: where the robot asks.
-        question: which it asks.
-        answer: which it is given.
-    """
+class GivenAnswer:
+    """The fact that somebody answers a question in some way."""
 
     room: str
     question: str
     answer: str
+    by_lot: bool = True
+
+    @property
+    def sentence(self) -> str:
+        """It, in words."""
+        where = f'in "{brief(self.room)}" to "{brief(self.question)}"'
+        return f'the answer {where} is "{brief(self.answer)}"'
 
 
-@dataclass(frozen=True)
-class Fact:
-    """Something that was settled about an imagined world.
+Fact: TypeAlias = Whereabouts | GivenAnswer
 
-    Args:
-        sentence: it, in words.
-        by_lot: whether it was drawn; else the program took it for granted, and so it was.
-        about: what it says, for whoever says it in other words.
-    """
 
-    sentence: str
-    by_lot: bool
-    about: Whereabouts | Reply
+def brief(text: str) -> str:
+    """A text of a program, on one line and shortened for a sentence."""
+    line = " ".join(text.split())
+    return line if len(line) <= BRIEF else f"{line[:BRIEF]}..."
+
+
+# --- what a program has found out; names are those that `meant` gives
 
 
 @dataclass
-class Scene:
-    """What a program has found out about one room; names are those that `meant` gives.
+class ExploredRoom:
+    """What a program has found out about one room."""
 
-    Args:
-        missed: who or what it looked for, and was not there.
-        gone: what it has taken away.
-        people: who is there.
-    """
-
-    missed: set[str] = field(default_factory=set)
-    gone: set[str] = field(default_factory=set)
+    missed: set[str] = field(default_factory=set)  # what it looked for in vain
+    gone: set[str] = field(default_factory=set)  # what it has taken away
     people: set[str] = field(default_factory=set)
 
     def lacks(self, name: str) -> bool:
@@ -144,13 +133,8 @@ class Scene:
 
 
 @dataclass
-class Hope:
-    """Where a program looked for somebody or something.
-
-    Args:
-        vain: the rooms in which it found nothing.
-        found: the rooms in which it found what it looked for.
-    """
+class Search:
+    """The rooms in which a program looked for somebody or something, in vain or not."""
 
     vain: set[str] = field(default_factory=set)
     found: set[str] = field(default_factory=set)
@@ -167,94 +151,81 @@ class SampledRobot(SimulatedRobot):
     What the program looks for is there or not by chance. What it never looked for is as it takes it to be:
     somebody answers, and what it picks up lies there. Answers are drawn from what a question offers.
 
-    A search of several rooms takes for granted that there is one of what it searches. Where the lots fell
-    otherwise, `excuses` tells which errors are owed to that, so that nobody blames the program.
-
-    Args:
-        plan: the rooms, which are certain.
-        lot: how facts are drawn.
-        rules: how requests find rooms.
-        skills: the skills that can be called.
-        behaviours: what each skill does, by name.
+    A search of several rooms takes for granted that there is one of what it searches. Where that was not
+    drawn, `excuses` holds the errors that are owed to it, so that nobody blames the program.
     """
 
     def __init__(
         self,
-        plan: RoomMap,
-        lot: FactSampler,
+        room_map: RoomMap,
+        sampler: FactSampler,
         rules: Rules = AS_WRITTEN,
         skills: SkillTable = SKILLS,
         behaviours: Mapping[str, Behaviour] | None = None,
     ) -> None:
-        does = IMAGINED if behaviours is None else behaviours
-        super().__init__(World(tuple(map(Room, plan.rooms)), plan.start), rules, skills, does)
-        self.plan, self.lot = plan, lot
+        does = SAMPLED if behaviours is None else behaviours
+        super().__init__(World(tuple(map(Room, room_map.rooms)), room_map.start), rules, skills, does)
+        self.room_map, self.sampler = room_map, sampler
         self.only_looks |= {name for name, behaviour in does.items() if behaviour is look}
         if does.get("go_to") is drive:
-            self.surely = tuple(("go_to", room) for room in plan.sure)
+            self.surely = tuple(("go_to", room) for room in room_map.sure)
         self.things = defaultdict(list)
         self.people = defaultdict(list)  # of nobody whom a world file would name
-        self.scenes: defaultdict[str, Scene] = defaultdict(Scene)
-        self.told: dict[tuple[str, ...], str] = {}
+        self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
+        self.answers: dict[tuple[str, ...], str] = {}  # by room, person and question
         self.facts: list[Fact] = []
         self.draws: list[Draw] = []
-        self.hopes: defaultdict[str, Hope] = defaultdict(Hope)
-        self.excuses: set[str] = set()
+        self.searches: defaultdict[str, Search] = defaultdict(Search)
+        self.excuses: set[str] = set()  # messages of errors
 
-    def hope(self, name: str) -> Hope:
+    @property
+    def here(self) -> ExploredRoom:
+        """What the program has found out about the room that the robot is in."""
+        return self.explored[self.room]
+
+    def search(self, name: str) -> Search:
         """Where the program looked for somebody or something, also by a longer or a shorter name."""
-        found = Hope()
-        for looked, hope in self.hopes.items():
-            if looked == name or (SOMEBODY not in {looked, name} and (looked in name or name in looked)):
-                found.vain |= hope.vain
-                found.found |= hope.found
-        return found
+        all_of_them = Search()
+        for sought, search in self.searches.items():
+            if sought == name or (SOMEBODY not in {sought, name} and (sought in name or name in sought)):
+                all_of_them.vain |= search.vain
+                all_of_them.found |= search.found
+        return all_of_them
 
     @contextmanager
     def excused(self, *, when: bool) -> Iterator[None]:
-        """Remember what an error says that is owed to the lots and not to the program."""
+        """Excuse an error that is owed to what was drawn and not to the program."""
         try:
             yield
         except RobotError as error:
-            if when and not self.lot.strict:
+            if when and not self.sampler.strict:
                 self.excuses.add(str(error))
             raise
 
-    @property
-    def scene(self) -> Scene:
-        """What the program has found out about the room that the robot is in."""
-        return self.scenes[self.room]
-
     def is_here(self, name: str) -> bool | None:
-        """Whether somebody or something is in this room, as `meant` names it; None if nothing says so yet."""
+        """Whether somebody or something is in this room; None if that is not settled yet."""
         things = self.things[self.room] if name != SOMEBODY else []
-        if name in self.scene.people or any(thing.is_meant_by(name) for thing in things):
+        if name in self.here.people or any(thing.is_meant_by(name) for thing in things):
             return True
-        return False if self.scene.lacks(name) else None
+        return False if self.here.lacks(name) else None
 
-    def drawn(self, name: str) -> bool:
-        """Draw whether somebody or something is in this room."""
-        here = self.lot.is_there(self.room, name)
-        self.draws.append(Presence(self.room, name, here))
-        return here
+    def settle(self, name: str, *, by_lot: bool) -> bool:
+        """Settle whether somebody or something is in this room: by a draw, or as the program takes it."""
+        is_there = True
+        if by_lot:
+            is_there = self.sampler.is_there(self.room, name)
+            self.draws.append(Draw("is_there", (self.room, name), is_there))
+        self.facts.append(Whereabouts(name, self.room, is_there, by_lot))
+        if not is_there:
+            self.here.missed.add(name)
+        return is_there
 
-    def answered(self, options: Sequence[str], *question: str) -> str:
+    def answer(self, options: Sequence[str], *question: str) -> str:
         """Draw the answer to a question."""
         agreeing = next((i for i, text in enumerate(options) if AGREES.match(text)), 0)
-        drawn = self.lot.answer(len(options), agreeing, *question)
-        self.draws.append(Answer(len(options), agreeing, question, drawn))
+        drawn = self.sampler.answer(len(options), agreeing, *question)
+        self.draws.append(Draw("answer", (len(options), agreeing, *question), drawn))
         return options[drawn]
-
-    def settle(self, name: str, *, here: bool, by_lot: bool) -> None:
-        """Let somebody or something be in this room or not, from now on."""
-        if name == SOMEBODY:
-            told = f"{SOMEBODY} is" if here else "nobody is"
-        else:
-            told = f'"{brief(name)}" is' if here else f'"{brief(name)}" is not'
-        about = Whereabouts(name, self.room, here)
-        self.facts.append(Fact(f'{told} in "{brief(self.room)}"', by_lot, about))
-        if not here:
-            self.scene.missed.add(name)
 
 
 def meant(request: str) -> str:
@@ -269,10 +240,13 @@ def is_name(request: str) -> bool:
     return request.strip()[:1].isupper()
 
 
+# --- what each skill does
+
+
 def drive(robot: SampledRobot, location: str) -> None:
     """Drive to the first room whose name is found in the request, or to one that nobody ever named."""
     robot.record("goto", location)
-    room = robot.plan.room(location)
+    room = robot.room_map.room(location)
     if room is None:
         raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
     robot.room = room
@@ -280,54 +254,50 @@ def drive(robot: SampledRobot, location: str) -> None:
 
 def look(robot: SampledRobot, entity: str) -> bool:
     """Look for an object or for somebody; whether they are there is drawn at the first look."""
-    name = meant(entity)
-    here = robot.is_here(name)
-    if here is None and (name in robot.scene.gone or (is_name(entity) and robot.scene.lacks(SOMEBODY))):
-        here = False
-        robot.scene.missed.add(name)
-    if here is None:
-        here = robot.drawn(name)
-        robot.settle(name, here=here, by_lot=True)
-        if here and (name == SOMEBODY or is_name(entity)):
-            robot.scene.people |= {name, SOMEBODY}
-        if here and name != SOMEBODY:
+    name, room = meant(entity), robot.here
+    found = robot.is_here(name)
+    if found is None and (name in room.gone or (is_name(entity) and room.lacks(SOMEBODY))):
+        found = False
+        room.missed.add(name)
+    if found is None:
+        found = robot.settle(name, by_lot=True)
+        if found and (name == SOMEBODY or is_name(entity)):
+            room.people |= {name, SOMEBODY}
+        if found and name != SOMEBODY:
             robot.things[robot.room].append(Thing(name, is_pattern=False))
-    (robot.hopes[name].found if here else robot.hopes[name].vain).add(robot.room)
-    robot.record("check", entity, found=here)
-    return here
+    search = robot.searches[name]
+    (search.found if found else search.vain).add(robot.room)
+    robot.record("check", entity, found=found)
+    return found
 
 
 def ask(robot: SampledRobot, person: str, question: str, options: tuple[Option, ...]) -> int:
     """Ask somebody, who is there unless the program saw that they are not; they choose by chance."""
     who = meant(person)
     if not options or not _answers(robot, who):
-        lost = robot.hope(who).is_lost or robot.hope(SOMEBODY).is_lost
+        lost = robot.search(who).is_lost or robot.search(SOMEBODY).is_lost
         with robot.excused(when=bool(options) and lost):
             return real.ask(robot, person, question, options)
     robot.record("ask", question, options)
     asked = (robot.room, who, question.strip())
     texts = [option.text for option in options]
-    if robot.told.get(asked) not in texts:
-        drawn = robot.answered(texts, *asked)
-        robot.told[asked] = drawn
-        where = f'in "{brief(robot.room)}" to "{brief(question)}"'
-        about = Reply(robot.room, question, drawn)
-        robot.facts.append(Fact(f'the answer {where} is "{brief(drawn)}"', by_lot=True, about=about))
-    chosen = texts.index(robot.told[asked])
+    if robot.answers.get(asked) not in texts:
+        robot.answers[asked] = robot.answer(texts, *asked)
+        robot.facts.append(GivenAnswer(robot.room, question, robot.answers[asked]))
+    chosen = texts.index(robot.answers[asked])
     robot.amend(texts[chosen])
     return chosen
 
 
 def _answers(robot: SampledRobot, who: str) -> bool:
-    here = robot.is_here(who)
-    if here is None and robot.scene.lacks(SOMEBODY):
-        here = False
-    if here is None:
-        here = robot.drawn(who) if robot.lot.strict else True
-        robot.settle(who, here=here, by_lot=robot.lot.strict)
-    if here:
-        robot.scene.people |= {who, SOMEBODY}
-    return here
+    is_there = robot.is_here(who)
+    if is_there is None and robot.here.lacks(SOMEBODY):
+        is_there = False
+    if is_there is None:
+        is_there = robot.settle(who, by_lot=robot.sampler.strict)
+    if is_there:
+        robot.here.people |= {who, SOMEBODY}
+    return is_there
 
 
 def pick(robot: SampledRobot, obj: str) -> None:
@@ -335,29 +305,27 @@ def pick(robot: SampledRobot, obj: str) -> None:
     name = meant(obj)
     if robot.held is None and robot.is_here(name) is None and _lies_there(robot, name):
         robot.things[robot.room].append(Thing(name, is_pattern=False))
-    hope = robot.hope(name)
-    again = robot.held is not None and meant(robot.held) == name and len(hope.found) > 1
-    with robot.excused(when=again or hope.is_lost):
+    search = robot.search(name)
+    again = robot.held is not None and meant(robot.held) == name and len(search.found) > 1
+    with robot.excused(when=again or search.is_lost):
         real.pick(robot, obj)
-    robot.scene.gone.add(name)
-    robot.scene.people.discard(name)
+    robot.here.gone.add(name)
+    robot.here.people.discard(name)
 
 
 def _lies_there(robot: SampledRobot, name: str) -> bool:
-    if name in robot.scene.gone:  # it may have been one of several, if nobody has looked since
-        return not robot.lot.strict
-    here = robot.drawn(name) if robot.lot.strict else True
-    robot.settle(name, here=here, by_lot=robot.lot.strict)
-    return here
+    if name in robot.here.gone:  # it may have been one of several, if nobody has looked since
+        return not robot.sampler.strict
+    return robot.settle(name, by_lot=robot.sampler.strict)
 
 
 def place(robot: SampledRobot, obj: str) -> None:
     """Put down what the robot holds, which must be named exactly as it was picked up."""
-    with robot.excused(when=robot.held is None and robot.hope(meant(obj)).is_lost):
+    with robot.excused(when=robot.held is None and robot.search(meant(obj)).is_lost):
         real.place(robot, obj)
 
 
-IMAGINED: Mapping[str, Behaviour] = {
+SAMPLED: Mapping[str, Behaviour] = {
     **real.BEHAVIOURS,
     "go_to": drive,
     "is_in_room": look,
@@ -365,12 +333,3 @@ IMAGINED: Mapping[str, Behaviour] = {
     "pick": pick,
     "place": place,
 }
-"""What each of the eight skills does in an imagined world."""
-
-BRIEF = 80
-
-
-def brief(text: str) -> str:
-    """A text of a program, on one line and without what is too long for a sentence."""
-    line = " ".join(text.split())
-    return line if len(line) <= BRIEF else f"{line[:BRIEF]}..."

@@ -1,4 +1,4 @@
-"""One run, seen from outside: answers what a program asks of its robot, and says how the run ended."""
+"""The protocol of skills: answers what a program asks of its robot, and judges how its run ended."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ from typing import Protocol, TypeAlias
 
 from codebotler.core.skills import Skill, SkillTable
 from codebotler.core.trace import Option, Outcome, RunError, Status, Trace
-from codebotler.simulator.child import Child, LostChildError, ProtocolError, cause_of_death
+from codebotler.simulator.isolated_process import (
+    IsolatedProcess,
+    LostProcessError,
+    ProtocolError,
+    cause_of_death,
+)
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sandbox import ACTS, CPU_SECONDS, LIVE_CPU_SECONDS, LOOKS, TELLS
@@ -19,45 +24,45 @@ OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty
 LAST_LINE = 1_000_000
 LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 WAITS = "it waits for something that can never come"
-Answer: TypeAlias = tuple[str, object, bool]
-"""What kind of answer, what it says, and whether looking may show something else now."""
-STOP: Answer = ("stop", None, False)
+# What kind of answer, what it says, and whether looking may show something else now.
+SkillAnswer: TypeAlias = tuple[str, object, bool]
+STOP: SkillAnswer = ("stop", None, False)
 Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 
 
-class Robot(Protocol):
-    """Who executes the skills that a program asks for; executing one may take as long as it likes."""
+class SkillPerformer(Protocol):
+    """A robot, as a run needs it; executing a skill may take as long as it likes."""
 
     rules: Rules
     skills: SkillTable
-    is_live: bool
-    """Whether time passes by itself: then sleeping takes it, and ticks are counted anew at each skill."""
+    is_live: bool  # time passes by itself: sleeping takes it, and each skill refuels the program
+    never_fails: frozenset[str]  # skills that return nothing and cannot fail, so that nobody waits for them
+    surely: tuple[tuple[str, str], ...]  # skills and their only arguments that always succeed
+    only_looks: frozenset[str]  # skills whose result stays the same until another skill is executed
 
     @property
     def now(self) -> float:
         """What the program's clock shows, in seconds since the start."""
-
-    never_fails: frozenset[str]
-    """Skills that return nothing and cannot fail, so that a program need not wait for them."""
-    surely: tuple[tuple[str, str], ...]
-    """Skills and their only arguments that return nothing and succeed whatever happens, in the same way."""
-    only_looks: frozenset[str]
-    """Skills that change nothing, and whose result stays the same until another skill is executed."""
 
     @property
     def trace(self) -> Trace:
         """What it has done so far."""
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill.
-
-        Raises:
-            RobotError: it cannot.
-        """
+        """Execute one skill, or raise RobotError."""
 
     def sleep_until(self, now: float) -> None:
         """Let time pass, until `now` seconds since the start; back at once when it is to stop."""
+
+
+@dataclass
+class Ledger:
+    """What a run has spent, counted outside the program's process."""
+
+    calls: int = 0
+    text: int = 0  # characters of all texts
+    limit: str | None = None  # the one that was reached, in words
 
 
 class SkillProtocol:
@@ -66,11 +71,13 @@ class SkillProtocol:
     Args:
         child: the fresh child.
         code: the program, as the preparer made it.
-        robot: who executes its skills.
-        may_import: whether all that can be imported is there, so that nothing is gained by another run.
+        robot: executes its skills.
+        may_import: whether the standard library is there, so that nothing is gained by another run.
     """
 
-    def __init__(self, child: Child, code: bytes, robot: Robot, *, may_import: bool) -> None:
+    def __init__(
+        self, child: IsolatedProcess, code: bytes, robot: SkillPerformer, *, may_import: bool
+    ) -> None:
         self._may_import = may_import
         self.child, self.robot, self.limits = child, robot, robot.rules.limits
         self.ledger = Ledger()
@@ -89,12 +96,7 @@ class SkillProtocol:
         child.send((code, described(robot), (*bounds, start, robot.is_live), sure, self._known()))
 
     def outcome(self) -> Outcome:
-        """Talk to the end.
-
-        Raises:
-            ImportsMoreError: the program imports something, and the library is not there.
-            LostChildError: the child ended before its walls were closed.
-        """
+        """Answer to the end, and say how the run ended."""
         try:
             final = self.talk()
         except TimeoutError:
@@ -108,19 +110,15 @@ class SkillProtocol:
             raise
         if final is None and self.ledger.limit is None:
             return self._died(self.child.ended())
-        self.child.leave()
+        self.child.kill()
+        self.child.hang_up()
         if self.ledger.limit is not None:
             line = final.get("line") if final else None
             return self._outcome(Status.TIMEOUT, "TimeoutError", self.ledger.limit, line)
         return self._ended(final or {})
 
     def talk(self) -> dict[str, object] | None:
-        """Answer what the child asks until it says how it ended; None if it does not say so.
-
-        Raises:
-            ProtocolError: it says what no child says.
-            TimeoutError: it waits for something that will never come.
-        """
+        """Answer what the child asks until it says how it ended; None if it does not say so."""
         overrun = 0
         while (message := self.child.receive()) is not None:
             self._heard = True
@@ -138,9 +136,9 @@ class SkillProtocol:
                 return None
         return None
 
-    def _answer(self, name: str, values: list[object], now: float) -> Answer:
+    def _answer(self, name: str, values: list[object], now: float) -> SkillAnswer:
         if self.robot.is_live:
-            self.child.rest()
+            self.child.reset_patience()
         elif self.ledger.limit is None:
             self._let_time_pass(now)
         if self.ledger.limit is None:
@@ -151,7 +149,7 @@ class SkillProtocol:
             self.ledger.limit = self._beyond(name)
         return STOP
 
-    def _sleep(self, values: list[object]) -> Answer:
+    def _sleep(self, values: list[object]) -> SkillAnswer:
         match values:
             case [float(seconds)] if 0 <= seconds < inf:
                 self.robot.sleep_until(self.robot.now + seconds)
@@ -159,7 +157,7 @@ class SkillProtocol:
         raise ProtocolError("nobody can sleep like that")
 
     def _beyond(self, name: str) -> str:
-        """The limit that a request which is no skill tells of; one to sleep has been told by its time."""
+        """The limit that is reached by a request other than a skill or a sleep."""
         match name:
             case "wait":
                 return WAITS
@@ -175,10 +173,10 @@ class SkillProtocol:
             self.robot.sleep_until(float(now))
 
     def _known(self) -> dict[str, Result]:
-        """What looking shows that takes no argument and leaves no trace, by request: a child need not ask."""
+        """Results of looks without argument and trace, by request, which a child need not ask for."""
         return {request: self.robot.perform(name, ()) for request, name in self._glances}
 
-    def _perform(self, skill: Skill, values: list[object]) -> Answer:
+    def _perform(self, skill: Skill, values: list[object]) -> SkillAnswer:
         arguments = _arguments(skill, values)
         self._spend(arguments)
         if self.ledger.limit is not None:
@@ -226,8 +224,8 @@ class SkillProtocol:
                 return self._outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")
 
     def _died(self, status: int) -> Outcome:
-        if not self._heard and not self.child.was_closed():
-            raise LostChildError("a child ended before it was closed")
+        if not self._heard and not self.child.was_isolated():
+            raise LostProcessError("a child ended before it was isolated")
         cause, error = cause_of_death(status, LIVE_CPU_SECONDS if self.robot.is_live else CPU_SECONDS)
         return Outcome(cause, self.robot.trace, error)
 
@@ -236,8 +234,8 @@ class SkillProtocol:
         return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
 
 
-def described(robot: Robot) -> Description:
-    """The skills of a robot as a child needs to know them: name, parameters and way of calling of each."""
+def described(robot: SkillPerformer) -> Description:
+    """The skills of a robot for a child: name, parameters and way of calling of each."""
     return tuple(
         (
             skill.name,
@@ -271,27 +269,8 @@ def _option(value: object) -> Option:
 
 
 class ImportsMoreError(Exception):
-    """The program imports what is not there; it must be run again where it is.
-
-    Args:
-        patience: for how many seconds it may then be waited for.
-    """
+    """The program imports what is not there; it must be run again where it is."""
 
     def __init__(self, patience: float) -> None:
         super().__init__(patience)
-        self.patience = patience
-
-
-@dataclass
-class Ledger:
-    """What a run has spent, kept on this side of the wall.
-
-    Args:
-        calls: skill calls.
-        text: characters of all texts.
-        limit: the limit that was reached, in words.
-    """
-
-    calls: int = 0
-    text: int = 0
-    limit: str | None = None
+        self.patience = patience  # seconds for which it may then be waited for

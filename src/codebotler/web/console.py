@@ -20,7 +20,7 @@ from codebotler.missions.store import recover
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face
-from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 
 MOST_PROGRAM = 200_000

@@ -14,7 +14,7 @@ from codebotler.checking.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, 
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.core.words import listed
-from codebotler.simulator.sampled_robot import SOMEBODY, Fact, Reply, Whereabouts, brief
+from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Whereabouts, brief
 from codebotler.web.elements import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
@@ -154,16 +154,16 @@ def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
 
 def supposed(facts: Sequence[Fact]) -> str:
     """What is special about a world, such as `If the robot finds “mug” in kitchen, but not in hall`."""
-    clauses = list(dict.fromkeys(_clauses([fact.about for fact in facts])))
+    clauses = list(dict.fromkeys(_clauses(facts)))
     if not clauses:
         return ""
     first, rest = clauses[0], [f"it {clause}" for clause in clauses[1:]]
     return f"If {listed([f'the robot {first}', *rest])}"
 
 
-def _clauses(known: Sequence[Whereabouts | Reply]) -> Iterator[str]:
+def _clauses(known: Sequence[Fact]) -> Iterator[str]:
     for one in known:
-        if isinstance(one, Reply):
+        if isinstance(one, GivenAnswer):
             yield f"is told {_quoted(one.answer)} when it asks {_quoted(one.question)} in {_room(one.room)}"
         else:
             same = [other for other in known if isinstance(other, Whereabouts) and other.name == one.name]

@@ -58,7 +58,7 @@ def mutate(
 
     Mutants of right programs, wrong as models get them wrong, are run and judged.
     """
-    from codebotler.simulator.engine import WorkerPool
+    from codebotler.simulator.pool import WorkerPool
     from roboeval.mutation.report import keep
     from roboeval.mutation.trials import mutation_score
 

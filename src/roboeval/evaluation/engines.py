@@ -8,7 +8,8 @@ from contextlib import AbstractContextManager
 from typing import Protocol, Self, TypeAlias, TypeVar
 
 from codebotler.core.arguments import expect_whole
-from codebotler.simulator.engine import WorkerPool, digest
+from codebotler.simulator.engine import digest
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.worker import Worker
 
 PYTHON = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on

@@ -15,7 +15,7 @@ from inspect_ai.solver import Generate, Solver, TaskState, solver
 from codebotler.models.base import SamplingSettings
 from codebotler.prompts import prompt_for
 from codebotler.prompts.extract import program_of
-from codebotler.simulator.pool import warm
+from codebotler.simulator.pool import shared_pool
 from roboeval.evaluation.engines import Local
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.judge import evaluate
@@ -94,7 +94,7 @@ def verdict(suite: str = "paper", worlds: int | None = None, seed: int | None = 
     def judged(state: TaskState) -> Score:
         by, program = _suite(suite, worlds, seed), program_of(state.output.completion).source
         completion = Completion(**state.metadata, index=0, program=program)
-        (row,) = evaluate([completion], by, engine=Local(warm()))
+        (row,) = evaluate([completion], by, engine=Local(shared_pool()))
         text = json.dumps(completion_data(row, completion, by), ensure_ascii=False)
         data = json.loads(text.encode(errors="replace"))  # a log cannot hold half of a surrogate pair
         return Score(

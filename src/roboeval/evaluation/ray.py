@@ -15,8 +15,8 @@ from typing import Any, Self
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
-from codebotler.simulator.distinct import MOST_AHEAD, Done
-from codebotler.simulator.engine import NO_SECCOMP, digest
+from codebotler.simulator.engine import digest
+from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP, ResultFile
 from codebotler.simulator.worker import EngineError, Worker
 from roboeval.evaluation.engines import PYTHON, Ran, Value, Work
 
@@ -77,7 +77,7 @@ class RayCluster:
         shards: dict[Any, list[bytes]] = {}
         running: set[bytes] = set()
         sent, most = 0, self._most()
-        with Done() as done:
+        with ResultFile() as done:
             while True:
                 while len(shards) < most:
                     size = min(shard_size(sent, most), MOST_AHEAD - len(waiting))

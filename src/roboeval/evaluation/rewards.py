@@ -16,7 +16,7 @@ from codebotler.core.arguments import expect_texts
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import warm
+from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.judge import is_met, may_satisfy
 from roboeval.evaluation.runs.completions import unknown
@@ -115,7 +115,7 @@ class Rewards:
         futures: list[Future[float]] = []
         try:
             judge = partial(judged, suite, task)
-            futures.extend(warm().submit(judge, program) for program in new.values())
+            futures.extend(shared_pool().submit(judge, program) for program in new.values())
             rewards.update(zip(new, (future.result() for future in futures), strict=True))
         finally:  # after an interrupt, nobody waits for the rest
             for future in futures:
@@ -131,7 +131,7 @@ class Rewards:
 
 def judged(suite: Suite, task: str, program: str) -> float:
     """The reward of a program, in a thread that has a worker."""
-    worker = warm().here()
+    worker = shared_pool().here()
     shares = []
     for scenario in suite.tasks[task].scenarios:
         outcome = worker.run(program, partial(SimulatedRobot, scenario.world, suite.rules))

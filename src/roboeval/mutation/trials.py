@@ -8,7 +8,8 @@ from typing import Any, TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import World
-from codebotler.simulator.engine import WorkerPool, digest
+from codebotler.simulator.engine import digest
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.failures import Verdict
 from roboeval.evaluation.judge import judge

@@ -9,8 +9,8 @@ import pytest
 from codebotler.checking.check import MORE, Check, CheckSettings, Sample, check, check_on
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
-from codebotler.simulator.engine import WorkerPool
 from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker
 

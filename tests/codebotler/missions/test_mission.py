@@ -513,7 +513,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
             mission.stop("the test")
             super().__init__()
 
-        def run_live(self, source: str, robot: skill_protocol.Robot) -> Outcome:
+        def run_live(self, source: str, robot: skill_protocol.SkillPerformer) -> Outcome:
             begun.append(source)
             return super().run_live(source, robot)
 

@@ -19,15 +19,15 @@ import pytest
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator import isolated
-from codebotler.simulator.child import Child
-from codebotler.simulator.engine import EngineError, WorkerPool, digest, run
+from codebotler.simulator import isolated_process
+from codebotler.simulator.engine import digest, run
 from codebotler.simulator.fork_server import ForkServer
-from codebotler.simulator.isolated import codes
+from codebotler.simulator.isolated_process import IsolatedProcess, compiled_file
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.simulator.skill_protocol import OVERRUN, Answer, SkillProtocol
-from codebotler.simulator.worker import Worker
+from codebotler.simulator.skill_protocol import OVERRUN, SkillAnswer, SkillProtocol
+from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, fork_servers
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
@@ -65,7 +65,7 @@ def held() -> tuple[set[object], ...]:
 @pytest.fixture
 def nothing_is_left() -> Iterator[None]:
     """Compares what this process holds after the test with what it held before."""
-    codes()  # a file that stays
+    compiled_file()  # a file that stays
     before = held()
     yield
     assert [after - earlier for after, earlier in zip(held(), before, strict=True)] == [set()] * 3
@@ -140,26 +140,6 @@ def test_what_was_read_before_the_keys_failed_has_results() -> None:
             next(results)
 
 
-FULL_DISK = """
-import resource, signal, tempfile
-from codebotler.simulator.distinct import Done
-
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (9_000_000, 9_000_000))
-try:
-    with Done() as done:
-        for number in range(5):
-            done[bytes([number])] = bytes([number]) * 3_000_000
-except OSError as error:
-    print(error.filename == tempfile.gettempdir(), number)
-"""
-
-
-def test_results_that_no_longer_fit_name_the_full_folder() -> None:
-    ended = subprocess.run([sys.executable, "-c", FULL_DISK], check=True, capture_output=True, text=True)
-    assert ended.stdout.split() == ["True", "2"], ended
-
-
 TELLS_WHAT_IS_THE_SAME = """
 def task_program():
     go_to('kitchen')
@@ -198,14 +178,14 @@ def test_a_smaller_table_of_skills_leaves_no_other_skill() -> None:
 
 def test_drives_to_rooms_by_their_names_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     answers: list[object] = []
-    send = Child.send
+    send = IsolatedProcess.send
 
-    def send_and_note(child: Child, message: tuple[object, ...]) -> None:
+    def send_and_note(child: IsolatedProcess, message: tuple[object, ...]) -> None:
         answers.append(message[0])
         send(child, message)
 
     worker = Worker()
-    monkeypatch.setattr(Child, "send", send_and_note)
+    monkeypatch.setattr(IsolatedProcess, "send", send_and_note)
     world = World((Room("start_loc"), Room("lab+"), Room("é'\"\n"), Room("hall \\d")), "start_loc")
     program = "def task_program():\n    for room in get_all_rooms() * 3:\n        go_to(room)\n"
     outcome = worker.run(program, lambda: SimulatedRobot(world, AS_WRITTEN))
@@ -417,7 +397,7 @@ def test_fork_server_that_is_killed_again_and_again_is_an_error_of_the_engine_an
 
 
 def test_a_skill_may_take_longer_than_a_child_may_be_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 1.0)
+    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 1.0)
 
     def slow(robot: SimulatedRobot, message: str) -> None:
         time.sleep(2.5)
@@ -470,7 +450,7 @@ def test_program_that_is_run_again_is_not_waited_for_as_long_again(monkeypatch: 
     worker = Worker()
     for warming in ("pass", "import json"):
         worker.run(f"def task_program():\n    {warming}\n", lambda: SimulatedRobot(WORLD))
-    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 0.6)
+    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 0.6)
     outcome = worker.run(COMPUTING_TWICE, lambda: SimulatedRobot(WORLD))
     worker.close()
     assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
@@ -503,7 +483,7 @@ def test_requests_beyond_a_limit_are_not_read_for_ever(monkeypatch: pytest.Monke
     answered: list[list[object]] = []
     answer = SkillProtocol._answer
 
-    def counted(self: SkillProtocol, name: str, values: list[object], now: float) -> Answer:
+    def counted(self: SkillProtocol, name: str, values: list[object], now: float) -> SkillAnswer:
         answered.append(values)
         return answer(self, name, values, now)
 
@@ -581,7 +561,7 @@ def test_events_of_runs_are_logged_and_off_by_default(caplog: pytest.LogCaptureF
 
 def test_windows_is_refused_with_the_platform_patched(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
-    with pytest.raises(EngineError, match="inside WSL"):
+    with pytest.raises(EngineError, match="WSL"):
         list(run([(saying("a"), WORLD)], workers=1))
 
 
@@ -618,13 +598,15 @@ resource.setrlimit = with_fewer
 def test_processes_do_with_what_macos_has_with_linux_patched_to_lack_the_rest(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def code_of(source: str, name: str) -> bytes:
+    def compiled(source: str, name: str) -> bytes:
         prelude = LIKE_MACOS if name == "codebotler.simulator.sandbox" else ""
-        return isolated.code_of(source.replace('"""The isolated', prelude + '"""The isolated', 1), name)
+        return isolated_process.compiled(
+            source.replace('"""The isolated', prelude + '"""The isolated', 1), name
+        )
 
     with TemporaryFile() as file:
-        monkeypatch.setattr(isolated, "codes", lambda: file)
-        file.write(isolated.written(code_of))
+        monkeypatch.setattr(isolated_process, "compiled_file", lambda: file)
+        file.write(isolated_process.compiled_modules(compiled))
         file.flush()
         programs = [saying("a"), "import json\n" + saying("b"), "import os\n\ndef task_program(): os.abort()"]
         outcomes = list(run([(program, WORLD) for program in programs], workers=1))
@@ -647,7 +629,7 @@ def test_large_programs_say_the_same_addresses_every_time() -> None:
     assert len({tuple(said(outcome)) for outcome in outcomes}) == 1
 
 
-def test_few_characters_of_much_code_are_refused_and_not_kept() -> None:
+def test_few_characters_of_much_code_are_refused() -> None:
     methods = "".join(f" def f{j}(): 0\n" for j in range(1500))
     worker = Worker()
     for number in range(3):
@@ -655,7 +637,6 @@ def test_few_characters_of_much_code_are_refused_and_not_kept() -> None:
         error = worker.run(source, lambda: SimulatedRobot(WORLD)).error
         assert error is not None
         assert error.kind == "MemoryError"
-    assert sum(len(repr(kept)) for kept in worker._preparer._kept.values()) < 1_000_000
     worker.close()
 
 
@@ -681,8 +662,8 @@ def test_a_preparer_that_is_killed_from_outside_is_no_verdict() -> None:
         return SimulatedRobot(WORLD)
 
     assert said(worker.run(saying("a"), robot)) == ["a"]
-    assert worker._preparer._child is not None
-    os.kill(worker._preparer._child.pid, signal.SIGKILL)
+    assert worker._preparer._process is not None
+    os.kill(worker._preparer._process.pid, signal.SIGKILL)
     assert said(worker.run(saying("b"), robot)) == ["b"]
     worker.close()
 
@@ -725,7 +706,7 @@ def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatc
     def interrupted(_: ForkServer) -> None:
         raise KeyboardInterrupt
 
-    codes()  # a file that stays open
+    compiled_file()  # a file that stays open
     before, processes = set(Path("/proc/self/fd").iterdir()), fork_servers()
     monkeypatch.setattr(ForkServer, "_rehearse", interrupted)
     with pytest.raises(KeyboardInterrupt):

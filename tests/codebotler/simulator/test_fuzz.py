@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from codebotler.core.program import Problem, Program
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.engine import WorkerPool, run
+from codebotler.simulator.engine import run
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from in_process import OrdinaryProcess, without_addresses

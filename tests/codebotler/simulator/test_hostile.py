@@ -34,7 +34,7 @@ from codebotler.core.trace import Event, Outcome, Status
 from codebotler.core.tracefile import outcome_data
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
-from codebotler.simulator.child import PROCESSOR_TIME
+from codebotler.simulator.isolated_process import PROCESSOR_TIME
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.worker import Worker
@@ -386,7 +386,7 @@ def test_every_program_says_in_one_sentence_what_it_tries() -> None:
 def test_program_that_is_silent_for_too_long_is_ended_though_it_computes(
     reach: Reach, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 0.5)
+    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 0.5)
     outcome = reach.run("def task_program():\n    sum(range(10**12))\n")
     assert outcome.status is Status.TIMEOUT
     assert outcome.error is not None

@@ -1,4 +1,4 @@
-"""Programs are kept in whoever runs the engine, root or not; and where a wall is missing, one is told."""
+"""Programs are kept in whoever runs the engine, root or not, and missing isolation is reported."""
 
 import json
 import os
@@ -203,7 +203,7 @@ def test_isolation_that_is_required_is_refused_where_the_kernel_refuses_a_filter
     assert evaluated("--require-isolation").returncode == 0
 
 
-def test_other_walls_hold_where_the_kernel_refuses_a_filter(folder: Path) -> None:
+def test_all_other_isolation_holds_where_the_kernel_refuses_a_filter(folder: Path) -> None:
     attacks = {f"open('{folder}/secret')": "OSError", "os.fork()": "BlockingIOError", "say('a')": None}
     check = BELOW_A_FILTER + CHECK.replace("require_isolation=True", "require_isolation=False")
     process = as_user(os.geteuid(), [sys.executable, "-c", check, json.dumps(list(attacks))])

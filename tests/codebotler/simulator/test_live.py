@@ -13,10 +13,9 @@ import pytest
 
 from codebotler.core.skills import SKILLS
 from codebotler.core.trace import Event, Outcome, Status, Trace
-from codebotler.simulator.engine import EngineError
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, PAPER
-from codebotler.simulator.worker import Worker
+from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, fork_servers
 
 LIVE = replace(PAPER, literals="as-written", limits=ENDLESS)
@@ -94,7 +93,7 @@ def test_there_is_no_limit_of_skill_calls_or_of_time(worker: Worker) -> None:
 def test_program_may_compute_for_long_if_it_acts_in_between(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("codebotler.simulator.child.LONGEST", 5.0)
+    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 5.0)
     program = (
         "def task_program():\n"
         "    for i in range(10):\n"

@@ -14,14 +14,14 @@ from codebotler.core.trace import Option
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.robot import Argument, Result, RobotError
-from codebotler.simulator.sampled_robot import Fact, RoomMap, SampledRobot, Whereabouts, meant
+from codebotler.simulator.sampled_robot import RoomMap, SampledRobot, Whereabouts, meant
 
-PLAN = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")
+ROOMS = RoomMap(("start_loc", "kitchen", "lab"), "start_loc")
 YES_NO = (Option("Yes"), Option("No"))
 
 
 def robot_in(room: str = "kitchen", sample: int = 0, *, seed: int = 0, strict: bool = False) -> SampledRobot:
-    robot = SampledRobot(PLAN, FactSampler(seed, sample, strict))
+    robot = SampledRobot(ROOMS, FactSampler(seed, sample, strict))
     robot.perform("go_to", [room])
     return robot
 
@@ -46,7 +46,7 @@ def failure(robot: SampledRobot, skill: str, *arguments: Any) -> str:  # noqa: A
 
 
 def test_rooms_are_those_of_the_plan_and_found_as_in_the_simulator() -> None:
-    robot = SampledRobot(PLAN, FactSampler())
+    robot = SampledRobot(ROOMS, FactSampler())
     assert robot.perform("get_all_rooms", ()) == ["start_loc", "kitchen", "lab"]
     assert robot.perform("get_current_location", ()) == "start_loc"
     robot.perform("go_to", ["the Kitchen, please"])
@@ -80,8 +80,8 @@ def test_guessed_rooms_are_plain_texts_and_any_other_is_found_too() -> None:
 
 
 def test_a_room_is_preferred_to_one_that_its_name_contains() -> None:
-    plan = RoomMap(("lab", "lab 2", "hall"), "hall", guessed=True)
-    assert (plan.room("Lab 2"), plan.room("the lab"), plan.room("")) == ("lab 2", "lab", None)
+    room_map = RoomMap(("lab", "lab 2", "hall"), "hall", guessed=True)
+    assert (room_map.room("Lab 2"), room_map.room("the lab"), room_map.room("")) == ("lab 2", "lab", None)
 
 
 # --- what is looked for is drawn, once
@@ -134,7 +134,7 @@ def test_looking_changes_nothing_so_that_a_program_need_not_wait_for_it() -> Non
     robot = robot_in()
     assert robot.only_looks == {"is_in_room", "get_all_rooms", "get_current_location"}
     assert robot.never_fails == {"say"}
-    assert robot.surely == tuple(("go_to", room) for room in PLAN.rooms)
+    assert robot.surely == tuple(("go_to", room) for room in ROOMS.rooms)
 
 
 def test_an_object_picked_up_is_gone_and_put_down_is_there() -> None:
@@ -170,8 +170,9 @@ def test_what_it_never_looked_for_is_as_the_program_takes_it() -> None:
         robot.perform("pick", ["stapler"])
         assert robot.perform("ask", ["alice", "Tea?", YES_NO]) in {0, 1}
         assert look(robot, "person") is True
-        there = Whereabouts("alice", "kitchen", is_there=True)
-        assert Fact('"alice" is in "kitchen"', by_lot=False, about=there) in robot.facts
+        fact = Whereabouts("alice", "kitchen", is_there=True, by_lot=False)
+        assert fact in robot.facts
+        assert fact.sentence == '"alice" is in "kitchen"'
 
 
 def test_it_may_take_another_one_where_it_never_looked() -> None:
@@ -222,7 +223,7 @@ def test_strict_draws_what_the_program_takes_for_granted() -> None:
 
 def test_strict_has_no_second_one_to_take() -> None:
     robots = (robot_in(sample=number, strict=True) for number in range(100))
-    robot = next(robot for robot in robots if robot.lot.is_there("kitchen", "mug"))
+    robot = next(robot for robot in robots if robot.sampler.is_there("kitchen", "mug"))
     robot.perform("pick", ["mug"])
     robot.perform("go_to", ["lab"])
     robot.perform("place", ["mug"])
@@ -268,7 +269,7 @@ def test_an_answer_that_is_no_longer_offered_is_drawn_again() -> None:
     ]
 
 
-# --- what is owed to the lots
+# --- what is owed to chance
 
 
 def searched(what: str, in_kitchen: bool, in_lab: bool, seed: int = 0) -> SampledRobot:  # noqa: FBT001 - a table
@@ -308,11 +309,11 @@ def test_a_search_that_found_it_once_excuses_nothing() -> None:
 
 def test_found_once_in_a_long_search_excuses_nothing() -> None:
     robot = searched("alice", in_kitchen=False, in_lab=True)
-    while not robot.scene.lacks("alice"):
-        robot = searched("alice", in_kitchen=False, in_lab=True, seed=robot.lot.seed + 1)
+    while not robot.here.lacks("alice"):
+        robot = searched("alice", in_kitchen=False, in_lab=True, seed=robot.sampler.seed + 1)
         robot.perform("go_to", ["start_loc"])
         look(robot, "alice")
-    assert len(robot.hopes["alice"].vain) == 2
+    assert len(robot.searches["alice"].vain) == 2
     assert failure(robot, "ask", "alice", "Tea?", YES_NO) == "AskNoPerson"
     assert robot.excuses == set()
 
@@ -334,10 +335,10 @@ def test_waiting_in_vain_does_not_excuse_asking() -> None:
 
 def test_who_has_a_name_is_somebody() -> None:
     for sample in range(20):
-        robot = SampledRobot(PLAN, FactSampler(sample=sample))
+        robot = SampledRobot(ROOMS, FactSampler(sample=sample))
         if look(robot, "Bob"):
             assert look(robot, "person")
-        robot = SampledRobot(PLAN, FactSampler(sample=sample))
+        robot = SampledRobot(ROOMS, FactSampler(sample=sample))
         if not look(robot, "person"):
             assert not look(robot, "Bob")
 
@@ -351,7 +352,7 @@ def test_what_was_taken_is_gone_also_if_it_has_a_name() -> None:
 @pytest.mark.parametrize("options", [("No", "Yes"), ("Yes", "No")])
 def test_who_is_lucky_meets_people_who_mostly_agree(options: tuple[str, ...]) -> None:
     def says_yes(sample: int, *, lucky: bool) -> bool:
-        robot = SampledRobot(PLAN, FactSampler(sample=sample, lucky=lucky))
+        robot = SampledRobot(ROOMS, FactSampler(sample=sample, lucky=lucky))
         chosen = robot.perform("ask", ["Bob", "Tea?", tuple(map(Option, options))])
         return isinstance(chosen, int) and options[chosen] == "Yes"
 
@@ -370,7 +371,7 @@ def test_finding_two_of_what_it_searches_excuses_picking_both() -> None:
 
 def test_strict_excuses_nothing() -> None:
     robot = searched("mug", in_kitchen=False, in_lab=False)
-    robot.lot = FactSampler(robot.lot.seed, robot.lot.sample, strict=True)
+    robot.sampler = FactSampler(robot.sampler.seed, robot.sampler.sample, strict=True)
     assert failure(robot, "place", "mug") == "PlaceNoObject"
     assert robot.excuses == set()
 
@@ -378,16 +379,16 @@ def test_strict_excuses_nothing() -> None:
 # --- the same seed draws the same
 
 
-def test_lots_depend_on_seed_sample_and_fact_alone() -> None:
-    def drawn(lot: FactSampler) -> list[int]:
-        return [lot.draw(1_000, "a fact", str(number)) for number in range(20)]
+def test_draws_depend_on_seed_sample_and_fact_alone() -> None:
+    def drawn(sampler: FactSampler) -> list[int]:
+        return [sampler.draw(1_000, "a fact", str(number)) for number in range(20)]
 
     assert drawn(FactSampler(7, 3)) == drawn(FactSampler(7, 3))
     assert (
         len(
             {
-                tuple(drawn(lot))
-                for lot in (FactSampler(7, 3), FactSampler(7, 4), FactSampler(8, 3), FactSampler(73, 0))
+                tuple(drawn(sampler))
+                for sampler in (FactSampler(7, 3), FactSampler(7, 4), FactSampler(8, 3), FactSampler(73, 0))
             }
         )
         == 4
@@ -395,7 +396,7 @@ def test_lots_depend_on_seed_sample_and_fact_alone() -> None:
     assert FactSampler(1).draw(1_000, "ab", "c") != FactSampler(1).draw(1_000, "a", "bc")
 
 
-def test_lots_are_the_same_whatever_hashing_does() -> None:
+def test_draws_are_the_same_whatever_hashing_does() -> None:
     told = (
         "from codebotler.simulator.fact_sampler import FactSampler\n"
         "print([FactSampler(5).draw(99, 'x', str(n)) for n in range(9)])\n"
@@ -420,4 +421,4 @@ def test_a_draw_knows_in_which_worlds_it_would_be_the_same() -> None:
         other = robot_in(sample=number)
         same = look(other, "mug") == look(robot, "mug")
         same &= other.perform("ask", ["", "Tea?", YES_NO]) == robot.perform("ask", ["", "Tea?", YES_NO])
-        assert all(draw.is_drawn_by(other.lot) for draw in robot.draws) is same
+        assert all(draw.is_drawn_by(other.sampler) for draw in robot.draws) is same

@@ -10,7 +10,7 @@ import pytest
 from codebotler.checking.check import check
 from codebotler.core.world import Room, World
 from codebotler.missions.progress import MOST, Moment, Progress, line_of
-from codebotler.simulator.sampled_robot import Fact, Reply, Whereabouts
+from codebotler.simulator.sampled_robot import Fact, GivenAnswer, Whereabouts
 from codebotler.web.floorplan import MOST_ROOMS, floorplan
 from codebotler.web.storyboard import MOST_STRIPS, Deed, strips, supposed
 
@@ -119,7 +119,7 @@ def test_strips_show_each_kind_of_world_once() -> None:
 
 
 def there(name: str, room: str, *, found: bool = True) -> Fact:
-    return Fact("", by_lot=True, about=Whereabouts(name, room, found))
+    return Whereabouts(name, room, found)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def there(name: str, room: str, *, found: bool = True) -> Fact:
         ),
         ([there("somebody", "a", found=False)], "If the robot finds nobody in a"),
         (
-            [Fact("", by_lot=True, about=Reply("hall", "Tea?", "Yes")), there("cup", "ann's")],
+            [GivenAnswer("hall", "Tea?", "Yes"), there("cup", "ann's")],
             "If the robot is told “Yes” when it asks “Tea?” in hall and it finds “cup” in ann's",
         ),
         ([there("mug", "a, but not in b")], "If the robot finds “mug” in “a, but not in b”"),

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from check import CAUGHT, LOST, LOST_IN_A_TASK, Source, rates, real, rejections, truths
-from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.pool import WorkerPool
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import Suite
 

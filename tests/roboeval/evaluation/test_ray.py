@@ -18,8 +18,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from codebotler.simulator.distinct import MOST_AHEAD
-from codebotler.simulator.engine import NO_SECCOMP
+from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP
 from codebotler.simulator.worker import EngineError
 from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine

@@ -19,8 +19,8 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Outcome, RunError, Status
-from codebotler.simulator.isolated import ONE_AT_A_TIME
-from codebotler.simulator.pool import warm
+from codebotler.simulator.isolated_process import ONE_AT_A_TIME
+from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate
@@ -129,7 +129,7 @@ def uncollected() -> Iterator[None]:
 @pytest.mark.usefixtures("uncollected")
 def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)  # in the place of polars' own
-    pool, gate, patience = warm(), threading.Event(), 60
+    pool, gate, patience = shared_pool(), threading.Event(), 60
     here, submit = pool.here, pool.submit
     monkeypatch.setattr(pool, "here", lambda: gate.wait(patience) and here())
     futures: list[Future[object]] = []
@@ -275,7 +275,7 @@ def test_nobody_forks_in_the_middle_of_a_start() -> None:
 def test_a_forked_process_does_not_wait_for_threads_of_the_one_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    pool, gate, patience = warm(), threading.Event(), 60
+    pool, gate, patience = shared_pool(), threading.Event(), 60
     here, began = pool.here, threading.Event()
 
     def held() -> Worker:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.simulator.engine import WorkerPool
+from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.report import to_yaml

@@ -1,55 +1,36 @@
 """The isolated side of the engine: processes that prepare programs, and fork one closed child for each run.
 
-A child holds the program and nothing else: the world, the robot and the trace stay with the engine, and the
-child asks for skills over a socket. Everything it says is checked there; here is only what keeps it in. All
-of it runs under a bare interpreter and imports as little as it can, since every page of memory and every
-library makes each fork dearer.
+A child holds nothing but the program. World, robot and trace stay with the engine, and the child asks for
+skills over a socket. All of this runs under a bare interpreter and imports as little as it can, since every
+page of memory makes each fork dearer.
 """
 
+# The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings.
 FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
-"""The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings."""
 
-CHANNEL = 3
-"""The descriptor by which a closed process and the engine talk: HEADER bytes of length, then content."""
+# Roles: compiles programs; forks runs; forks runs that import something; forks runs on a robot.
+PREPARER, FORK_SERVER = "preparer", "fork-server"
+LIBRARY_SERVER, LIVE_SERVER = "library-fork-server", "live-fork-server"
 
-HEADER, MAX_FRAME = 4, 1_000_000
+CHANNEL = 3  # the descriptor by which a closed process and the engine talk
+HEADER, MAX_FRAME = 4, 1_000_000  # bytes of length before each frame, and of a frame
+PIECE, MORE = 16_384, "more"  # bytes of a message that a child gets at once, and how it asks for the next
+WITHOUT_REFERENCES = 2  # of marshal's formats: later ones depend on what else the writing process holds
 
-PIECE, MORE = 16_384, "more"
-"""Bytes of a message to a child that it gets at once, and what it says when it wants the next."""
+MEMORY = 512 * 1024 * 1024  # bytes of address space of an isolated process
+CPU_SECONDS = 5  # of processor time, against what fuel cannot see, such as one long call into C
+LIVE_CPU_SECONDS = 3600  # the same on a robot, where a run may take all day and somebody watches it
+MAX_CODE = 10_000_000  # bytes of a program's compiled code
 
-MEMORY = 512 * 1024 * 1024
-"""Bytes of address space of an isolated process."""
+PROGRAM = "<program>"  # the file that a program's code says it comes from
 
-CPU_SECONDS = 5
-"""Seconds of processor time of a closed process, against what ticks cannot see, such as one long call."""
-
-LIVE_CPU_SECONDS = 3600
-"""The same for a run on a robot, which may take all day, and which somebody watches."""
-
-WITHOUT_REFERENCES = 2
-"""The version of marshal's format: later ones write what depends on what else the writing process holds."""
-
-PREPARER, FORK_SERVER, LIBRARY_SERVER, LIVE_SERVER = (
-    "preparer",
-    "fork-server",
-    "library-fork-server",
-    "live-fork-server",
-)
-"""The roles: who compiles programs; who forks runs, those that import something, and those on a robot."""
-
-PROGRAM = "<program>"
-"""The file that a program's code says it comes from."""
-
+# Names of the functions that programs call without knowing; no source text can spell them.
 TICK, ENTRY, ENTER, BY_NAME = "<tick>", "<entry>", "<enter>", "<by-name>"
-"""Names of what counts in a program's code; no source text can spell them."""
 
+# How a skill is called: waiting for its result; not waiting, since there is none and it cannot fail; and
+# waiting only until the result is known, which then stays the same until the robot acts.
 ACTS, TELLS, LOOKS = 0, 1, 2
-"""How a skill is called: waiting for its result; without waiting, since there is none and it cannot fail; and
-waiting only until the result is known, which then stays as it is until the robot acts."""
 
-MAX_CODE = 10_000_000
-"""Bytes of a program's compiled code."""
-
+# First byte of the preparer's answer: before code, before code that imports more than is always there, and
+# before the reason why there is no code.
 PLAIN, IMPORTING, REFUSED = b"p", b"i", b"-"
-"""What the preparer's answer begins with: before the code of a program, before that of one which imports more
-than is always there, and before the reason why there is none."""

@@ -1,7 +1,7 @@
-"""The line between a child and the engine: frames of four bytes of length; JSON goes out, marshal comes in.
+"""The socket between a child and the engine: frames of JSON go out, frames of marshal come in.
 
-Only what the engine has written is ever unmarshalled. What a program does to `json`, `os` or the builtins is
-not felt here: all that is needed is held under names of our own.
+Only what the engine has written is ever unmarshalled. Nothing that a program does to `json`, `os` or the
+builtins is felt here: all that is needed is held under names of our own.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def send_bytes(data: bytes) -> None:
         written = write(CHANNEL, data)
 
 
-def receive() -> Any:  # noqa: ANN401 - whatever the engine says
-    """Read one message, piece by piece; without an engine there is no reason to go on."""
+def receive() -> Any:  # noqa: ANN401 - whatever the engine sends
+    """Read one message, piece by piece."""
     pieces = [read_piece()]
     missing = HEADER + int.from_bytes(pieces[0][:HEADER], "big") - len(pieces[0])
     while missing > 0:
@@ -50,7 +50,7 @@ def receive() -> Any:  # noqa: ANN401 - whatever the engine says
 
 
 def read_piece() -> bytes:
-    """Read what the engine has sent at once."""
+    """Read what the engine has sent at once; without an engine, end."""
     piece = read(CHANNEL, PIECE)
     if not piece:
         _exit(1)

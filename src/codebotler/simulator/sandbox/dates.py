@@ -1,4 +1,4 @@
-"""Dates as programs see them: `datetime` reads the time from `time`."""
+"""Simulated dates: stand-ins for the classes of `datetime` that read the time from `time`."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import datetime as real  # noqa: ICN001 - the stand-ins bear its usual name
 import time
 
 
-class Stand(type):
-    """The class of a class that takes the place of another: what is one of those is one of these."""
+class StandIn(type):
+    """Metaclass of a stand-in, which accepts the instances and subclasses of the class that it replaces."""
 
     def __instancecheck__(cls, thing: object) -> bool:
         if cls in (date, datetime):
@@ -20,7 +20,7 @@ class Stand(type):
         return super().__subclasscheck__(other)
 
 
-class date(real.date, metaclass=Stand):  # noqa: N801 - it takes the place of the real one
+class date(real.date, metaclass=StandIn):  # noqa: N801 - it takes the place of the real one
     """Takes the place of `datetime.date`."""
 
     @classmethod
@@ -32,17 +32,17 @@ class date(real.date, metaclass=Stand):  # noqa: N801 - it takes the place of th
         return f"datetime.{super().__repr__()}"
 
 
-class datetime(real.datetime, metaclass=Stand):  # noqa: N801 - the same
+class datetime(real.datetime, metaclass=StandIn):  # noqa: N801 - the same
     """Takes the place of `datetime.datetime`."""
 
     @classmethod
     def now(cls, tz: real.tzinfo | None = None) -> datetime:
-        """The moment on the simulated clock."""
+        """The moment on the simulated clock, which has no zone of its own."""
         return cls.fromtimestamp(time.time(), tz)
 
     @classmethod
     def utcnow(cls) -> datetime:
-        """The same: the simulated clock has no zone."""
+        """The same."""
         return cls.fromtimestamp(time.time())
 
     @classmethod
@@ -59,7 +59,7 @@ class datetime(real.datetime, metaclass=Stand):  # noqa: N801 - the same
 
 
 def simulate_dates() -> None:
-    """Let the two take their places."""
+    """Put the stand-ins into `datetime`."""
     for fake in (date, datetime):
         fake.__module__, fake.__qualname__ = "datetime", fake.__name__
         setattr(real, fake.__name__, fake)

@@ -1,4 +1,4 @@
-"""One run of one program, from inside: its budget, its clock, and its skills as functions."""
+"""One run of one program inside its process: fuel, a simulated clock, and skills as functions."""
 
 from __future__ import annotations
 
@@ -32,35 +32,27 @@ COROUTINE = 0x80  # among the flags of code
 UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not async def"
 
 
-class Run:
-    """One run of one program: its budget, its clock and its line to the engine.
-
-    All that can be is made before the fork, in the fork server.
-    """
+class ProgramRun:
+    """One run of one program; all that can be is made before the fork, in the fork server."""
 
     def __init__(self) -> None:
-        self.skills: Skills = ()
+        self.skills: Skills = ()  # name, parameters (name, and type `str` or `list`) and way of calling
         self.now = 0.0
         self.spent = self.entered = False
         self.codes: set[types.CodeType] = set()
-        self.ticks = self.calls = self.room = 0
+        self.fuel = self.calls = self.longest = self.room = 0  # longest text, and all texts, in characters
         self.start = self.seconds = 0.0
-        self.longest = 0
-        self.is_live = False
-        self.sure: tuple[str, ...] = ()
-        self.known: dict[str, Any] = {}
+        self.is_live = False  # whether time passes by itself
+        self.sure: tuple[str, ...] = ()  # requests that succeed and return nothing, whenever they are made
+        self.known: dict[str, Any] = {}  # what looking shows now, by request
         self.namespace = types.ModuleType("__main__")
         # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
-        tick = self.ticker()
+        tick = self.new_tick()
         counters = {TICK: tick, ENTRY: lambda: tick(), ENTER: self.enter, BY_NAME: self.start_task}  # noqa: PLW0108 - see above
         vars(builtins).update(counters)
 
     def provide(self, skills: Skills) -> None:
-        """Give the program what it can use without an import: the skills, and `sys` and `time`.
-
-        Args:
-            skills: name, parameters (name and type, `str` or `list`) and way of calling of each.
-        """
+        """Give the program what it can use without an import: the skills, and `sys` and `time`."""
         names = vars(self.namespace)
         for name, _, _ in self.skills:
             del names[name]
@@ -75,16 +67,8 @@ class Run:
         sure: tuple[str, ...],
         known: dict[str, Any],
     ) -> str:
-        """Run the program to its end and say how it ended.
-
-        Args:
-            code: marshalled.
-            limits: ticks, simulated seconds, skill calls, characters of a text and of all texts; what the
-                clock shows at the start, in seconds; and whether time passes by itself.
-            sure: requests of which nothing can come back, whenever they are made.
-            known: what looking would show at the start, by request.
-        """
-        self.ticks, self.seconds, self.calls, self.longest, self.room, self.start, self.is_live = limits
+        """Run the program to its end; how it ended, as JSON."""
+        self.fuel, self.seconds, self.calls, self.longest, self.room, self.start, self.is_live = limits
         self.sure, self.known = sure, known
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
@@ -101,17 +85,13 @@ class Run:
         return '{"end":"timeout","line":null}' if self.spent else '{"end":"finished"}'
 
     def forget(self, names: dict[str, Any]) -> None:
-        """Be as before the run of a program.
-
-        Args:
-            names: what the program could use then.
-        """
+        """Be as before the run of a program, which could use these names."""
         self.now = 0.0
         self.spent = self.entered = False
         self.codes.clear()
         self.known = {}
         RAISED.clear()
-        self.count_anew()
+        self.refuel()
         provided = vars(self.namespace)
         provided.clear()
         provided.update(names)
@@ -119,15 +99,15 @@ class Run:
     def ended_by(self, error: BaseException) -> str:
         """Describe what ended the program; the exception's class may be the program's own."""
         kind, line = type(error), last_line(error)
-        message = str.__getitem__(message_of(error), slice(1000))  # it may take ticks
+        message = str.__getitem__(message_of(error), slice(1000))  # it may use fuel
         where = f'"line":{"null" if line is None else line}'
-        if self.spent or issubclass(kind, BudgetSpentError):
+        if self.spent or issubclass(kind, LimitReachedError):
             return f'{{"end":"timeout",{where}}}'
         if issubclass(kind, SystemExit):
             code = own(SystemExit, "code", error)
             if code is None or (type(code) is int and code == 0):
                 return '{"end":"finished"}'
-        if issubclass(kind, RobotError):
+        if issubclass(kind, SkillError):
             number = number_of(error)
             if number is not None:
                 return f'{{"end":"robot-error","number":{number},{where}}}'
@@ -159,23 +139,23 @@ class Run:
             and task.__code__ not in self.codes
         )
 
-    def ticker(self) -> Callable[[], None]:
-        """The function that counts ticks and, once they are spent, raises each time it is called."""
-        self.count_anew()
+    def new_tick(self) -> Callable[[], None]:
+        """The function that uses one unit of fuel and, once all is spent, raises each time it is called."""
+        self.refuel()
 
         def tick() -> None:
-            if self.count() > self.ticks or self.spent:
+            if self.count() > self.fuel or self.spent:
                 self.spent = True
-                raise BudgetSpentError
+                raise LimitReachedError
 
         return tick
 
-    def count_anew(self) -> None:
-        """Count ticks from the start."""
+    def refuel(self) -> None:
+        """Count fuel from the start."""
         self.count = itertools.count(1).__next__
 
     def skill(self, name: str, parameters: tuple[tuple[str, str], ...], way: int) -> object:
-        """A function with a skill's name and parameters that asks the engine."""
+        """The function that a program calls for a skill."""
         names = ", ".join(parameter for parameter, _ in parameters)
         arguments = "".join(f"{parameter}, " for parameter, _ in parameters)
         types_: list[tuple[str, type]] = [
@@ -204,7 +184,7 @@ class Run:
                 wanted = "a list" if kind is list else "text"
                 raise TypeError(f"{name}: {parameter} must be {wanted}, not {NAME_OF(given)}")
         if self.spent:
-            raise BudgetSpentError
+            raise LimitReachedError
         arguments = [value.copy() if type(value) is list else value for value in values]
         result = self.carry_out(name, arguments, way)
         for options in arguments:
@@ -213,12 +193,9 @@ class Run:
         return result
 
     def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401 - what a skill returns
-        """Ask the engine for a skill."""
+        """Ask the engine for a skill, and wait for the answer only where it is not known before."""
         given = [options_text(value) if type(value) is list else quoted(value) for value in arguments]
-        return self.ask(f"{quoted(name)},[{','.join(given)}]", way)
-
-    def ask(self, request: str, way: int) -> Any:  # noqa: ANN401 - what a skill returns
-        """Ask for a skill, and wait for the answer only where it is not known before."""
+        request = f"{quoted(name)},[{','.join(given)}]"
         self.calls -= 1
         self.room -= len(request)
         if way == ACTS:
@@ -236,7 +213,7 @@ class Run:
         return result
 
     def sleep(self, seconds: object, /) -> None:
-        """Let time pass; the engine hears of simulated time with the next request, or when it is up."""
+        """Let time pass; the engine learns of simulated time with the next request, or when it is up."""
         if not isinstance(seconds, int | float):
             raise TypeError(f"{NAME_OF(type(seconds))!r} object cannot be interpreted as an integer")
         if not 0 <= seconds < float("inf"):
@@ -249,37 +226,37 @@ class Run:
             self.request('"sleep",[]')
 
     def wait_for_ever(self) -> None:
-        """End the run: nothing that the program waits for can come, since it is alone."""
+        """End the run: a program is alone, so that nothing can come that it waits for."""
         self.request('"wait",[]')
 
     def tell(self, request: str) -> None:
-        """Send one request that needs no reply, with the time at which it is made."""
+        """Send one request that needs no reply."""
         send(f"[{request},{self.now!r},0]")
 
     def request(self, request: str) -> Any:  # noqa: ANN401 - what a skill returns
-        """Send one request with the time at which it is made, and wait for its reply."""
+        """Send one request, and wait for its reply."""
         if self.spent:
-            raise BudgetSpentError
+            raise LimitReachedError
         send(f"[{request},{self.now!r},1]")
         kind, value, known, self.now = receive()
         self.known.update(known)
         if self.is_live:
-            self.count_anew()
+            self.refuel()
         if kind == "ok":
             return value
         if kind == "error":
             raise robot_error(*value)
         self.spent = True
-        raise BudgetSpentError
+        raise LimitReachedError
 
 
 def call_task() -> object:
-    """Code that is run among the program's names; a text would be compiled anew in each child."""
+    """Code that is run among the program's names; source text would be compiled anew in each child."""
     return task_program()  # type: ignore[name-defined] # noqa: F821 - the program's
 
 
 def options_text(options: list[Any]) -> str:
-    """Options as they cross the line: the text of each, and whether it was one."""
+    """Options as JSON: the text of each, and whether it was one."""
     texts = [(str(option), issubclass(type(option), str)) for option in options]
     parts = [f"[{quoted(text)},{'true' if is_text else 'false'}]" for text, is_text in texts]
     return f"[{','.join(parts)}]"
@@ -301,7 +278,7 @@ def own(kind: type[BaseException], name: str, error: BaseException) -> Any:  # n
 
 
 def message_of(error: BaseException) -> str:
-    """What an exception says."""
+    """The message of an exception, whose class may be the program's own."""
     try:
         return str(error)
     except BaseException:  # noqa: BLE001 - the program's own __str__ may raise anything
@@ -309,32 +286,27 @@ def message_of(error: BaseException) -> str:
 
 
 NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
-"""The name of a class, past what its metaclass may say."""
+"""The name of a class, past what a metaclass of the program may say."""
 
 
-class BudgetSpentError(BaseException):
+class LimitReachedError(BaseException):
     """The run has reached a limit; every further tick and skill call raises it again."""
 
 
-class RobotError(Exception):
+class SkillError(Exception):
     """The robot could not do what the program asked for."""
 
-    number = -1
+    number = -1  # by which the engine knows it; that of a class is the latest of its kind
 
 
-RAISED: dict[str, type[RobotError]] = {}
+SkillError.__name__ = SkillError.__qualname__ = "RobotError"  # as programs see it
+RAISED: dict[str, type[SkillError]] = {}
 
 
-def robot_error(number: int, kind: str, text: str) -> RobotError:
-    """An error of the robot, of one class for each kind.
-
-    Args:
-        number: by which the engine knows it; what the program makes of its class stands for the latest.
-        kind: the name of its class.
-        text: what it says.
-    """
+def robot_error(number: int, kind: str, text: str) -> SkillError:
+    """An error of the robot, of one class for each kind."""
     if kind not in RAISED:
-        RAISED[kind] = type(kind, (RobotError,), {"__module__": "robot"})
+        RAISED[kind] = type(kind, (SkillError,), {"__module__": "robot"})
     RAISED[kind].number = number
     error = RAISED[kind](text)
     error.number = number
@@ -342,7 +314,7 @@ def robot_error(number: int, kind: str, text: str) -> RobotError:
 
 
 def number_of(error: BaseException) -> int | None:
-    """The number of a robot's error; None for an error of the program's own making."""
+    """The number of a robot's error; None for one that the program has made itself."""
     try:
         number = error.number  # type: ignore[attr-defined]  # or whatever the program has made of it
     except BaseException:  # noqa: BLE001 - the same

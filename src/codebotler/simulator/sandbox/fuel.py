@@ -1,4 +1,4 @@
-"""A program made ready to run: parsed, its literals lowered, and every loop and function counted."""
+"""Fuel, the deterministic limit of computing: a program is compiled so that each loop and call uses some."""
 
 from __future__ import annotations
 
@@ -17,15 +17,7 @@ SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 
 def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset[str]]:
-    """Parse a program, lower its literals if the suite wants it, and compile it with ticks.
-
-    Returns:
-        the code, and the names of the modules that import statements name.
-
-    Raises:
-        SyntaxError: it does not parse.
-        MemoryError: it is too large, or nested more deeply than every version of Python can hold.
-    """
+    """A program's code, which uses fuel, and the names of the modules that it imports."""
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
@@ -36,7 +28,7 @@ def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset
         if lowercase:
             lower_literals(nodes)
         for node in nodes:
-            add_ticks(node)
+            use_fuel(node)
         for node in tree.body:
             note_entries(node)
         return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), imports
@@ -45,14 +37,7 @@ def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset
 
 
 def walk(tree: ast.AST) -> Iterator[ast.AST]:
-    """All nodes of a tree.
-
-    Versions of Python differ in how deep they can go and in where they notice, so that both is decided here.
-
-    Raises:
-        MemoryError: it is nested too deeply.
-        SyntaxError: too many loops and the like stand in each other.
-    """
+    """All nodes of a tree, unless it is nested too deeply, which versions of Python limit differently."""
     waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]
     while waiting:
         node, depth, blocks = waiting.pop()
@@ -69,7 +54,7 @@ def walk(tree: ast.AST) -> Iterator[ast.AST]:
 
 
 def imported(node: ast.AST) -> list[str]:
-    """The modules that a node imports, if it is an import statement."""
+    """The modules that a node imports."""
     match node:
         case ast.Import(names):
             return [alias.name for alias in names]
@@ -79,7 +64,7 @@ def imported(node: ast.AST) -> list[str]:
 
 
 def lower_literals(nodes: list[ast.AST]) -> None:
-    """Lower all texts that stand in the program, but not the format specifications of f-strings."""
+    """Lower-case all string literals, but not the format specifications of f-strings."""
     specifications = {
         id(part)
         for node in nodes
@@ -91,8 +76,8 @@ def lower_literals(nodes: list[ast.AST]) -> None:
             node.value = node.value.lower()
 
 
-def add_ticks(node: ast.AST) -> None:
-    """Count a node's turns or entries: a tick at the head of what it runs again."""
+def use_fuel(node: ast.AST) -> None:
+    """Use fuel at the head of whatever a node runs again."""
     match node:
         case ast.FunctionDef() | ast.AsyncFunctionDef():
             insert_head(node, ENTRY)
@@ -113,7 +98,7 @@ def add_ticks(node: ast.AST) -> None:
 
 
 def note_entries(statement: ast.stmt) -> None:
-    """Let each function of the module note that it was entered: any may be the task, by whatever name."""
+    """Note when functions of the module are entered: any may be the task, by whatever name."""
     waiting: list[ast.AST] = [statement]
     while waiting:
         node = waiting.pop()
@@ -127,12 +112,12 @@ def note_entries(statement: ast.stmt) -> None:
 
 
 def insert_head(node: ast.FunctionDef | ast.AsyncFunctionDef, name: str) -> None:
-    """Call a function of ours first thing in a function, after its docstring."""
+    """Call one of our functions first thing in a function, after its docstring."""
     at = 1 if ast.get_docstring(node, clean=False) is not None else 0
     node.body.insert(at, call(name, node.body[0]))
 
 
 def call(name: str, where: ast.AST) -> ast.Expr:
-    """The statement `name()`, said to stand where another node stands."""
+    """The statement `name()`, with the line of another node."""
     function = ast.copy_location(ast.Name(name, ast.Load()), where)
     return ast.copy_location(ast.Expr(ast.copy_location(ast.Call(function, [], []), where)), where)

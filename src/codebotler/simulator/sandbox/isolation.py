@@ -1,4 +1,4 @@
-"""The walls around a child: limits, lost rights, and the list of what it may ask of the kernel."""
+"""Isolation by the kernel: resource limits, dropped privileges, and a seccomp filter of system calls."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-    Filter: TypeAlias = tuple[bytes, bytes]
-    """What the kernel is given, and what that points to."""
+    Filter: TypeAlias = tuple[bytes, bytes]  # a `struct sock_fprog`, and the code that it points to
 
 
 def give_up_rights() -> None:
@@ -29,12 +28,7 @@ def give_up_rights() -> None:
 
 
 def enclose(seccomp: Filter | None, seconds: int) -> None:
-    """Close everything but the channel; after `give_up_rights`, here or in the process that forked this one.
-
-    Args:
-        seccomp: what may be asked of the kernel; None where it takes no such list.
-        seconds: of processor time that remain.
-    """
+    """Close everything but the channel, and limit processor time; `give_up_rights` comes before."""
     set_limit("NPROC", 0)
     set_limit("NOFILE", CHANNEL + 1)
     limit_time(seconds)
@@ -43,7 +37,7 @@ def enclose(seccomp: Filter | None, seconds: int) -> None:
 
 
 def set_limit(name: str, value: int) -> None:
-    """Set one limit of this process for ever; other systems have fewer of them, or take no small one."""
+    """Set one limit for ever; systems other than Linux have fewer of them, or take no small one."""
     kind = getattr(resource, "RLIMIT_" + name, None)
     try:
         if kind is not None:
@@ -59,7 +53,7 @@ def limit_time(seconds: int) -> None:
 
 
 def become_nobody() -> None:
-    """Give up being root, whom RLIMIT_NPROC does not bind; whoever is not root stays who they are."""
+    """Give up being root, whom RLIMIT_NPROC does not bind."""
     if os.geteuid() != 0:
         return
     os.setgroups([])
@@ -72,7 +66,7 @@ def become_nobody() -> None:
 
 
 def die_with_parent() -> None:
-    """Be killed when the thread ends that has started this process; a change of user would undo this."""
+    """Be killed when the thread ends that has started this process; a change of user undoes this."""
     prctl(PR_SET_PDEATHSIG, SIGKILL)
 
 
@@ -87,7 +81,7 @@ def refuse_new_rights() -> None:
 
 
 def install(seccomp: Filter) -> None:
-    """Ask nothing more of the kernel than the list allows."""
+    """Allow only the system calls of a filter."""
     prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, seccomp[0])
 
 
@@ -100,7 +94,7 @@ LIBC = _ctypes.dlopen(None, 0)  # type: ignore[arg-type]  # of `ctypes`, which w
 
 
 def prctl(option: int, value: int = 0, other: int | bytes = 0) -> None:
-    """Ask the kernel to change what this process may do; only Linux can be asked."""
+    """Change what this process may do; on Linux only."""
     if sys.platform != "linux":
         return
     if _ctypes.call_function(_ctypes.dlsym(LIBC, "prctl"), (option, value, other, 0, 0)) != 0:
@@ -130,7 +124,7 @@ FUTEX_WAKE_PRIVATE = 129
 
 
 def seccomp_filter(machine: str = MACHINE) -> Filter | None:
-    """The list of what a child may ask of the kernel, as a BPF program; None on an unknown machine.
+    """The system calls that a child may make, as a BPF program; None on an unknown machine.
 
     Reading and writing go to the channel only, memory is never executable, and a futex wakes but never waits,
     since nobody else could wake; all else is refused with EPERM.
@@ -143,7 +137,7 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
         **dict.fromkeys(("mmap", "mprotect"), (THIRD_ARGUMENT, (ANY_BIT, 1, 0, PROT_EXEC))),
         "futex": (SECOND_ARGUMENT, (EQUAL, 0, 1, FUTEX_WAKE_PRIVATE)),
     }
-    code = [
+    code = [  # of each instruction: operation, jump if true, jump if false, operand
         (LOAD, 0, 0, ARCHITECTURE),
         (EQUAL, 1, 0, architecture),
         (RETURN, 0, 0, KILL),
@@ -158,32 +152,19 @@ def seccomp_filter(machine: str = MACHINE) -> Filter | None:
         body = [(LOAD, 0, 0, argument), test, (RETURN, 0, 0, ALLOW), (RETURN, 0, 0, DENY)]
         code += [(EQUAL, 0, len(body), numbers[name]), *body]
     code.append((RETURN, 0, 0, DENY))
-    instructions = b"".join(map(instruction, code))
-    length, address = (number.to_bytes(8, sys.byteorder) for number in (len(code), address_of(instructions)))
-    return length + address, instructions
-
-
-def address_of(data: bytes) -> int:
-    """Where the bytes lie: behind the head of their object."""
-    return id(data) + bytes.__basicsize__ - 1
-
-
-def instruction(line: tuple[int, int, int, int]) -> bytes:
-    """One instruction of a BPF program: operation, jump if true, jump if false, operand."""
-    operation, if_true, if_false, operand = line
-    return (
+    instructions = b"".join(
         operation.to_bytes(2, sys.byteorder) + bytes((if_true, if_false)) + operand.to_bytes(4, sys.byteorder)
+        for operation, if_true, if_false, operand in code
     )
+    address = id(instructions) + bytes.__basicsize__ - 1  # the content lies behind the head of the object
+    return len(code).to_bytes(8, sys.byteorder) + address.to_bytes(8, sys.byteorder), instructions
 
 
 def usable_filter() -> Filter | None:
-    """The filter for this machine, if its kernel takes it, which a container may forbid."""
+    """The filter for this machine if its kernel takes it, which a container may forbid; tried in a fork."""
     seccomp = seccomp_filter()
-    return seccomp if seccomp is not None and can_install(seccomp) else None
-
-
-def can_install(seccomp: Filter) -> bool:
-    """Whether the kernel takes the filter; tried in another process."""
+    if seccomp is None:
+        return None
     pid = os.fork()
     if pid == 0:
         try:
@@ -192,4 +173,4 @@ def can_install(seccomp: Filter) -> bool:
         except OSError:
             os._exit(1)
         os._exit(0)
-    return os.waitpid(pid, 0)[1] == 0
+    return seccomp if os.waitpid(pid, 0)[1] == 0 else None

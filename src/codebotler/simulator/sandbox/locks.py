@@ -1,22 +1,22 @@
-"""Locks as programs see them: a program is alone, so that waiting for one only lets simulated time pass."""
+"""Simulated locks: a program is alone, so that waiting for a lock only lets simulated time pass."""
 
 from __future__ import annotations
 
 import _thread
 
-from codebotler.simulator.sandbox.execution import Run
+from codebotler.simulator.sandbox.execution import ProgramRun
 
 
 class Lock:
-    """Takes the place of `_thread.lock`: one that is held stays held, since nobody else could release it."""
+    """Takes the place of `_thread.lock`; one that is held stays held, since nobody else could release it."""
 
-    run: Run
+    run: ProgramRun
 
     def __init__(self) -> None:
         self._times = 0
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:  # noqa: FBT001, FBT002 - as in _thread
-        """Take it, if it is free; otherwise wait, which costs simulated time or, without a limit, the run."""
+        """Take it if it is free; otherwise wait, which costs simulated time or, without a limit, the run."""
         if not blocking and timeout != -1:
             raise ValueError("can't specify a timeout for a non-blocking call")
         if self._is_free():
@@ -52,7 +52,7 @@ class Lock:
 
 
 class RLock(Lock):
-    """Takes the place of `_thread.RLock`; what `threading.Condition` asks of one is here."""
+    """Takes the place of `_thread.RLock`, with what `threading.Condition` asks of one."""
 
     def release(self) -> None:
         """Let it go once."""
@@ -77,8 +77,8 @@ class RLock(Lock):
         self._times = times
 
 
-def simulate_locks(run: Run) -> None:
-    """Let all locks that are made from now on be these; `threading` and its like must not be imported yet."""
+def simulate_locks(run: ProgramRun) -> None:
+    """Replace all locks that are made from now on; `threading` must not be imported yet."""
     Lock.run = run
     for each in (Lock, RLock):
         each.__module__ = "_thread"

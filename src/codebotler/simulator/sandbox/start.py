@@ -1,4 +1,4 @@
-"""The script of every isolated process: makes it the same in every start, then hands over to its role."""
+"""The script that isolated processes start with: fixes addresses and limits, then hands over to a role."""
 
 from __future__ import annotations
 
@@ -12,49 +12,38 @@ if TYPE_CHECKING:
     import types
     from typing import NoReturn
 
-FIRST = 4
-CODES = FIRST  # the descriptor of a file with the code of our own modules
+FIRST = 4  # of the descriptors that the engine hands over
+CODES = FIRST  # a file with the code of our own modules
 STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
 
 def main(role: str, descriptors: list[str]) -> None:
-    """Start, at first only to start again.
-
-    Args:
-        role: what to become.
-        descriptors: what the engine handed over; none in the second start, where they begin at FIRST.
-    """
+    """Start the interpreter again if there are descriptors, then take on a role."""
     if descriptors:
         start_again(list(map(int, descriptors)))
-    if (
-        role != "preparer"
-    ):  # bytecode, there in one start and not in the next, would move a fork_server's heap
+    if role != "preparer":  # bytecode, there in one start and not in the next, would move the heap
         sys.pycache_prefix = os.devnull
-    sys.meta_path.insert(0, Given(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
+    sys.meta_path.insert(0, CompiledModules(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
     os.close(CODES)
     if role == "preparer":
-        from codebotler.simulator.sandbox import preparing  # noqa: PLC0415 - only now it can be found
+        from codebotler.simulator.sandbox import preparer  # noqa: PLC0415 - only now it can be found
 
-        preparing.serve()
+        preparer.serve()
     else:
-        from codebotler.simulator.sandbox import forking  # noqa: PLC0415 - the same
+        from codebotler.simulator.sandbox import fork_server  # noqa: PLC0415 - the same
 
-        forking.serve(role)
+        fork_server.serve(role)
 
 
-class Given:
-    """Finds modules whose code the engine has compiled: a compiler would leave a fork server twice as large.
-
-    Args:
-        codes: marshalled code, by the name of the module.
-    """
+class CompiledModules:
+    """Importer of modules that the engine has compiled, since a compiler would double a fork server."""
 
     def __init__(self, codes: dict[str, bytes]) -> None:
-        self.codes = codes
+        self.codes = codes  # marshalled, by the name of the module
 
     def find_spec(self, name: str, *_: object) -> ModuleSpec | None:
-        """What the import system wants to know of a module."""
+        """Describe a module to the import system."""
         if name not in self.codes:
             return None
         is_package = any(other.startswith(name + ".") for other in self.codes)
@@ -69,7 +58,7 @@ class Given:
 
 
 def start_again(descriptors: list[int]) -> NoReturn:
-    """Become the role, with what the engine handed over at fixed numbers and with fixed addresses.
+    """Start the interpreter again, with descriptors from FIRST on and with fixed addresses.
 
     A program may say an address. It must be the same in every start, and even the lengths of arguments and
     the numbers of descriptors would move it.
@@ -89,7 +78,7 @@ def start_again(descriptors: list[int]) -> NoReturn:
 
 
 def forget_the_shell() -> None:
-    """Undo what a shell may have set and a process inherits: ignored signals, the size of the stack."""
+    """Undo what a process inherits from a shell: ignored signals, the size of the stack."""
     import _signal  # type: ignore[import-not-found] # noqa: PLC0415 - the second start has no use for it
     from resource import RLIMIT_STACK, getrlimit, setrlimit  # noqa: PLC0415 - the same
 

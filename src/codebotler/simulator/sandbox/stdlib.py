@@ -1,8 +1,8 @@
-"""The standard library as programs see it: all there before the walls close, and none of it tells real time.
+"""The standard library as programs see it: loaded before isolation, on a simulated clock and fixed seeds.
 
-Nothing can be imported behind the walls, so that what is listed here is what a program can import, the same
-under every version of Python. What tells the time, draws lots or waits is replaced before the modules that
-take it for their own are imported.
+An isolated process can import nothing, so that what is listed here is what a program can import, the same
+under every version of Python. What tells the time, draws at random or waits is replaced before the modules
+that take it for their own are imported.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import os
 import posix
 import sys
 
-from codebotler.simulator.sandbox.execution import Run
+from codebotler.simulator.sandbox.execution import ProgramRun
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -40,12 +40,16 @@ CODECS = """
 SOME_VERSIONS_HAVE = ("typing.io", "typing.re")
 
 
-def load_stdlib(run: Run) -> None:
-    """Import all that a program may import, on the run's clock and with chance that repeats."""
-    simulate_select(run)
+def load_stdlib(run: ProgramRun) -> None:
+    """Import all that a program may import."""
+    import select  # noqa: PLC0415 - see the module's first lines
+
+    vars(select)["select"] = Select(run)
     simulate_chance()
     vars(_thread)["get_native_id"] = lambda: 1
-    forget_forks()
+    # Whatever runs in the fork server once for each run is adapted by the interpreter after some dozens of
+    # them, and from then on leaves another heap behind.
+    os.register_at_fork = posix.register_at_fork = lambda **_: None
     sys.modules["_queue"] = None  # type: ignore[assignment]  # `queue` then takes its own, with simulated locks
     for name in [*LISTED, "_strptime", *(f"encodings.{codec}" for codec in CODECS)]:
         importlib.import_module(name)
@@ -59,7 +63,7 @@ def load_stdlib(run: Run) -> None:
 
 
 def simulate_chance() -> None:
-    """Let chance repeat, also where a program asks for an unpredictable seed."""
+    """Let random numbers repeat, also where a program asks for an unpredictable seed."""
 
     class Random(_random.Random):
         def __new__(cls, *_: object, **__: object) -> Self:
@@ -80,17 +84,8 @@ def simulate_chance() -> None:
     os.urandom = posix.urandom = urandom
 
 
-def forget_forks() -> None:
-    """Let no module do anything around a fork, which a program knows nothing of.
-
-    Whatever runs in the fork server once for each run is adapted by the interpreter after some dozens of
-    them, and from then on leaves another heap behind.
-    """
-    os.register_at_fork = posix.register_at_fork = lambda **_: None
-
-
 def simulate_identities() -> None:
-    """Let `uuid` take its time from `time`, and let neither it nor `platform` tell which machine this is."""
+    """Let `uuid` take its time from `time`, and let neither it nor `platform` name this machine."""
     import platform  # noqa: PLC0415 - see the module's first lines
     import uuid  # noqa: PLC0415 - the same
 
@@ -100,7 +95,7 @@ def simulate_identities() -> None:
 
 
 def hide_folders() -> None:
-    """Let modules name no folder of this machine: messages of errors would say it."""
+    """Let modules and tracebacks name no folder of this machine."""
     for name, module in list(sys.modules.items()):
         if getattr(module, "__file__", None):
             module.__file__ = f"{name}.py"
@@ -119,10 +114,10 @@ def hide_folders() -> None:
 class Select:
     """Takes the place of `select.select`: a wait for no file is a sleep, and one for a file is forbidden.
 
-    No function, which would become a method of the class in `selectors` that keeps it.
+    A function would become a method of the class in `selectors` that keeps it.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: ProgramRun) -> None:
         self.run = run
 
     def __call__(
@@ -135,10 +130,3 @@ class Select:
             self.run.wait_for_ever()
         self.run.sleep(timeout)
         return [], [], []
-
-
-def simulate_select(run: Run) -> None:
-    """Let waits cost simulated time."""
-    import select  # noqa: PLC0415 - see the module's first lines
-
-    vars(select)["select"] = Select(run)

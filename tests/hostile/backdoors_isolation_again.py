@@ -1,4 +1,4 @@
-"""Tries to close the walls again, wider."""
+"""Tries to isolate itself again, with wider limits."""
 # ends: python-error ValueError
 
 

@@ -1,4 +1,4 @@
-"""What every program sees of the world outside: a simulated clock, no input and no output, nobody else."""
+"""The simulated environment of programs: clock, standard streams, process ids, and what they may not do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import time
 import types
 from _sitebuiltins import Quitter
 
-from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, Run
+from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, ProgramRun
 from codebotler.simulator.sandbox.locks import simulate_locks
 
 TYPE_CHECKING = False
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def simulate_surroundings(run: Run) -> None:
-    """Give programs a simulated clock and locks, no input, a deaf output, no environment, a way to exit."""
+def simulate_environment(run: ProgramRun) -> None:
+    """Give programs a simulated clock and locks, no input, an output that forgets, and no environment."""
     simulate_time(run)
     simulate_locks(run)
     sys.stdin = io.StringIO("")
@@ -64,10 +64,10 @@ class Nowhere(io.BufferedIOBase):
         return len(data)
 
 
-def simulate_time(run: Run) -> None:
+def simulate_time(run: ProgramRun) -> None:
     """Let `time` follow the run's clock."""
     for name in ("time", "monotonic", "perf_counter", "process_time", "thread_time"):
-        clock = since_start(run) if name == "time" else lambda: run.now
+        clock = (lambda: run.start + run.now) if name == "time" else (lambda: run.now)
         setattr(time, name, clock)
         setattr(time, name + "_ns", lambda clock=clock: int(clock() * 1e9))
     time.sleep = run.sleep
@@ -87,8 +87,3 @@ def simulate_time(run: Run) -> None:
         if isinstance(function, types.FunctionType):  # which would become a method of a class that keeps it
             function.__name__ = function.__qualname__ = name
             setattr(time, name, staticmethod(function))
-
-
-def since_start(run: Run) -> Any:  # noqa: ANN401 - a function
-    """The function that tells the time of day."""
-    return lambda: run.start + run.now

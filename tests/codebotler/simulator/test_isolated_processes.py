@@ -1,4 +1,4 @@
-"""The walls that the engine puts up, as the kernel tells of its processes while a program runs."""
+"""The isolation of the engine's processes, as the kernel shows it while a program runs."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
     worker = Worker()
 
     def say(_robot: SimulatedRobot, message: str) -> None:
-        preparer = worker._preparer._child
+        preparer = worker._preparer._process
         assert preparer is not None
         found["preparer"] = Enclosed.of(preparer.pid)
         for role, fork_server in worker._fork_servers.items():
@@ -125,7 +125,7 @@ def test_nothing_of_the_engines_environment_is_handed_on(enclosed: dict[str, Enc
 
 ASKED = """
 import ctypes, os, sys
-from codebotler.simulator.sandbox import forking
+from codebotler.simulator.sandbox import fork_server
 from codebotler.simulator.sandbox import isolation
 {deed}
 signal = ctypes.c_int()
@@ -135,8 +135,8 @@ os._exit(100 + signal.value + 50 * ctypes.CDLL(None).prctl(3))  # PR_GET_DUMPABL
 DEEDS = {
     "pass": 150,
     "os.geteuid = lambda: 1000; isolation.give_up_rights()": 109,  # whoever was root is not dumpable anyhow
-    "forking.go_behind_walls(1, None, 5, os.getppid().to_bytes(8, 'big'))": 159,
-    "forking.go_behind_walls(1, None, 5, (os.getppid() + 1).to_bytes(8, 'big'))": 1,  # orphaned before that
+    "fork_server.isolate(1, None, 5, os.getppid().to_bytes(8, 'big'))": 159,
+    "fork_server.isolate(1, None, 5, (os.getppid() + 1).to_bytes(8, 'big'))": 1,  # orphaned before that
 }
 
 

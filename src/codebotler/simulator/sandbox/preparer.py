@@ -1,4 +1,4 @@
-"""The preparer: a closed process that parses and compiles programs and never runs a line of one.
+"""The preparer: a closed process that parses and compiles programs, and never runs a line of one.
 
 A program runs in several worlds, each time in a fresh child. Compiled here, once and in a process that is
 warm, it costs each of them next to nothing. Code goes through the engine unopened, to the child that runs it.
@@ -7,7 +7,7 @@ warm, it costs each of them next to nothing. Code goes through the engine unopen
 from __future__ import annotations
 
 import os
-import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: nothing can be imported behind the walls
+import unicodedata as _  # noqa: F401 - for "\N{...}" in a program: an isolated process can import nothing
 from _json import encode_basestring_ascii as quoted
 from marshal import dumps
 
@@ -43,7 +43,7 @@ def serve() -> None:
 
 
 def answer(source: str, *, lowercase: bool) -> bytes:
-    """A byte that says what follows; then the code, or why there is none, as JSON."""
+    """PLAIN or IMPORTING and a program's code, or REFUSED and why there is none, as JSON."""
     try:
         code, imports = prepared(source, lowercase=lowercase)
         data = dumps(code, WITHOUT_REFERENCES)

@@ -11,9 +11,9 @@ from posix import getpid, getppid
 
 from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, FORK_SERVER, LIVE_CPU_SECONDS, LIVE_SERVER
 from codebotler.simulator.sandbox.channel import receive, send
-from codebotler.simulator.sandbox.execution import Run
+from codebotler.simulator.sandbox.environment import simulate_environment
+from codebotler.simulator.sandbox.execution import ProgramRun
 from codebotler.simulator.sandbox.isolation import die_with_parent, enclose, give_up_rights, usable_filter
-from codebotler.simulator.sandbox.surroundings import simulate_surroundings
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -21,21 +21,17 @@ if TYPE_CHECKING:
 
     from codebotler.simulator.sandbox.isolation import Filter
 
-DOOR, REPORT = 5, 6
+DOOR, REPORT = 5, 6  # descriptors: by which runs are asked for, and on which numbers are reported
 PID = 8  # bytes of a process id: as an int, a small one would take no memory and a large one some
 DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
 
 
 def serve(role: str) -> None:
-    """Serve runs, one at a time, until the engine closes its end.
-
-    Args:
-        role: of the three kinds of fork servers; programs find the standard library in all but the first.
-    """
+    """Serve runs, one at a time, until the engine closes its end."""
     library, seconds = role != FORK_SERVER, LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
     door = socket(fileno=DOOR)
-    run = Run()
-    simulate_surroundings(run)
+    run = ProgramRun()
+    simulate_environment(run)
     skills, lessons = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
     run.provide(skills)
     if library:
@@ -48,7 +44,7 @@ def serve(role: str) -> None:
     sys.meta_path[:] = [NothingMore() if library else MoreInTheLibrary()]
     give_up_rights()
     seccomp = usable_filter()
-    learn(run, door, lessons)
+    warm_up(run, door, lessons)
     gc.collect()
     gc.freeze()
     report(0 if seccomp is None else 1)
@@ -56,8 +52,8 @@ def serve(role: str) -> None:
         pass
 
 
-def learn(run: Run, door: socket, lessons: int) -> None:
-    """Run the engine's own play here, and not in a child."""
+def warm_up(run: ProgramRun, door: socket, lessons: int) -> None:
+    """Run the engine's own program here, and not in a child."""
     report(lessons)
     names = vars(run.namespace).copy()
     for _ in range(lessons):
@@ -65,29 +61,29 @@ def learn(run: Run, door: socket, lessons: int) -> None:
         os.dup2(line, CHANNEL)
         if line != CHANNEL:
             os.close(line)
-        play(run)
+        execute(run)
         run.forget(names)
     os.close(CHANNEL)
 
 
 class NothingMore:
-    """Finds no module: all that a program can import has been imported."""
+    """An importer that finds nothing: all that a program can import has been imported."""
 
     def find_spec(self, name: str, *_: object) -> NoReturn:
-        """Say so, in Python's words."""
+        """Refuse in Python's words."""
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 
 class MoreInTheLibrary:
-    """Ends a run whose program imports something here, so that it is repeated where the library is loaded."""
+    """An importer that ends the run, so that it is repeated where the library is loaded."""
 
     def find_spec(self, *_: object) -> NoReturn:
-        """Say so to the engine."""
+        """Tell the engine, and end."""
         send('{"end":"again"}')
         os._exit(0)
 
 
-def one_run(door: socket, run: Run, seccomp: Filter | None, seconds: int) -> bool:
+def one_run(door: socket, run: ProgramRun, seccomp: Filter | None, seconds: int) -> bool:
     """Fork the child of one run and report its process id and, at its end, its wait status.
 
     The dead child is reaped only when the next run is asked for, so that until then its id stays its own.
@@ -99,8 +95,8 @@ def one_run(door: socket, run: Run, seccomp: Filter | None, seconds: int) -> boo
     pid = os.fork()
     if pid == 0:
         try:
-            go_behind_walls(line, seccomp, seconds, parent)
-            play(run)
+            isolate(line, seccomp, seconds, parent)
+            execute(run)
             os._exit(0)
         finally:
             os._exit(1)
@@ -111,7 +107,7 @@ def one_run(door: socket, run: Run, seccomp: Filter | None, seconds: int) -> boo
 
 
 def asked_for(door: socket) -> int:
-    """Wait for the next run, bury the last child, and return the descriptor of the new one's line."""
+    """Wait for the next run, reap the last child, and return the new one's socket; -1 where none comes."""
     ancillary = door.recvmsg(1, CMSG_SPACE(DESCRIPTOR))[1]
     if not ancillary:
         return -1
@@ -132,8 +128,8 @@ def end_of(pid: int) -> int:
     return ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
 
 
-def go_behind_walls(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
-    """Be the child of one run: take the channel and close the walls."""
+def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> None:
+    """In the forked child: take the socket as channel, apply limits and seccomp."""
     os.dup2(line, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     die_with_parent()
@@ -142,8 +138,8 @@ def go_behind_walls(line: int, seccomp: Filter | None, seconds: int, parent: byt
     enclose(seccomp, seconds)
 
 
-def play(run: Run) -> None:
-    """Run the program that the engine sends, and say how it ended."""
+def execute(run: ProgramRun) -> None:
+    """Run the program that the engine sends, and report how it ended."""
     code, skills, limits, sure, known = receive()
     if skills != run.skills:
         run.provide(skills)
@@ -151,5 +147,5 @@ def play(run: Run) -> None:
 
 
 def report(number: int) -> None:
-    """Tell the engine a number."""
+    """Report a number to the engine."""
     os.write(REPORT, number.to_bytes(8, sys.byteorder, signed=True))
