@@ -183,7 +183,15 @@ class IsolatedProcess:
         Raises ProtocolError if it is none, and TimeoutError if the process waits for what will never come.
         """
         frame = self.receive_bytes(MAX_FRAME)
-        return None if frame is None else _parsed(frame)
+        if frame is None:
+            return None
+        try:
+            message, end = decode(str(frame, "ascii"))
+        except (ValueError, RecursionError):
+            message, end = None, 0
+        if message is None or end < len(frame):
+            raise ProtocolError("a frame says nothing")
+        return message
 
     def receive_bytes(self, most: int) -> bytes | None:
         """Its next frame, which may have so many bytes; None when it has hung up."""
@@ -285,16 +293,6 @@ def _stat(pid: int) -> list[str]:
 
 # A process puts no spaces around what it says, and so need not be asked for them as `json.loads` does.
 decode: Callable[[str], tuple[object, int]] = json.JSONDecoder().raw_decode
-
-
-def _parsed(frame: bytes) -> object:
-    try:
-        message, end = decode(str(frame, "ascii"))
-    except (ValueError, RecursionError):
-        message, end = None, 0
-    if message is None or end < len(frame):
-        raise ProtocolError("a frame says nothing")
-    return message
 
 
 # --- ending

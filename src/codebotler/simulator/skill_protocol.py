@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from json.encoder import encode_basestring_ascii as quoted
 from math import inf
 from typing import Protocol, TypeAlias
@@ -56,15 +55,6 @@ class SkillPerformer(Protocol):
         """Let time pass, until `now` seconds since the start; back at once when it is to stop."""
 
 
-@dataclass
-class Ledger:
-    """What a run has spent, counted outside the program's process."""
-
-    calls: int = 0
-    text: int = 0  # characters of all texts
-    limit: str | None = None  # the one that was reached, in words
-
-
 class SkillProtocol:
     """One run: answers what the child asks until it ends, and says how it ended.
 
@@ -80,7 +70,8 @@ class SkillProtocol:
     ) -> None:
         self._may_import = may_import
         self.child, self.robot, self.limits = child, robot, robot.rules.limits
-        self.ledger = Ledger()
+        self.calls = self.text = 0  # characters of all texts
+        self.limit: str | None = None  # the one that was reached, in words
         self.errors: list[RobotError] = []
         self._heard = False
         self._skills = {skill.name: skill for skill in robot.skills.rows}
@@ -100,7 +91,7 @@ class SkillProtocol:
         try:
             final = self.talk()
         except TimeoutError:
-            self.ledger.limit = WAITS
+            self.limit = WAITS
             final = None
         except ProtocolError as error:
             self.child.end()
@@ -108,13 +99,13 @@ class SkillProtocol:
         except BaseException:
             self.child.end()
             raise
-        if final is None and self.ledger.limit is None:
+        if final is None and self.limit is None:
             return self._died(self.child.ended())
         self.child.kill()
         self.child.hang_up()
-        if self.ledger.limit is not None:
+        if self.limit is not None:
             line = final.get("line") if final else None
-            return self._outcome(Status.TIMEOUT, "TimeoutError", self.ledger.limit, line)
+            return self._outcome(Status.TIMEOUT, "TimeoutError", self.limit, line)
         return self._ended(final or {})
 
     def talk(self) -> dict[str, object] | None:
@@ -131,7 +122,7 @@ class SkillProtocol:
                         self.child.send((kind, value, self._known() if changed else {}, self.robot.now))
                 case _:
                     raise ProtocolError("a request is malformed")
-            overrun += self.ledger.limit is not None
+            overrun += self.limit is not None
             if overrun > OVERRUN:
                 return None
         return None
@@ -139,36 +130,28 @@ class SkillProtocol:
     def _answer(self, name: str, values: list[object], now: float) -> SkillAnswer:
         if self.robot.is_live:
             self.child.reset_patience()
-        elif self.ledger.limit is None:
+        elif self.limit is None:
             self._let_time_pass(now)
-        if self.ledger.limit is None:
-            if name in self._skills:
-                return self._perform(self._skills[name], values)
-            if name == "sleep" and self.robot.is_live:
-                return self._sleep(values)
-            self.ledger.limit = self._beyond(name)
-        return STOP
-
-    def _sleep(self, values: list[object]) -> SkillAnswer:
-        match values:
-            case [float(seconds)] if 0 <= seconds < inf:
+        if self.limit is not None:
+            return STOP
+        if name in self._skills:
+            return self._perform(self._skills[name], values)
+        match name, values:
+            case "sleep", [float(seconds)] if self.robot.is_live and 0 <= seconds < inf:
                 self.robot.sleep_until(self.robot.now + seconds)
                 return ("ok", None, True)
-        raise ProtocolError("nobody can sleep like that")
-
-    def _beyond(self, name: str) -> str:
-        """The limit that is reached by a request other than a skill or a sleep."""
-        match name:
-            case "wait":
-                return WAITS
-            case "too-long":
-                return f"a text of more than {self.limits.text:,} characters"
-        raise ProtocolError("there is no such skill")
+            case "wait", _:
+                self.limit = WAITS
+            case "too-long", _:
+                self.limit = f"a text of more than {self.limits.text:,} characters"
+            case _:
+                raise ProtocolError("there is no such skill")
+        return STOP
 
     def _let_time_pass(self, now: float) -> None:
         if now > self.limits.seconds:
             now = self.limits.seconds
-            self.ledger.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
+            self.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
         if now > self.robot.now:  # if it is less, the program has found the channel, and deceives itself
             self.robot.sleep_until(float(now))
 
@@ -179,7 +162,7 @@ class SkillProtocol:
     def _perform(self, skill: Skill, values: list[object]) -> SkillAnswer:
         arguments = _arguments(skill, values)
         self._spend(arguments)
-        if self.ledger.limit is not None:
+        if self.limit is not None:
             return STOP
         try:
             result = self.robot.perform(skill.name, arguments)
@@ -189,19 +172,18 @@ class SkillProtocol:
         return ("ok", result, skill.name not in self.robot.only_looks)
 
     def _spend(self, arguments: list[Argument]) -> None:
-        ledger, limits = self.ledger, self.limits
-        longest = 0
+        limits, longest = self.limits, 0
         for argument in arguments:
             texts = (argument,) if isinstance(argument, str) else [option.text for option in argument]
             longest = max(longest, *map(len, texts), 0)
-            ledger.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - 1)
-        ledger.calls += 1
-        if ledger.calls > limits.calls:
-            ledger.limit = f"{limits.calls:,} skill calls"
+            self.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - 1)
+        self.calls += 1
+        if self.calls > limits.calls:
+            self.limit = f"{limits.calls:,} skill calls"
         elif longest > limits.text:
-            ledger.limit = f"a text of more than {limits.text:,} characters"
-        elif ledger.text > limits.trace:
-            ledger.limit = f"texts of more than {limits.trace:,} characters in all"
+            self.limit = f"a text of more than {limits.text:,} characters"
+        elif self.text > limits.trace:
+            self.limit = f"texts of more than {limits.trace:,} characters in all"
 
     def _ended(self, final: dict[str, object]) -> Outcome:
         line = final.get("line")

@@ -3,7 +3,7 @@
 A program's first line says what it tries. Comments below say how its run must end (`# ends: STATUS KIND`),
 what its robot must have done by then (`# does: KIND TEXT`, one line an event; nothing by default) and whether
 that is what was asked of it (`# earns: yes`; no by default). `@NAME@` stands for something real that it could
-reach if a wall were missing.
+reach if a layer of isolation were missing.
 """
 
 import _ctypes
@@ -112,7 +112,7 @@ def done(outcome: Outcome) -> tuple[str, ...]:
     return counted(map(rendered, outcome.trace))
 
 
-# --- what a program could reach if a wall were missing
+# --- what a program could reach if a layer of isolation were missing
 
 
 def processes() -> dict[int, tuple[int, str]]:
@@ -304,7 +304,9 @@ def reach(
     reach.run(HONEST)  # by now all processes are there
     before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
-    yield reach
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("codebotler.simulator.preparer.SERVES", 10_000)  # one that is replaced would look new
+        yield reach
     for pid in carry_the_marker():  # a test has failed; nothing of it stays
         os.kill(pid, signal.SIGKILL)
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 0, 0, 0, 0) == 0

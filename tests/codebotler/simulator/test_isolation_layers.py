@@ -1,4 +1,4 @@
-"""Each wall around a child holds by itself, with all others left out; without it, the same deed is done."""
+"""Each layer of isolation holds by itself, with all others left out; without it, the same deed is done."""
 
 import os
 import platform
@@ -42,7 +42,7 @@ def limit(name):
 
 {before}
 try:
-    {wall}
+    {layer}
     {deed}
     tell("done")
 except OSError as error:
@@ -55,9 +55,9 @@ def indented(code: str) -> str:
     return code.strip().replace("\n", "\n    ")
 
 
-def result(wall: str, deed: str, before: str, folder: str = "/") -> str:
-    """What a process says that puts up a wall and then does something; or the signal that ended it."""
-    script = SCRIPT.format(before=before, wall=wall, deed=indented(deed))
+def result(layer: str, deed: str, before: str, folder: str = "/") -> str:
+    """What a process says that puts up a layer and then does something; or the signal that ended it."""
+    script = SCRIPT.format(before=before, layer=layer, deed=indented(deed))
     process = subprocess.run(
         [sys.executable, "-B", "-c", script],
         capture_output=True,
@@ -73,17 +73,17 @@ def result(wall: str, deed: str, before: str, folder: str = "/") -> str:
 
 @dataclass(frozen=True)
 class Deed:
-    """Something a process does, and what it comes to behind one wall.
+    """Something a process does, and what it comes to behind one layer.
 
     Args:
-        wall: puts up the wall.
+        layer: puts up the layer.
         deed: what is done.
         comes_to: what the process says then: `done`, the name of an error or of the signal that ended it.
-        before: what is done before, with and without the wall.
-        bare: what the deed comes to without the wall.
+        before: what is done before, with and without the layer.
+        bare: what the deed comes to without the layer.
     """
 
-    wall: str
+    layer: str
     deed: str
     comes_to: str
     before: str = ""
@@ -120,7 +120,7 @@ A_SHORT_WAIT = """
 word, a_moment = (ctypes.c_int * 1)(), (ctypes.c_long * 2)(0, 1_000_000)
 futex = dict(x86_64=202, aarch64=98).get(platform.machine())
 """
-A_QUEUE = "succeed(libc.mq_open(b'/walls', os.O_CREAT | os.O_RDWR, 0o600, None))\nlibc.mq_unlink(b'/walls')"
+A_QUEUE = "succeed(libc.mq_open(b'/layers', os.O_CREAT | os.O_RDWR, 0o600, None))\nlibc.mq_unlink(b'/layers')"
 DUMP = """
 dumper = os.fork()
 if dumper == 0:
@@ -154,7 +154,7 @@ DEEDS = {
     "seccomp: timer": denied("signal.setitimer(signal.ITIMER_REAL, 100)"),
     "seccomp: wait": denied("select.select([], [], [], 0)"),
     "seccomp: user": denied("os.setuid(os.getuid())"),
-    "seccomp: prctl": denied("isolation.hide_memory()"),
+    "seccomp: prctl": denied("isolation.prctl(isolation.PR_SET_DUMPABLE, 0)"),
     "seccomp: limit": denied("succeed(libc.setrlimit(4, bytes(16)))"),
     "seccomp: true chance": denied("os.getrandom(1)"),
     "seccomp: descriptor": denied("os.dup(3)"),
@@ -184,7 +184,7 @@ DEEDS = {
     "AS": Deed("limit('AS')", "succeed(libc.mmap(None, 10**9, READABLE, PRIVATE, -1, 0))", "ENOMEM"),
     "CPU": Deed("isolation.limit_time(1)", "while time.process_time() < 1.5: pass", "SIGXCPU"),
     "death with the parent": Deed("isolation.die_with_parent()", OUTLIVE, "", AN_ORPHAN),
-    "hidden memory": Deed("isolation.hide_memory()", LOOK, "EACCES", SEEN_BY_OTHERS),
+    "hidden memory": Deed("isolation.prctl(isolation.PR_SET_DUMPABLE, 0)", LOOK, "EACCES", SEEN_BY_OTHERS),
 }
 
 
@@ -192,7 +192,7 @@ DEEDS = {
 def test_wall_holds_by_itself(name: str) -> None:
     case = DEEDS[name]
     assert result("pass", case.deed, case.before) == case.bare
-    assert result(case.wall, case.deed, case.before) == case.comes_to
+    assert result(case.layer, case.deed, case.before) == case.comes_to
 
 
 # --- what only root has to lose
@@ -201,7 +201,7 @@ def test_wall_holds_by_itself(name: str) -> None:
 @pytest.fixture(scope="module")
 def folder() -> Iterator[str]:
     """A folder that everybody may enter, with a file of root's and a program that makes its user root."""
-    path = Path(tempfile.mkdtemp(prefix="walls-"))
+    path = Path(tempfile.mkdtemp(prefix="layers-"))
     path.chmod(0o755)
     (path / "secret").touch(0o600)
     shutil.copyfile(shutil.which("id") or "", path / "id")
@@ -244,7 +244,7 @@ def test_wall_holds_root_by_itself(folder: str, name: str) -> None:
     if bare != case.bare and name in ("no new rights", "dumps of memory"):
         pytest.skip(f"this machine does not allow the deed to anybody ({bare})")
     assert bare == case.bare
-    assert result(case.wall, case.deed, case.before, folder) == case.comes_to
+    assert result(case.layer, case.deed, case.before, folder) == case.comes_to
 
 
 # --- other ways into the kernel

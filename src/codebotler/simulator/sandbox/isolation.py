@@ -23,7 +23,7 @@ def give_up_rights() -> None:
     set_limit("AS", MEMORY)
     become_nobody()
     die_with_parent()
-    hide_memory()
+    prctl(PR_SET_DUMPABLE, 0)  # others of the same user can neither trace this process nor read its memory
     refuse_new_rights()
 
 
@@ -68,11 +68,6 @@ def become_nobody() -> None:
 def die_with_parent() -> None:
     """Be killed when the thread ends that has started this process; a change of user undoes this."""
     prctl(PR_SET_PDEATHSIG, SIGKILL)
-
-
-def hide_memory() -> None:
-    """Keep other processes of the same user from tracing this one and from reading its memory."""
-    prctl(PR_SET_DUMPABLE, 0)
 
 
 def refuse_new_rights() -> None:
