@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterable, Iterator
 
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome
 from codebotler.core.world import World
-from codebotler.simulator.pool import WorkerPool
+from codebotler.simulator.pool import WorkerPool, cores
 from codebotler.simulator.robot import Behaviour, SimulatedRobot
 from codebotler.simulator.rules import PAPER, Rules
 
@@ -23,22 +22,8 @@ def run(
     behaviours: dict[str, Behaviour] | None = None,
     require_isolation: bool = False,
 ) -> Iterator[Outcome]:
-    """Run programs in worlds and yield their outcomes in the order of the pairs.
-
-    Args:
-        pairs: source of a program and the world to run it in; read as they are needed.
-        workers: how many runs go on at the same time; as many as there are processors by default.
-        rules: how the worlds are simulated.
-        skills: the skills that programs can call.
-        behaviours: what each skill does; those of the eight skills by default.
-        require_isolation: whether to refuse where the kernel has no seccomp, rather than warn.
-
-    Raises:
-        UserError: there are no workers.
-        EngineError: no isolated process could be started.
-    """
-    workers = (os.cpu_count() or 1) if workers is None else workers
-    with WorkerPool(workers, require_isolation=require_isolation) as pool:
+    """Run programs in worlds, read as they are needed, and yield their outcomes in the order of the pairs."""
+    with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
         def run_pair(pair: tuple[str, World]) -> Outcome:
             source, world = pair

@@ -116,22 +116,15 @@ def compiled(source: str, name: str) -> bytes:
 
 
 class IsolatedProcess:
-    """One isolated process, seen from outside.
-
-    Args:
-        find_pid: returns its process id, which stays its own until the next run.
-        channel: the socket to it.
-        wait: waits for its end and returns its exit status, or minus the signal.
-        has_seccomp: whether its seccomp filter shows from outside that it is isolated by now.
-    """
+    """One isolated process, seen from outside."""
 
     def __init__(
         self,
-        find_pid: Callable[[], int],
+        find_pid: Callable[[], int],  # which stays its own until the next run
         channel: socket.socket,
-        wait: Callable[[], int],
+        wait: Callable[[], int],  # for its end; returns the exit status, or minus the signal
         *,
-        has_seccomp: bool,
+        has_seccomp: bool,  # so that it can be seen from outside whether it is isolated by now
     ) -> None:
         self._find_pid, self._channel, self._wait = find_pid, channel, wait
         silence = struct.pack("ll", SILENCE, 0)

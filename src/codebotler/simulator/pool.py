@@ -17,7 +17,6 @@ from itertools import islice
 from queue import SimpleQueue
 from typing import Any, ParamSpec, Self, TypeVar
 
-from codebotler.core.arguments import expect_whole
 from codebotler.simulator.worker import EngineError, Worker
 
 LOG = logging.getLogger("codebotler.engine")
@@ -38,17 +37,10 @@ Arguments = ParamSpec("Arguments")
 class WorkerPool:
     """Threads that each own one worker; use as a context manager.
 
-    Args:
-        workers: how many, at least 1.
-        require_isolation: whether to refuse where the kernel has no seccomp, rather than warn.
-
-    Raises:
-        UserError: there are less than 1.
-        EngineError: no worker can be started, or the isolation that is required is missing.
+    Where the kernel has no seccomp, this warns, or refuses if isolation is required.
     """
 
     def __init__(self, workers: int, *, require_isolation: bool = False) -> None:
-        expect_whole(workers, "the number of workers", least=1)
         if sys.platform == "win32":
             raise EngineError(ON_WINDOWS)
         self.workers = workers
@@ -129,13 +121,8 @@ class WorkerPool:
         """Like `map`, in threads, calling the function once for equal keys and reading ahead a little.
 
         While the next result is long in coming, more is read, so that the other threads have work. What the
-        keys or a call raise comes in its place among the results.
-
-        Args:
-            function: what to call with each key.
-            keys: read as they are needed.
-            name: a short name of a key, which no other key has.
-            then: what to call with each result, in the thread that asks for them; its result is pickled.
+        keys or a call raise comes in its place among the results. `name` gives each key a short name of its
+        own. `then` is called with each result in the thread that asks for them, and its own is pickled.
         """
         failed: dict[bytes, BaseException] = {}
         waiting: deque[bytes] = deque()

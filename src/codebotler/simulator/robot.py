@@ -92,7 +92,7 @@ class SimulatedRobot:
         self.rules, self.skills = rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
         if missing := [name for name in skills if name not in self.behaviours]:
-            raise UserError(f'no behaviour says what the skill "{missing[0]}" does')
+            raise UserError(f'the skill "{missing[0]}" has no behaviour: say in `behaviours` what it does')
         self.never_fails = frozenset(name for name, does in self.behaviours.items() if does is say)
         self.only_looks = frozenset(name for name, does in self.behaviours.items() if does in LOOKING)
         self.rooms = tuple(room.name for room in world.rooms)

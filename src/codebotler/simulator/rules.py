@@ -22,35 +22,24 @@ class Limits:
 
 @dataclass(frozen=True)
 class Rules:
-    """How a suite wants its worlds simulated; the defaults are those of the paper's suite.
+    """How a suite wants its worlds simulated; the defaults are those of the paper's suite."""
 
-    Args:
-        literals: `lowercase` lowers the string literals of a program before the run, as the authors of the
-            paper did; `as-written` is what a robot does.
-        matching: how a request finds a room, an object or a person: if the label is found anywhere in it
-            (`label-in-request`), or as whole words, in the singular or the plural (`whole-words`).
-        people: who answers to which name: everybody to any (`answer-to-any-name`), or each to their own and
-            to a word for people, as well as to no name at all (`own-name-or-word`).
-        words_for_people: regexes of the words for people, for `own-name-or-word`.
-        words_for_yes: regexes of what else an option may say that means yes, for people who answer `yes`.
-        words_for_no: the same for `no`. An option in which one of them is found is never a yes; and a single
-            option that says neither is what who answers yes chooses.
-        events: whether drives, picks and places are recorded by the words of the request (`as-requested`), or
-            by the room that was reached and the thing that was moved (`as-happened`). A drive that reaches no
-            room is then no event.
-        limits: what a run may spend.
-        clock_starts: what the program's clock shows when the run starts.
-    """
-
+    # The string literals of a program are lowered before the run, as the authors of the paper did.
     literals: Literal["lowercase", "as-written"] = "lowercase"
+    # A label of the world is looked for anywhere in a request, or as whole words in the singular or plural.
     matching: Matching = "label-in-request"
+    # Everybody answers to any name, or each to their own, to a word for people, and to no name at all.
     people: Literal["answer-to-any-name", "own-name-or-word"] = "answer-to-any-name"
-    words_for_people: tuple[str, ...] = ()
+    words_for_people: tuple[str, ...] = ()  # regexes
+    # Regexes of what else an option may say that means yes or no. An option in which a no is found is never a
+    # yes, and people who answer yes choose a single option that says neither.
     words_for_yes: tuple[str, ...] = ()
     words_for_no: tuple[str, ...] = ()
+    # Drives, picks and places are recorded in the words of the request, or by the room that was reached and
+    # the thing that was moved; a drive that reaches no room is then no event.
     events: Literal["as-requested", "as-happened"] = "as-requested"
     limits: Limits = field(default_factory=Limits)
-    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)
+    clock_starts: datetime = datetime(2024, 1, 1, 12, tzinfo=UTC)  # what clocks show when the run starts
 
 
 PAPER = Rules()

@@ -56,13 +56,9 @@ class SkillPerformer(Protocol):
 
 
 class SkillProtocol:
-    """One run: answers what the child asks until it ends, and says how it ended.
+    """One run: answers what a fresh child asks until it ends, and says how it ended.
 
-    Args:
-        child: the fresh child.
-        code: the program, as the preparer made it.
-        robot: executes its skills.
-        may_import: whether the standard library is there, so that nothing is gained by another run.
+    Where it may import, the standard library is there, and nothing is gained by another run.
     """
 
     def __init__(

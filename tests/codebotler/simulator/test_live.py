@@ -75,7 +75,7 @@ def test_clock_is_the_robots_and_sleeping_is_asked_of_it(worker: Worker) -> None
     assert outcome == Outcome(Status.FINISHED, tuple(Event("say", text) for text in happened))
 
 
-def test_ticks_are_counted_anew_after_each_skill_and_sleep(worker: Worker) -> None:
+def test_fuel_is_counted_anew_after_each_skill_and_sleep(worker: Worker) -> None:
     turns = "    for _ in range(150_000): pass\n"
     both = f"def task_program():\n{turns}    say('a')\n{turns}    time.sleep(1)\n{turns}"
     assert done(worker, both)[1].status == Status.FINISHED

@@ -25,7 +25,7 @@ MAX_CODE = 10_000_000  # bytes of a program's compiled code
 PROGRAM = "<program>"  # the file that a program's code says it comes from
 
 # Names of the functions that programs call without knowing; no source text can spell them.
-TICK, ENTRY, ENTER, BY_NAME = "<tick>", "<entry>", "<enter>", "<by-name>"
+FUEL, ENTRY, ENTER, BY_NAME = "<fuel>", "<entry>", "<enter>", "<by-name>"
 
 # How a skill is called: waiting for its result; not waiting, since there is none and it cannot fail; and
 # waiting only until the result is known, which then stays the same until the robot acts.

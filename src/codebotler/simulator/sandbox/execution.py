@@ -11,7 +11,7 @@ from marshal import loads
 from sys import _getframe as getframe
 from sys import setrecursionlimit
 
-from codebotler.simulator.sandbox import ACTS, BY_NAME, ENTER, ENTRY, LOOKS, PROGRAM, TELLS, TICK
+from codebotler.simulator.sandbox import ACTS, BY_NAME, ENTER, ENTRY, FUEL, LOOKS, PROGRAM, TELLS
 from codebotler.simulator.sandbox.channel import receive, send
 
 TYPE_CHECKING = False
@@ -47,8 +47,8 @@ class ProgramRun:
         self.known: dict[str, Any] = {}  # what looking shows now, by request
         self.namespace = types.ModuleType("__main__")
         # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
-        tick = self.new_tick()
-        counters = {TICK: tick, ENTRY: lambda: tick(), ENTER: self.enter, BY_NAME: self.start_task}  # noqa: PLW0108 - see above
+        use_fuel = self.fuel_counter()
+        counters = {FUEL: use_fuel, ENTRY: lambda: use_fuel(), ENTER: self.enter, BY_NAME: self.start_task}  # noqa: PLW0108 - see above
         vars(builtins).update(counters)
 
     def provide(self, skills: Skills) -> None:
@@ -139,16 +139,16 @@ class ProgramRun:
             and task.__code__ not in self.codes
         )
 
-    def new_tick(self) -> Callable[[], None]:
+    def fuel_counter(self) -> Callable[[], None]:
         """The function that uses one unit of fuel and, once all is spent, raises each time it is called."""
         self.refuel()
 
-        def tick() -> None:
+        def use_fuel() -> None:
             if self.count() > self.fuel or self.spent:
                 self.spent = True
                 raise LimitReachedError
 
-        return tick
+        return use_fuel
 
     def refuel(self) -> None:
         """Count fuel from the start."""
@@ -290,7 +290,7 @@ NAME_OF: Callable[[type], str] = type.__dict__["__name__"].__get__
 
 
 class LimitReachedError(BaseException):
-    """The run has reached a limit; every further tick and skill call raises it again."""
+    """The run has reached a limit; any further use of fuel or of a skill raises it again."""
 
 
 class SkillError(Exception):

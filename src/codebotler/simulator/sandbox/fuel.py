@@ -6,7 +6,7 @@ import ast
 import types
 from collections.abc import Iterator
 
-from codebotler.simulator.sandbox import BY_NAME, ENTER, ENTRY, PROGRAM, TICK
+from codebotler.simulator.sandbox import BY_NAME, ENTER, ENTRY, FUEL, PROGRAM
 
 TASK = "task_program"
 TOO_LARGE = "the program is too large, or nested too deeply"
@@ -82,16 +82,16 @@ def use_fuel(node: ast.AST) -> None:
         case ast.FunctionDef() | ast.AsyncFunctionDef():
             insert_head(node, ENTRY)
         case ast.For() | ast.AsyncFor() | ast.While() | ast.ExceptHandler():
-            node.body.insert(0, call(TICK, node.body[0]))
+            node.body.insert(0, call(FUEL, node.body[0]))
         case ast.Try() | ast.TryStar():
             if node.finalbody:
-                node.finalbody.insert(0, call(TICK, node.finalbody[0]))
+                node.finalbody.insert(0, call(FUEL, node.finalbody[0]))
         case ast.Lambda():
-            tick = call(ENTRY, node.body).value
-            node.body = ast.copy_location(ast.BoolOp(ast.Or(), [tick, node.body]), node.body)
+            spend = call(ENTRY, node.body).value
+            node.body = ast.copy_location(ast.BoolOp(ast.Or(), [spend, node.body]), node.body)
         case ast.comprehension():
-            tick = call(TICK, node.iter).value
-            node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), tick), node.iter))
+            spend = call(FUEL, node.iter).value
+            node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), spend), node.iter))
         case ast.Call(func=ast.Name(id=name)) if name == TASK:
             start = call(BY_NAME, node.func).value
             node.func = ast.copy_location(ast.BoolOp(ast.Or(), [start, node.func]), node.func)
