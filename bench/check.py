@@ -16,7 +16,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from codebotler.checking.check import SAMPLES, CheckSettings, Sample, check_on
+from codebotler.checking.check import check_on
+from codebotler.checking.problems import Sample
+from codebotler.checking.sampled import SAMPLES, CheckSettings
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool

@@ -200,7 +200,7 @@ def returned() -> Iterator[object]:
     yield from roboeval.recorded_completions("recorded:careful", load_suite())
     yield codebotler.program_of(LONG)
     for check in (codebotler.check(LONG), codebotler.check(LONG.replace(", 1)", ")").replace("say(x)", ""))):
-        yield from (check, check.plan, *check.samples, *(sample.outcome for sample in check.samples))
+        yield from (check, check.room_map, *check.samples, *(sample.outcome for sample in check.samples))
     generation = codebotler.generate(load_suite().tasks["SayGoodDay"].prompts[0])
     (attempt,) = generation.attempts
     yield from (generation, attempt, attempt.prompt, attempt.reply)

@@ -1,16 +1,15 @@
 """Files of each kind, damaged in each of five ways, are read or refused in a sentence with a line."""
 
 import random
-import warnings
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
 
 import pytest
 
-from codebotler.core.errors import UserError, YamlFile
-from codebotler.core.tracefile import OutcomeFile
+from codebotler.core.errors import UserError
 from codebotler.core.world import WorldFile
+from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.load import SUITES, read_task
 from roboeval.suites.schema import SuiteFile
 from roboeval.suites.solutions import SolutionsFile
@@ -33,15 +32,6 @@ rules:
   limits: {calls: 7, seconds: 3.5, ticks: 9}
   clock_starts: 2024-01-01T12:00:00+00:00
 """
-OUTCOME = """\
-status: robot-error
-error: {kind: K, message: m}
-line: 3
-trace:
-- [goto, lab]
-- [ask, q, [a, {no text: b}], a]
-- [check, x, true]
-"""
 BITS = (
     *("[", "]", "{", "}", ":", " - ", "\n", "  ", "'", '"', "|", ">", "&a ", "*a ", "? ", "#", "%", "@", "`"),
     *("!!set ", "!!int ", "!!float ", "!!bool ", "!!timestamp ", "!!str ", "!!omap ", "!!null ", "!x "),
@@ -49,7 +39,6 @@ BITS = (
     *(
         "\0",
         "\x07",
-        "\ud800",
         "\x85",
         "\u2028",
         "\ufeff",
@@ -70,10 +59,6 @@ def world(file: YamlFile) -> object:
 
 def solutions(file: YamlFile) -> object:
     return file.validate(SolutionsFile)
-
-
-def outcome(file: YamlFile) -> object:
-    return file.validate(OutcomeFile).outcome(file)
 
 
 def suite(file: YamlFile) -> object:
@@ -117,7 +102,6 @@ def damaged(text: str, chance: random.Random, kind: int) -> str:
     [
         pytest.param([(WORLD, world)], id="worlds"),
         pytest.param([(SUITE, suite)], id="suites"),
-        pytest.param([(OUTCOME, outcome)], id="outcomes"),
         pytest.param(TASKS, id="tasks"),
         pytest.param(SOLUTIONS, id="solutions"),
     ],
@@ -140,9 +124,7 @@ def test_a_damaged_file_is_read_or_refused_in_a_sentence_with_a_line(files: list
 
 def refusal(text: str, read: Read) -> UserError | None:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", FutureWarning)  # of regexes that are odd but valid
-            read(YamlFile(text, "w.yaml"))
+        read(YamlFile(text, "w.yaml"))
     except UserError as error:
         return error
     return None

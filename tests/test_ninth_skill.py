@@ -8,10 +8,10 @@ import pytest
 
 from codebotler.checking.check import check
 from codebotler.core.errors import UserError
-from codebotler.core.program import Problem, Program
+from codebotler.core.program import Flaw, Program
 from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status
-from codebotler.core.tracefile import outcome_yaml, read_outcome
+from codebotler.core.tracefile import trace_data, trace_from
 from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse
@@ -107,15 +107,7 @@ def test_formula_judges_it(outcomes: dict[str, Outcome]) -> None:
     assert not holds(parse('tr.Exists(wave("carol"))', skills=TABLE), trace)
 
 
-def test_its_events_are_read_from_files(outcomes: dict[str, Outcome], tmp_path: Path) -> None:
-    path = tmp_path / "outcome.yaml"
-    path.write_text(outcome_yaml(outcomes["waves"], TABLE))
-    assert read_outcome(path, TABLE) == outcomes["waves"]
-    with pytest.raises(UserError, match='"wave"'):
-        read_outcome(path)
-
-
-def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others(tmp_path: Path) -> None:
+def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others() -> None:
     asks = Skill(
         "vote",
         (Parameter("about"), Parameter("options", list, "list[str]")),
@@ -130,10 +122,7 @@ def test_a_ninth_skill_that_asks_or_looks_is_written_and_read_as_the_others(tmp_
         Event("vote", "tea?", (Option("a"),), "a"),
         Event("smell", "tea", found=True),
     )
-    outcome = Outcome(Status.FINISHED, trace)
-    path = tmp_path / "outcome.yaml"
-    path.write_text(outcome_yaml(outcome, table))
-    assert read_outcome(path, table) == outcome
+    assert trace_from(trace_data(trace, table)) == trace
 
 
 def test_a_suite_whose_formulas_know_it_draws_other_worlds(tmp_path: Path) -> None:
@@ -171,5 +160,5 @@ def test_static_check_knows_it() -> None:
     assert Program(PROGRAMS["waves"]).problems(TABLE) == ()
     assert [problem.kind for problem in Program(PROGRAMS["waves"]).problems()] == ["NameError", "NameError"]
     (problem,) = Program(PROGRAMS["too many"]).problems(TABLE)
-    assert isinstance(problem, Problem)
+    assert isinstance(problem, Flaw)
     assert (problem.line, problem.kind) == (2, "TypeError")

@@ -20,7 +20,8 @@ __all__ = [
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from codebotler.checking.check import Check, Problem, check
+    from codebotler.checking.check import check
+    from codebotler.checking.problems import Check, Problem
     from codebotler.core.errors import UserError
     from codebotler.generation.generate import Generation, generate
     from codebotler.models.base import ModelError
@@ -35,11 +36,11 @@ else:  # each name is imported when it is first used
         {
             "UserError": "core.errors",
             "BadInput": "core.errors",
-            "Check": "checking.check",
+            "Check": "checking.problems",
             "EngineError": "simulator.worker",
             "Generation": "generation.generate",
             "ModelError": "models.base",
-            "Problem": "checking.check",
+            "Problem": "checking.problems",
             "check": "checking.check",
             "generate": "generation.generate",
             "program_of": "prompts.extract",

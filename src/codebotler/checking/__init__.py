@@ -1,4 +1,4 @@
-"""Programs checked before a robot moves: by their text, and in sampled worlds.
+"""Checking programs before a robot moves: by their text, and by runs in sampled worlds.
 
 Start with `check.py`; `problems.py` is what a check finds.
 """

@@ -1,86 +1,28 @@
-"""Checks a program before a robot moves: by its text, and in imagined worlds."""
+"""The check of a program before a robot moves: its text, then runs in sampled worlds."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import replace
 
-from codebotler.checking.problems import Check, Problem, Sample, failures, no_room
-from codebotler.checking.reachability import reach
-from codebotler.checking.room_names import MOST_ROOMS, fixed_drives, lists_rooms, named_rooms
-from codebotler.core.arguments import expect_skills, expect_text, expect_texts, expect_whole
-from codebotler.core.errors import UserError
-from codebotler.core.program import Problem as Flaw
-from codebotler.core.program import Program, parsed
+from codebotler.checking.problems import Check, Problem, Sample
+from codebotler.checking.room_names import MOST_ROOMS, lists_rooms, named_rooms
+from codebotler.checking.sampled import SAMPLES, CheckSettings, SampledRuns, failures, run_sample
+from codebotler.checking.static import static_problems
+from codebotler.core.errors import UserError, expect_list
+from codebotler.core.program import Flaw, parsed, tree_of
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.trace import Outcome, Status
-from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import Behaviour
-from codebotler.simulator.rules import Rules
-from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
+from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Worker
 
-__all__ = [
-    "MORE",
-    "SAMPLES",
-    "Check",
-    "CheckSettings",
-    "Problem",
-    "Runner",
-    "Sample",
-    "check",
-    "check_on",
-    "imagined",
-]
-
-SAMPLES = 5
-MOST_SAMPLES = 10_000
-"""Of one check, which holds all of its runs."""
-
-MORE = 20
-"""Worlds that are drawn in addition where the program waits in vain in all that were drawn before."""
-
-START = "start_loc"
-"""Where the robot starts if nobody says otherwise; models know it by this name from the paper."""
-
-GUESSES = 3
-"""How often what a program drives to while it runs is added to the rooms, and it is run again."""
-
-SOME_ROOMS = ("room 1", "room 2")
-"""For a program that drives wherever it is told to, and names no room itself."""
-
-
-@dataclass(frozen=True)
-class CheckSettings:
-    """How programs are checked.
-
-    Args:
-        samples: how many worlds to imagine, 1 to 10,000.
-        seed: from which they are drawn: the same ones on every machine.
-        strict: whether to draw also what the program takes for granted.
-        rules: how a run is simulated.
-        skills: what the program may call.
-        behaviours: what each skill does; those of the eight skills by default.
-
-    Raises:
-        UserError: a number is none, or out of its range.
-    """
-
-    samples: int = SAMPLES
-    seed: int = 0
-    strict: bool = False
-    rules: Rules = AS_WRITTEN
-    skills: SkillTable = SKILLS
-    behaviours: Mapping[str, Behaviour] | None = None
-
-    def __post_init__(self) -> None:
-        expect_whole(self.samples, "the number of samples", least=1, most=MOST_SAMPLES)
-        expect_whole(self.seed, "the seed")
+START = "start_loc"  # models know it by this name from the paper
+GUESSES = 3  # times that the rooms to which a program drives are added to those in its text
+SOME_ROOMS = ("room 1", "room 2")  # for a program that drives to all rooms and names none
 
 
 def check(
@@ -93,173 +35,96 @@ def check(
     strict: bool = False,
     skills: SkillTable = SKILLS,
     behaviours: Mapping[str, Behaviour] | None = None,
-    workers: int | None = None,
+    workers: int = 1,
     pool: WorkerPool | None = None,
-    plan: RoomMap | None = None,
+    room_map: RoomMap | None = None,
 ) -> Check:
-    """Say what is wrong with a program, as far as its text and some imagined worlds tell.
+    """Find what is wrong with a program, by its text and by runs in sampled worlds.
 
     Args:
         program: its source, which need not even parse.
-        rooms: the names of the rooms, in order, as a world file writes them; without them they are taken from
-            the program.
-        start: the room in which the robot starts, one of `rooms` where there are any; without it `start_loc`
-            if that is a room, or the first one.
-        samples: how many worlds to imagine, 1 to 10,000.
-        seed: from which they are drawn: the same ones on every machine.
+        rooms: the names of the rooms, in order, as a world file has them; by default those in the program.
+        start: the room in which the robot starts, one of `rooms` where there are any; by default `start_loc`
+            if that is a room, or else the first one.
+        samples: how many worlds to sample, 1 to 10,000.
+        seed: of the worlds: the same ones on every machine.
         strict: whether to draw also what the program takes for granted.
         skills: what the program may call.
         behaviours: what each skill does; those of the eight skills by default.
-        workers: how many runs go on at the same time; one by default, which is enough for one program.
-        pool: what runs programs, for who checks many; without it, it is started and ended. What runs on a
-            worker itself calls `check_on`.
-        plan: the rooms and the start, in the place of those two, for who knows more of them.
+        workers: how many runs go on at the same time.
+        pool: what runs the programs, to be used for many checks; by default a new one.
+        room_map: the rooms and the start, in place of those two, where more is known of them.
 
     Raises:
-        UserError: the name of a room is no regular expression, the robot starts in none of the rooms, or an
-            argument is not of its kind or range.
+        UserError: the name of a room is no regular expression, the robot starts in none of the rooms, or the
+            number of samples or workers is out of range.
         EngineError: no isolated process could be started.
     """
-    expect_text(program, "the program")
-    expect_texts(rooms or (), "the rooms")
-    if start is not None:
-        expect_text(start, "the start")
-    expect_skills(skills)
+    expect_list(rooms, "the rooms")
     settings = CheckSettings(samples, seed, strict, AS_WRITTEN, skills, behaviours)
-    plan = plan or _plan(program, rooms, start, skills)
-    with nullcontext(pool) if pool else WorkerPool(1 if workers is None else workers) as open_pool:
+    known = room_map or _room_map(program, rooms, start, skills)
+    with nullcontext(pool) if pool else WorkerPool(workers) as opened:
 
-        def run(plan: RoomMap, lots: Iterable[FactSampler]) -> Iterator[Sample]:
-            return open_pool.map_distinct(
-                lambda lot: imagined(open_pool.here(), program, plan, lot, settings),
-                lots,
-                name=lambda lot: digest(str(lot)),
-            )
+        def one(room_map: RoomMap, sampler: FactSampler) -> Sample:
+            return run_sample(opened.here(), program, room_map, sampler, settings)
 
-        return _checked(program, plan, settings, Runner(run, open_pool.workers))
+        def run(room_map: RoomMap, samplers: Iterable[FactSampler]) -> list[Sample]:
+            futures = [opened.submit(one, room_map, sampler) for sampler in samplers]
+            return [future.result() for future in futures]
+
+        return _checked(program, known, settings, SampledRuns(run, opened.workers))
 
 
 def check_on(
     worker: Worker,
     program: str,
-    plan: RoomMap | None = None,
+    room_map: RoomMap | None = None,
     settings: CheckSettings | None = None,
     known: dict[RoomMap, list[Sample]] | None = None,
 ) -> Check:
-    """The same on one worker, one run after the other, for who checks many programs at the same time.
+    """The same check on one worker, for checking many programs at the same time.
 
     Args:
         worker: the calling thread's own.
         program: its source, which need not even parse.
-        plan: the rooms; without it they are taken from the program.
+        room_map: the rooms; by default those in the program.
         settings: how to check it.
-        known: runs of the same program under the same rules, by other checks; those of this one are added.
+        known: the runs of the same program under the same rules in other checks; those of this one are added.
 
     Raises:
         EngineError: a process was lost twice, or the worker was stopped.
     """
     how = settings or CheckSettings()
 
-    def run(plan: RoomMap, lots: Iterable[FactSampler]) -> Iterator[Sample]:
-        return (imagined(worker, program, plan, lot, how) for lot in lots)
+    def run(room_map: RoomMap, samplers: Iterable[FactSampler]) -> Iterable[Sample]:
+        return (run_sample(worker, program, room_map, sampler, how) for sampler in samplers)
 
-    rooms = plan or _plan(program, None, None, how.skills)
-    return _checked(program, rooms, how, Runner(run, known={} if known is None else known))
-
-
-# --- running
+    rooms = room_map or _room_map(program, None, None, how.skills)
+    return _checked(program, rooms, how, SampledRuns(run, known={} if known is None else known))
 
 
-@dataclass
-class Runner:
-    """Runs a program in worlds, those that are alike to it once.
-
-    Args:
-        run: runs it in each of some worlds.
-        width: in how many at the same time.
-        known: what came of it, by what was certain of the worlds.
-    """
-
-    run: Callable[[RoomMap, Iterable[FactSampler]], Iterator[Sample]]
-    width: int = 1
-    known: dict[RoomMap, list[Sample]] = field(default_factory=dict)
-
-    def runs(self, plan: RoomMap, lots: Sequence[FactSampler]) -> list[Sample]:
-        """The runs in some worlds, in their order."""
-        known = self.known.setdefault(plan, [])
-        found = []
-        for start in range(0, len(lots), self.width):
-            these = lots[start : start + self.width]
-            known += self.run(plan, [lot for lot in these if not any(one.is_as_in(lot) for one in known)])
-            for lot in these:
-                same = next(one for one in known if one.is_as_in(lot))
-                found.append(replace(same, number=lot.sample))
-        return found
-
-
-def imagined(
-    worker: Worker, program: str, plan: RoomMap, lot: FactSampler, settings: CheckSettings
-) -> Sample:
-    """Run a program in one imagined world.
-
-    Args:
-        worker: the calling thread's own.
-        program: its source, which need not even parse.
-        plan: the rooms.
-        lot: how the world is drawn.
-        settings: how to check it.
-    """
-    robots: list[SampledRobot] = []
-
-    def new_robot() -> SampledRobot:
-        robots.append(SampledRobot(plan, lot, settings.rules, settings.skills, settings.behaviours))
-        return robots[-1]
-
-    outcome = worker.run(program, new_robot)
-    robot = robots[-1]
-    return Sample(lot.sample, outcome, tuple(robot.facts), tuple(robot.draws), _is_in_vain(outcome, robot))
-
-
-def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
-    if outcome.status is Status.ROBOT_ERROR and outcome.error is not None:
-        return any(excuse.startswith(outcome.error.message) for excuse in robot.excuses)
-    return outcome.status is Status.TIMEOUT
-
-
-def _checked(program: str, plan: RoomMap, settings: CheckSettings, runner: Runner) -> Check:
-    flaws = _flaws(program, plan, settings.skills)
-    if len(flaws) == 1 and isinstance(parsed(program, compiled=True), Flaw):
-        return Check(flaws, (), plan, settings.seed, settings.strict)
-    ran = _samples(plan, settings, runner)
-    for _ in range(GUESSES if plan.guessed else 0):
-        wider = _widened(plan, ran)
-        if wider == plan:
+def _checked(program: str, room_map: RoomMap, settings: CheckSettings, runs: SampledRuns) -> Check:
+    tree = parsed(program, compiled=True)
+    if isinstance(tree, Flaw):
+        problem = Problem(tree.kind, tree.message, tree.line)
+        return Check((problem,), (), room_map, settings.seed, settings.strict)
+    problems = static_problems(program, tree, room_map, settings.skills)
+    ran = runs.samples(room_map, settings)
+    for _ in range(GUESSES if room_map.guessed else 0):
+        wider = _widened(room_map, ran)
+        if wider == room_map:
             break
-        plan, ran = wider, _samples(wider, settings, runner)
-    blamed = {flaw.line for flaw in flaws}
-    shown = [problem for problem in failures(ran, plan) if problem.line not in blamed]
-    problems = sorted([*flaws, *shown], key=lambda problem: problem.line or 0)
-    return Check(tuple(problems), tuple(ran), plan, settings.seed, settings.strict)
-
-
-def _samples(plan: RoomMap, settings: CheckSettings, runner: Runner) -> list[Sample]:
-    """The runs in so many worlds, and in more where the program waits or searches in vain in all of them."""
-    first = FactSampler(settings.seed, 0, settings.strict)
-    ran = runner.runs(plan, [replace(first, sample=number) for number in range(settings.samples)])
-    for more in range(MORE):
-        if not all(sample.in_vain and sample.draws for sample in ran) or all(
-            one.only_computed for one in ran
-        ):
-            break
-        # Who waits in many places needs luck to see the end of it; a search, that not all is full of things.
-        ran += runner.runs(plan, [replace(first, sample=len(ran), lucky=more % 2 == 1)])
-    return ran
+        room_map, ran = wider, runs.samples(wider, settings)
+    blamed = {problem.line for problem in problems}
+    problems += [problem for problem in failures(ran, room_map) if problem.line not in blamed]
+    problems.sort(key=lambda problem: problem.line or 0)
+    return Check(tuple(problems), tuple(ran), room_map, settings.seed, settings.strict)
 
 
 # --- rooms
 
 
-def _plan(program: str, rooms: Sequence[str] | None, start: str | None, skills: SkillTable) -> RoomMap:
+def _room_map(program: str, rooms: Sequence[str] | None, start: str | None, skills: SkillTable) -> RoomMap:
     if rooms is not None:
         for room in rooms:
             _expect_regex(room)
@@ -269,8 +134,9 @@ def _plan(program: str, rooms: Sequence[str] | None, start: str | None, skills: 
             raise UserError(f'the robot starts in "{start}", but the rooms are: {", ".join(names)}')
         return RoomMap(names, start)
     start = start or START
-    named = [room for room in named_rooms(program, skills) if room != start]
-    if len(named) < len(SOME_ROOMS) and lists_rooms(program):
+    tree = tree_of(program)
+    named = [room for room in named_rooms(tree, skills) if room != start]
+    if len(named) < len(SOME_ROOMS) and lists_rooms(tree):
         named += [room for room in SOME_ROOMS if room not in named]
     return RoomMap((*named, start), start, guessed=True)
 
@@ -282,41 +148,10 @@ def _expect_regex(room: str) -> None:
         raise UserError(f'the room "{room}" is no valid regular expression: {error}') from None
 
 
-def _widened(plan: RoomMap, ran: Iterable[Sample]) -> RoomMap:
+def _widened(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:
     """The rooms, and those that the program drove to although its text does not name them."""
     requests = (event.text for sample in ran for event in sample.outcome.trace if event.kind == "goto")
-    driven = (plan.room(request) for request in requests)
-    found = dict.fromkeys([*plan.rooms, *(room for room in driven if room is not None)])
-    rooms = [room for room in found if room != plan.start][:MOST_ROOMS]
-    return replace(plan, rooms=(*rooms, plan.start))
-
-
-# --- what is wrong
-
-
-def unforgiven(flaws: Iterable[Flaw], program: str) -> Iterator[Flaw]:
-    """Those that do harm: their line is run, and nothing catches them."""
-    return (flaw for flaw in flaws if not reach(program).forgives(flaw.line, flaw.kind))
-
-
-HARMLESS = "AskInvalidOptions"
-"""Options that are no texts: a robot offers them as texts all the same, and only RTL has nothing to judge."""
-
-
-@lru_cache(maxsize=16)  # who checks with many seeds does so program by program
-def _flaws(program: str, plan: RoomMap, skills: SkillTable) -> tuple[Problem, ...]:
-    """What the text shows, one problem a line."""
-    flaws = [flaw for flaw in Program(program).problems(skills) if flaw.kind != HARMLESS]
-    if not plan.guessed:
-        flaws += [
-            Flaw(line, "GoToInvalidLocation", no_room(request, plan))
-            for line, request in fixed_drives(program, skills)
-            if plan.room(request) is None
-        ]
-    by_line: dict[int | None, list[Flaw]] = {}
-    for flaw in flaws if isinstance(parsed(program), Flaw) else unforgiven(flaws, program):
-        by_line.setdefault(flaw.line, []).append(flaw)
-    return tuple(
-        Problem(same[0].kind, "; ".join(dict.fromkeys(flaw.message for flaw in same)), line)
-        for line, same in by_line.items()
-    )
+    driven = (room_map.room(request) for request in requests)
+    found = dict.fromkeys([*room_map.rooms, *(room for room in driven if room is not None)])
+    rooms = [room for room in found if room != room_map.start][:MOST_ROOMS]
+    return replace(room_map, rooms=(*rooms, room_map.start))

@@ -1,21 +1,17 @@
-"""What a check finds: problems, the runs that show them, and what is special about their worlds."""
+"""What a check finds: problems, and the runs in sampled worlds that show them."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.trace import Outcome, Status
+from codebotler.core.trace import Outcome
 from codebotler.core.tracefile import outcome_data
 from codebotler.core.words import counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.isolated_process import PROCESSOR_TIME
 from codebotler.simulator.sampled_robot import Fact, RoomMap, brief
-
-MOST_FACTS = 4
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class Problem:
 
     @property
     def sentence(self) -> str:
-        """All of it, as one says it to a person or to a model."""
+        """All of it in one sentence, for a person or a model."""
         line = "" if self.line is None else f"line {self.line}: "
         where = f", where {self.where}" if self.where else ""
         return f"{line}{self.kind}: {self.message}{where}"
@@ -46,14 +42,14 @@ class Problem:
 
 @dataclass(frozen=True)
 class Sample:
-    """One run in an imagined world.
+    """One run in a sampled world.
 
     Args:
         number: of the world, from 0.
         outcome: how the run ended.
         facts: what was settled about the world while it ran, in that order.
-        draws: of the lots by which that was settled, in order.
-        in_vain: whether the robot waited or searched in vain, so that the end says little of the program.
+        draws: the draws that settled it, in order.
+        in_vain: whether the robot waited or searched in vain, so that the end says little about the program.
     """
 
     number: int
@@ -62,19 +58,13 @@ class Sample:
     draws: tuple[Draw, ...] = field(default=(), repr=False)
     in_vain: bool = False
 
-    def is_as_in(self, lot: FactSampler) -> bool:
-        """Whether the same run in another world would meet the same facts, and so be the same."""
-        return all(draw.is_drawn_by(lot) for draw in self.draws)
+    def is_as_in(self, sampler: FactSampler) -> bool:
+        """Whether a run in another world would meet the same facts, and so be the same."""
+        return all(draw.is_drawn_by(sampler) for draw in self.draws)
 
     @property
-    def only_computed(self) -> bool:
-        """Whether it used up its processor time; that costs seconds, and is no waiting."""
-        error = self.outcome.error
-        return self.in_vain and error is not None and error.message.endswith(PROCESSOR_TIME)
-
-    @property
-    def lots(self) -> tuple[str, ...]:
-        """What chance settled, in words."""
+    def drawn(self) -> tuple[str, ...]:
+        """The facts that chance settled, in words."""
         return tuple(dict.fromkeys(fact.sentence for fact in self.facts if fact.by_lot))
 
     @property
@@ -90,14 +80,14 @@ class Check:
     Args:
         problems: by line; the program is rejected if there is one.
         samples: the runs; none of a program that does not parse.
-        plan: the rooms that the worlds have in common.
+        room_map: the rooms that the worlds have in common.
         seed: from which the worlds were drawn.
         strict: whether all facts were drawn.
     """
 
     problems: tuple[Problem, ...]
     samples: tuple[Sample, ...]
-    plan: RoomMap
+    room_map: RoomMap
     seed: int = 0
     strict: bool = False
 
@@ -107,12 +97,12 @@ class Check:
     @property
     def rooms(self) -> tuple[str, ...]:
         """The rooms, in the order in which the robot knew them."""
-        return self.plan.rooms
+        return self.room_map.rooms
 
     @property
     def rooms_are_guessed(self) -> bool:
         """Whether the rooms were taken from the program itself."""
-        return self.plan.guessed
+        return self.room_map.guessed
 
     def data(self, skills: SkillTable = SKILLS) -> dict[str, Any]:
         """All of it as plain data; equal checks give equal data.
@@ -131,7 +121,7 @@ class Check:
                 for problem in self.problems
             ],
             "rooms": list(self.rooms),
-            "start": self.plan.start,
+            "start": self.room_map.start,
             "rooms_are_guessed": self.rooms_are_guessed,
             "seed": self.seed,
             "strict": self.strict,
@@ -147,46 +137,9 @@ class Check:
         }
 
 
-def no_room(request: str, plan: RoomMap) -> str:
-    """That a room does not exist, in a sentence that names the closest one."""
+def no_room(request: str, room_map: RoomMap) -> str:
+    """The message for an unknown room, with the closest match."""
     name = brief(request)
-    closest = difflib.get_close_matches(name.lower(), plan.rooms, n=1)
+    closest = difflib.get_close_matches(name.lower(), room_map.rooms, n=1)
     hint = f'; the closest is "{closest[0]}"' if closest else ""
     return f'there is no room "{name}"{hint}'
-
-
-def failures(ran: Sequence[Sample], plan: RoomMap) -> Iterator[Problem]:
-    """What the runs show: one problem for the runs that ended at the same line in the same way."""
-    in_vain = all(sample.in_vain for sample in ran)
-    groups: dict[tuple[int | None, str], list[Sample]] = {}
-    for sample in ran:
-        outcome = sample.outcome
-        if outcome.error is not None and (in_vain or not sample.in_vain):
-            line = None if outcome.status is Status.TIMEOUT else outcome.line  # any of those where it waits
-            groups.setdefault((line, outcome.error.kind), []).append(sample)
-    for (_, kind), same in groups.items():
-        numbers = tuple(sample.number for sample in same)
-        yield Problem(kind, _message(same, ran, plan), same[0].outcome.line, _where(same, ran), numbers)
-
-
-def _message(same: Sequence[Sample], ran: Sequence[Sample], plan: RoomMap) -> str:
-    """What the first of some runs says at its end."""
-    first = same[0].outcome
-    assert first.error is not None
-    if first.status is Status.TIMEOUT:
-        all_or_some = "each" if len(same) == len(ran) else str(len(same))
-        often = f"in {all_or_some} of {len(ran)} imagined worlds " if same[0].draws else ""
-        return f"the program never ends: {often}it reached a limit, {first.error.message}"
-    if first.error.kind == "GoToInvalidLocation" and first.trace and first.trace[-1].kind == "goto":
-        return no_room(first.trace[-1].text, plan)
-    return first.error.message
-
-
-def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:
-    """What some runs have in common that the others have not."""
-    others = [sample for sample in ran if sample not in same]
-    shared = [fact for fact in same[0].lots if all(fact in sample.lots for sample in same)]
-    telling = [fact for fact in shared if not others or not all(fact in other.lots for other in others)]
-    facts = telling or list(same[0].lots if others else ())
-    left = len(facts) - MOST_FACTS
-    return listed([*([f"{left} more such facts hold"] if left > 0 else []), *facts[-MOST_FACTS:]])

@@ -1,89 +1,68 @@
-"""Where a program drives, as far as its text tells without running it."""
+"""The rooms that a program names, found by following its variables without running it."""
 
 from __future__ import annotations
 
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import TypeAlias
 
-from codebotler.core.program import Problem, names_bound, parsed
+from codebotler.core.program import names_bound
 from codebotler.core.skills import SKILLS, Skill, SkillTable
 
 DRIVE, LIST, HERE = "goto", "get_all_rooms", "get_current_location"
 MOST_ROOMS = 100
-ROUNDS = 6
-"""How often names are passed on from variable to variable; nobody writes longer chains."""
+ROUNDS = 6  # in which names are passed on from variable to variable; longer chains are unusual
 SAME_VALUES = frozenset({"sorted", "list", "set", "tuple", "reversed", "iter", "filter", "frozenset"})
 OF_A_LIST = frozenset({"copy", "keys", "lower", "strip", "casefold", "title", "pop"})
 COMPARING = frozenset({"startswith", "endswith"})
 
+Literal: TypeAlias = tuple[int, int, str]
+"""A text in a program: its line from 1, its column from 0, and the text."""
 
-def fixed_drives(source: str, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
-    """The line and the request of each drive that is written out, and that depends on no other mention of it.
+A_ROOM: Literal = (0, 0, "")  # stands for the name of a room that a skill returns
 
-    A program that compares something with a name of a room may drive there only if there is one.
 
-    Args:
-        source: of the program; of one that does not parse, there are none.
-        skills: what it may call.
-    """
-    tree = parsed(source)
-    if isinstance(tree, Problem):
-        return []
+def named_rooms(tree: ast.Module, skills: SkillTable = SKILLS) -> tuple[str, ...]:
+    """The rooms that a program drives to, or compares rooms with, by their names in its text, in order."""
     try:
-        bound = names_bound(tree)
-        if "*" in bound:
-            return []
-        compared = {text for node in ast.walk(tree) if isinstance(node, ast.Compare) for text in _texts(node)}
-        drives = {name: skill for name, skill in _drives(skills).items() if name not in bound}
-        return [
-            (call.lineno, request.value)
-            for call, request in _requests(tree, drives)
-            if isinstance(request, ast.Constant) and isinstance(request.value, str)
-            if request.value.strip().casefold() not in compared
-        ]
+        return tuple(dict.fromkeys(_Variables(tree, skills).rooms()))[:MOST_ROOMS]
     except RecursionError:
+        return ()
+
+
+def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[int, str]]:
+    """The line and the request of each drive whose room is written out.
+
+    A program that compares something with the name of a room may drive there only if there is one; such
+    drives are left out.
+    """
+    bound = names_bound(tree)
+    if "*" in bound:
         return []
+    compared = {text for node in ast.walk(tree) if isinstance(node, ast.Compare) for text in _texts(node)}
+    drives = {name: skill for name, skill in _drives(skills).items() if name not in bound}
+    return [
+        (call.lineno, request.value)
+        for call, request in _requests(tree, drives)
+        if isinstance(request, ast.Constant) and isinstance(request.value, str)
+        if request.value.strip().casefold() not in compared
+    ]
+
+
+def lists_rooms(tree: ast.Module) -> bool:
+    """Whether a program asks for the list of all rooms."""
+    return any(isinstance(node, ast.Name) and node.id == LIST for node in ast.walk(tree))
 
 
 def _texts(expression: ast.expr) -> Iterator[str]:
-    """The texts that stand in an expression, in small letters."""
     for node in ast.walk(expression):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield node.value.strip().casefold()
 
 
-def named_rooms(source: str, skills: SkillTable = SKILLS) -> tuple[str, ...]:
-    """The rooms that a program drives to or compares rooms with, by the names that it writes out, in order.
-
-    Args:
-        source: of the program; one that does not parse names none.
-        skills: what it may call.
-    """
-    tree = parsed(source)
-    if isinstance(tree, Problem):
-        return ()
-    try:
-        return tuple(dict.fromkeys(Rooms(tree, _drives(skills)).names()))[:MOST_ROOMS]
-    except RecursionError:
-        return ()
-
-
-def lists_rooms(source: str) -> bool:
-    """Whether a program asks for the list of all rooms."""
-    tree = parsed(source)
-    return not isinstance(tree, Problem) and any(
-        isinstance(node, ast.Name) and node.id == LIST for node in ast.walk(tree)
-    )
-
-
 def _drives(skills: SkillTable) -> dict[str, Skill]:
-    return {
-        skill.name: skill
-        for skill in skills.rows
-        if skill.recording is not None and skill.recording.kind == DRIVE
-    }
+    return {s.name: s for s in skills.rows if s.recording is not None and s.recording.kind == DRIVE}
 
 
 def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.Call, ast.expr]]:
@@ -98,36 +77,12 @@ def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.
                 yield from ((node, k.value) for k in node.keywords if k.arg == recording.text)
 
 
-@dataclass(frozen=True, order=True)
-class Text:
-    """A text that a program writes out.
+class _Variables:
+    """The texts that the variables of a program may hold, roughly: a name means the same all over it."""
 
-    Args:
-        line: counted from 1.
-        column: counted from 0.
-        value: the text; None for what the simulator says of rooms.
-    """
-
-    line: int
-    column: int
-    value: str = ""
-
-
-A_ROOM = Text(0, 0)
-"""Stands for the name of a room that the robot was told."""
-
-
-class Rooms:
-    """Follows texts through the variables of a program, roughly: a name means the same all over it.
-
-    Args:
-        tree: the program.
-        drives: the skills that drive.
-    """
-
-    def __init__(self, tree: ast.Module, drives: dict[str, Skill]) -> None:
-        self.tree, self.drives = tree, drives
-        self.held: defaultdict[str, set[Text]] = defaultdict(set)
+    def __init__(self, tree: ast.Module, skills: SkillTable) -> None:
+        self.tree, self.drives = tree, _drives(skills)
+        self.held: defaultdict[str, set[Literal]] = defaultdict(set)
         self.functions = {
             node.name: [*node.args.posonlyargs, *node.args.args]
             for node in ast.walk(tree)
@@ -140,26 +95,26 @@ class Rooms:
             if sum(map(len, self.held.values())) == before:
                 break
 
-    def names(self) -> list[str]:
-        """The names of rooms, in the order in which they stand in the program."""
+    def rooms(self) -> list[str]:
+        """The names of rooms, in the order of the program."""
         found = {text for _, request in _requests(self.tree, self.drives) for text in self.texts(request)}
         driven = {_name(request) for _, request in _requests(self.tree, self.drives)} - {None}
         for node in ast.walk(self.tree):
             found |= self._compared(node, driven)
-        return [text.value for text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text.value))]
+        return [text for _, _, text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text))]
 
-    def texts(self, node: ast.expr) -> set[Text]:
+    def texts(self, node: ast.expr) -> set[Literal]:
         """What an expression may be, or what may be among its elements."""
         match node:
             case ast.Constant(str(value)):
-                return {Text(node.lineno, node.col_offset, value.strip())}
+                return {(node.lineno, node.col_offset, value.strip())}
             case ast.Name(name):
                 return self.held[name]
             case ast.Call(ast.Name(name)) if name in {LIST, HERE}:
                 return {A_ROOM}
         return self._all(_parts(node))
 
-    def _all(self, nodes: list[ast.expr]) -> set[Text]:
+    def _all(self, nodes: list[ast.expr]) -> set[Literal]:
         return set().union(*map(self.texts, nodes))
 
     def _pass_on(self, node: ast.AST) -> None:
@@ -213,7 +168,7 @@ class Rooms:
             case _:
                 self._bind(target, over)
 
-    def _compared(self, node: ast.AST, driven: set[str | None]) -> set[Text]:
+    def _compared(self, node: ast.AST, driven: set[str | None]) -> set[Literal]:
         """The texts with which an expression compares a room."""
 
         def is_room(side: ast.expr) -> bool:

@@ -172,7 +172,7 @@ def run(
     """
     from codebotler.cli.run import Request
     from codebotler.cli.run import run as run_mission
-    from codebotler.core.home import home
+    from codebotler.core.files import home
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
     from codebotler.models.open import open_model
@@ -204,7 +204,7 @@ def missions(
     """List past missions, or show what happened in one."""
     from codebotler.cli.missions import show_mission, show_missions, write_mission
     from codebotler.core.errors import UserError
-    from codebotler.core.home import home
+    from codebotler.core.files import home
 
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; name it, or `last`")
@@ -272,7 +272,7 @@ def serve(
 
     Ctrl-C ends it, which also stops the robot.
     """
-    from codebotler.core.home import home
+    from codebotler.core.files import home
     from codebotler.core.world import World
     from codebotler.models.base import Model, SamplingSettings
     from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server

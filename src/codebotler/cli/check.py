@@ -12,7 +12,8 @@ from rich.text import Text
 
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.storyboard import steps_of, storyboard
-from codebotler.core.errors import MAX_BYTES, UserError, read_text, text_of
+from codebotler.core.errors import UserError
+from codebotler.core.files import MAX_BYTES, read_text, text_of
 from codebotler.core.program import TASK, bound_names
 from codebotler.core.terminal import shortened, visible
 from codebotler.prompts.extract import program_of
@@ -123,7 +124,7 @@ def _telling(found: Check) -> Sample:
 def _sample(sample: Sample, found: Check) -> Iterator[RenderableType]:
     where = f", where {shortened(sample.world, 1_000)}" if sample.world else ""
     yield Text.assemble(("what the robot would do", "bold"), where)
-    steps = steps_of(sample.outcome.trace, found.plan.room)
+    steps = steps_of(sample.outcome.trace, found.room_map.room)
     yield storyboard(steps, set())
     if sample.outcome.error is not None:
         told = f"{sample.outcome.error.kind}: {shortened(sample.outcome.error.message)}"

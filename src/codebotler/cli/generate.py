@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from codebotler.core.replacing import expect_replaceable
+from codebotler.core.files import expect_replaceable
 from codebotler.core.terminal import busy, note, print_source, visible
 from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore, write_checked_program

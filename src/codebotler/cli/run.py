@@ -70,7 +70,7 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
     note_interrupted(home)
     order = Order(program=program) if program else Order(request.what, request.model)
     session = MissionSession(
-        robot, home, order, open_model=open_model, check=lambda source, rooms: check(source, plan=rooms)
+        robot, home, order, open_model=open_model, check=lambda source, rooms: check(source, room_map=rooms)
     )
     session.start()
     try:

@@ -12,7 +12,6 @@ from rich.table import Table
 from rich.text import Text
 
 from codebotler.checking.storyboard import grid
-from codebotler.core.pasted import mission_command
 from codebotler.core.terminal import console, shortened, visible
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.mission import State
@@ -95,7 +94,7 @@ def ending(summary: Summary) -> Group:
     text = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))
     if state is State.STOPPED:
         text.append("\nthe robot has stopped")
-    again = f"`{mission_command('missions', summary.id)}` shows it again"
+    again = f"`codebotler missions {summary.id}` shows it again"
     return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
 
 

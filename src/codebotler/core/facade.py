@@ -1,4 +1,4 @@
-"""What a package offers to who imports it, each name imported when it is first used."""
+"""Lazy public names of a package: each is imported when it is first used."""
 
 from __future__ import annotations
 
@@ -8,22 +8,17 @@ if TYPE_CHECKING:
 
 
 def facade(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """The `__getattr__` and the `__dir__` of a package: who needs one name need not wait for all.
-
-    Args:
-        package: its name.
-        homes: for each name that it offers, the module in it that has it.
-    """
+    """The `__getattr__` and `__dir__` of a package, from its name and the module of each public name."""
 
     def get(name: str) -> object:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}", name=name)
-        from importlib import import_module  # noqa: PLC0415 - only where something is used
+        from importlib import import_module  # noqa: PLC0415 - imported only when a name is used
 
         return getattr(import_module(f"{package}.{homes[name]}"), name)
 
     def names() -> list[str]:
-        from sys import modules  # noqa: PLC0415 - only where somebody asks
+        from sys import modules  # noqa: PLC0415 - as above
 
         return sorted({*vars(modules[package]), *homes})
 

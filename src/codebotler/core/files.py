@@ -1,21 +1,63 @@
-"""Files that no crash leaves half-written: JSON lines that only grow, and files that are replaced whole."""
+"""Reading files with clear errors, logs that survive a crash, atomic replacement, and the state folder."""
 
 from __future__ import annotations
 
-import contextlib
-import errno
+import fcntl
+import io
 import json
+import mmap
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import count, islice
+from contextlib import contextmanager, suppress
+from itertools import count
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from codebotler.core.errors import UserError
 
+MAX_BYTES = 5_000_000
 MAX_ROW = 5_000_000
-CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no folder to the disk
+
+
+# --- whole texts
+
+
+def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
+    """The content of a UTF-8 file of at most so many bytes, or a UserError."""
+    with _opened(path, path) as file:
+        try:
+            data = file.read(limit + 1)
+        except OSError as error:
+            raise UserError(f"cannot be read ({error.strerror})", file=path) from None
+    return text_of(data, path, limit=limit)
+
+
+def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
+    """The text of a file's bytes, with the line ends of any system and without a byte order mark.
+
+    Args:
+        data: the bytes; of a larger file, one more than the limit is enough.
+        name: what errors call the file.
+        limit: the largest size in bytes.
+    """
+    if len(data) > limit:
+        raise UserError(f"is larger than {limit:,} bytes", file=name)
+    try:
+        return io.StringIO(data.decode("utf-8-sig"), newline=None).read()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise UserError("is not UTF-8 text; save it as UTF-8", file=name, line=line) from None
+
+
+def _opened(path: Path, name: Path | str) -> BinaryIO:
+    try:
+        return path.open("rb")
+    except FileNotFoundError:
+        raise UserError("there is no such file", file=name) from None
+    except IsADirectoryError:
+        raise UserError("is a folder; name a file", file=name) from None
+    except OSError as error:
+        raise UserError(f"cannot be read ({error.strerror})", file=name) from None
 
 
 # --- JSON lines
@@ -24,70 +66,45 @@ CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # says a file system that brings no
 def read_lines(
     path: Path, *, limit: int = MAX_ROW, name: Path | str | None = None
 ) -> Iterator[tuple[int, bytes]]:
-    """Read a file line by line: the line's number, counted from 1, and its bytes.
+    """The lines of a file with their numbers, counted from 1; a line past the limit is a UserError.
 
     Args:
         path: the file.
         limit: the longest line in bytes.
-        name: what sentences call the file; its path by default.
-
-    Raises:
-        UserError: the file is missing, or a line is too long.
+        name: what errors call the file; its path by default.
     """
-    name = name or path
-    try:
-        file = path.open("rb")
-    except FileNotFoundError:
-        raise UserError("there is no such file", file=name) from None
-    except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=name) from None
-    with file:
+    with _opened(path, name or path) as file:
         for number in count(1):
             line = file.readline(limit + 1)
             if not line:
                 return
             if len(line) > limit:
-                raise UserError(f"this row is longer than {limit:,} bytes", file=name, line=number)
+                raise UserError(f"this row is longer than {limit:,} bytes", file=name or path, line=number)
             yield number, line
 
 
-def read_rows(
-    path: Path,
-    *,
-    growing: bool = False,
-    name: Path | str | None = None,
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Read a file of JSON lines: the line's number, counted from 1, and its object.
+def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[str, Any]]]:
+    """The objects of a file of JSON lines with the numbers of their lines, or a UserError.
 
     Args:
         path: the file.
-        growing: whether it is one that we write: then a broken last line without an end was torn by a crash,
-            and is passed over.
-        name: what sentences call the file; its path by default.
-
-    Raises:
-        UserError: the file is missing, or a line is too long or no JSON object.
+        growing: whether we append to it, so that a crash may have torn the last line, which is left out.
     """
-    name = name or path
-    for number, line in read_lines(path, name=name):
+    for number, line in read_lines(path):
         if line.strip():
             try:
                 row = parsed_row(line)
             except UserError as error:
-                raise UserError(error.sentence, file=name, line=number) from None
+                raise UserError(error.sentence, file=path, line=number) from None
             if row is None and growing and not line.endswith(b"\n"):
                 return
             if row is None:
-                raise UserError("this line is no JSON", file=name, line=number)
+                raise UserError("this line is not JSON", file=path, line=number)
             yield number, row
 
 
 def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None:
-    """The JSON object that a line says; None if it is no JSON.
-
-    Raises:
-        UserError: it is JSON, but no object.
-    """
+    """The JSON object of a line; None if the line is not JSON, a UserError if it is no object."""
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
@@ -99,139 +116,148 @@ def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None
 
 
 def to_line(row: object) -> bytes:
-    """A row, or a part of one, as a line of JSON, in UTF-8."""
+    """A row as a line of JSON, in UTF-8."""
     # Half of a surrogate pair, which UTF-8 cannot hold, becomes an escape, which JSON reads.
     return json.dumps(row, ensure_ascii=False).encode(errors="backslashreplace") + b"\n"
-
-
-@dataclass
-class Appender:
-    """Appends whole lines to a file; what a crash leaves torn is cut off when it is opened.
-
-    Args:
-        path: the file.
-    """
-
-    path: Path
-
-    def __post_init__(self) -> None:
-        is_new = not self.path.exists()
-        self._file: BinaryIO = self.path.open("ab", buffering=0)
-        if is_new:
-            sync_folder(self.path.parent)
-        whole = whole_length(self.path)
-        if self.path.stat().st_size > whole:
-            self._file.truncate(whole)
-
-    def append(self, line: bytes) -> None:
-        """Add a line, whole or not at all.
-
-        Raises:
-            OSError: the disk is full; nothing of the line stays.
-        """
-        start = self._file.seek(0, os.SEEK_END)
-        view = memoryview(line)
-        try:
-            while view:
-                view = view[self._file.write(view) :]
-        except OSError as error:
-            self._file.truncate(start)
-            raise OSError(error.errno, error.strerror, str(self.path)) from None
-
-    def cut(self, length: int) -> None:
-        """Drop what stands after so many bytes."""
-        if self.path.stat().st_size > length:
-            self._file.truncate(length)
-
-    def sync(self) -> None:
-        """Bring everything to the disk; may be called from another thread.
-
-        Raises:
-            OSError: that is not possible.
-        """
-        try:
-            os.fsync(self._file.fileno())
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(self.path)) from None
-
-    def close(self) -> None:
-        """Bring everything to the disk, and let go of the file."""
-        with self._file:
-            self.sync()
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring to the disk which files a folder has, as far as its file system can.
-
-    Else a file whose content is on the disk may be gone after a power failure.
-
-    Raises:
-        OSError: the disk is broken.
-    """
-    try:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
-    except PermissionError:  # a folder that may be written but not read
-        return
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno not in CANNOT_SYNC:
-            raise OSError(error.errno, error.strerror, str(folder)) from None
-    finally:
-        os.close(descriptor)
-
-
-def whole_length(path: Path) -> int:
-    """How many bytes of a file of lines are whole lines."""
-    with path.open("rb") as file:
-        position = file.seek(0, os.SEEK_END)
-        while position > 0:
-            start = max(0, position - (1 << 16))
-            file.seek(start)
-            end = file.read(position - start).rfind(b"\n")
-            if end >= 0:
-                return start + end + 1
-            position = start
-    return 0
-
-
-def length_before(path: Path, line: int) -> int:
-    """How many bytes of a file stand before a line, counted from 1."""
-    with path.open("rb") as file:
-        return sum(map(len, islice(file, line - 1)))
-
-
-# --- whole files
-
-
-def write_whole(path: Path, content: bytes | memoryview) -> None:
-    """Write a file so that it is there whole or as it was."""
-    with written_whole(path) as file:
-        file.write(content)
-
-
-@contextlib.contextmanager
-def written_whole(path: Path) -> Iterator[BinaryIO]:
-    """A file to write to, which takes its place when all is written; else what stood there stays."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".new")
-    try:
-        with temporary.open("wb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-        sync_folder(path.parent)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        if error.errno is None:
-            raise
-        raise OSError(error.errno, error.strerror, str(path)) from None
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 def to_text(data: dict[str, Any]) -> bytes:
     """A JSON file for people to read."""
     return json.dumps(data, indent=2, ensure_ascii=False).encode() + b"\n"
+
+
+class Appender:
+    """A file of lines that only grows; a last line that a crash has torn is cut off when it is opened.
+
+    Args:
+        path: the file.
+        exclusive: whether to lock the file; a BlockingIOError if another process has locked it.
+    """
+
+    def __init__(self, path: Path, *, exclusive: bool = False) -> None:
+        self.path = path
+        is_new = not path.exists()
+        self._file: BinaryIO = path.open("ab", buffering=0)
+        try:
+            if exclusive:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if is_new:
+                sync_folder(path.parent)
+            if path.is_file():  # no device or pipe
+                self._file.truncate(_whole_length(path))
+        except BaseException:
+            self._file.close()
+            raise
+
+    def append(self, line: bytes) -> None:
+        """Add a line, whole or not at all; an OSError if the disk is full."""
+        descriptor = self._file.fileno()
+        start = os.fstat(descriptor).st_size
+        with naming(self.path):
+            try:
+                while line:
+                    line = line[os.write(descriptor, line) :]
+            except OSError:
+                with suppress(OSError):  # a device has nothing to take back
+                    self._file.truncate(start)
+                raise
+
+    def sync(self) -> None:
+        """Flush everything to the disk; may be called from another thread."""
+        with naming(self.path):
+            os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Flush everything to the disk and close the file."""
+        with self._file:
+            self.sync()
+
+
+def _whole_length(path: Path) -> int:
+    """The length of a file without a torn last line, in bytes."""
+    with path.open("rb") as file:
+        if not os.fstat(file.fileno()).st_size:
+            return 0
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+            return content.rfind(b"\n") + 1
+
+
+# --- writing
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Put a file's name into the system's errors, which often lack it."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def write_whole(path: Path, content: bytes | memoryview) -> None:
+    """Replace a file in one step; after a crash it is there whole or as it was."""
+    with written_whole(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[BinaryIO]:
+    """A file to write to that takes its place when all is written; after an error the old one stays."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(path.name + ".new")
+    try:
+        with naming(path):
+            with temporary.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's list of files to the disk, as far as its file system can.
+
+    Without it, a file whose content is on the disk may be gone after a power failure.
+    """
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def expect_replaceable(path: Path, *beginnings: bytes) -> None:
+    """Refuse to overwrite a file that does not begin like one that we write."""
+    if path.is_file():
+        with path.open("rb") as file:
+            start = file.read(max(map(len, beginnings)))
+        if start and not start.startswith(beginnings):
+            raise UserError("this file holds something else; name another one, or remove it", file=path)
+
+
+# --- the state folder
+
+
+def home() -> Path:
+    """The folder of missions and what belongs to them; it need not exist."""
+    named, state = os.environ.get("CODEBOTLER_HOME"), os.environ.get("XDG_STATE_HOME")
+    if named:
+        return Path(named).absolute()
+    try:
+        return (Path(state) if state else Path.home() / ".local" / "state") / "codebotler"
+    except RuntimeError:  # a user without a home, as in containers
+        raise UserError("you have no home folder; set CODEBOTLER_HOME to a folder") from None
+
+
+def make_folder(folder: Path) -> None:
+    """Create a folder to write into; a UserError if that is not allowed."""
+    with suppress(PermissionError):
+        folder.mkdir(parents=True, exist_ok=True)
+    if not os.access(folder, os.W_OK | os.X_OK, effective_ids=True):
+        raise UserError("cannot be written to; name another folder with CODEBOTLER_HOME", file=folder)

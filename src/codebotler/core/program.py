@@ -1,24 +1,34 @@
-"""Robot programs, and what can be said against one without running it."""
+"""Robot programs, and what their text says without running it."""
 
 from __future__ import annotations
 
 import ast
-import builtins
+import os
 import symtable
-from collections.abc import Iterable, Iterator, Sequence
+import threading
+import warnings
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from codebotler.core.skills import SKILLS, Parameter, Skill, SkillTable
-from codebotler.core.syntaxtree import parse, reading
 from codebotler.core.words import counted, listed
 
 TASK = "task_program"
 GIVEN = ("time", "sys")  # modules that every program finds imported
-NOT_IN_A_RUN = frozenset({"help", "copyright", "credits", "license", "WindowsError", "__file__"})
+FILE = "<program>"
+
+warnings.filterwarnings("ignore", module=FILE)  # about odd escapes, such as "\d", in the programs of models
+
+# CPython before 3.13 counts the depth of all trees in the making together: where two threads parse at the
+# same time, one of them gets a SystemError. A forked process must not find the lock closed.
+_PARSING = threading.Lock()
+os.register_at_fork(
+    before=_PARSING.acquire, after_in_parent=_PARSING.release, after_in_child=_PARSING.release
+)
 
 
 @dataclass(frozen=True)
-class Problem:
+class Flaw:
     """Something that is certainly wrong with a program.
 
     Args:
@@ -45,64 +55,67 @@ class Program:
     def __repr__(self) -> str:
         return f"Program({counted(len(self.source.splitlines()), 'line')})"
 
-    def problems(self, skills: SkillTable = SKILLS) -> tuple[Problem, ...]:
+    def problems(self, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
         """What is certainly wrong, by line; nothing is run.
 
         Args:
             skills: what the program may call.
         """
         tree = parsed(self.source, compiled=True)
-        if isinstance(tree, Problem):
-            return (tree,)
-        try:
-            found = [
-                *_entry_problems(tree, self.source),
-                *_name_problems(tree, skills),
-                *_call_problems(tree, skills),
-            ]
-        except (RecursionError, MemoryError) as error:
-            found = [_too_deep(error)]
-        return tuple(sorted(dict.fromkeys(found), key=lambda problem: problem.line or 0))
+        return (tree,) if isinstance(tree, Flaw) else flaws_of(tree, self.source, skills)
 
 
 # --- parsing
 
 
-def parsed(source: str, *, compiled: bool = False) -> ast.Module | Problem:
-    """The syntax tree of a source, or why there is none.
+def parse(source: str) -> ast.Module:
+    """The syntax tree of a source, with the errors of `ast.parse`."""
+    with _PARSING:
+        return ast.parse(source, FILE)
 
-    CPython bounds the depth of its own parser and compiler (tried up to 1 MB of brackets, signs, lambdas,
-    attributes and blocks under 3.11), so that hostile nesting ends in an exception and needs no check before.
+
+def parse_expression(source: str) -> ast.expr:
+    """The syntax tree of an expression, with the errors of `ast.parse`."""
+    with _PARSING:
+        return ast.parse(source, FILE, mode="eval").body
+
+
+def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
+    """The syntax tree of a source, or why there is none; hostile nesting ends in CPython's own exceptions.
 
     Args:
         source: any text.
         compiled: whether to look also for errors that the compiler finds, such as a stray `return`.
     """
-    if "\0" in source:
-        line = source[: source.index("\0")].count("\n") + 1
-        return Problem(line, "SyntaxError", "the program holds a null character")
     try:
-        return parse(source, compiled=compiled)
+        tree = parse(source)
+        if compiled:
+            with _PARSING:
+                compile(tree, FILE, "exec", dont_inherit=True)
     except SyntaxError as error:
-        message = f"the program does not parse: {error.msg}"
-        return Problem(error.lineno or None, type(error).__name__, message)
-    except UnicodeEncodeError as error:
-        line = source[: error.start].count("\n") + 1
-        return Problem(
-            line, type(error).__name__, "the program holds half a character, which cannot be encoded"
-        )
+        return Flaw(error.lineno or None, type(error).__name__, f"the program does not parse: {error.msg}")
     except (RecursionError, MemoryError) as error:
         return _too_deep(error)
-    except (ValueError, OverflowError, SystemError) as error:
-        return Problem(None, type(error).__name__, f"the program cannot be read: {error}")
+    except (ValueError, OverflowError, SystemError) as error:  # such as a null character
+        return Flaw(None, type(error).__name__, f"the program cannot be read: {error}")
+    return tree
 
 
-def _too_deep(error: Exception) -> Problem:
-    return Problem(None, type(error).__name__, "the program is nested too deeply to be checked")
+def tree_of(source: str) -> ast.Module:
+    """The syntax tree of a source; an empty one if it does not parse."""
+    tree = parsed(source)
+    return ast.Module([], []) if isinstance(tree, Flaw) else tree
+
+
+def _too_deep(error: Exception) -> Flaw:
+    return Flaw(None, type(error).__name__, "the program is nested too deeply to be checked")
+
+
+# --- what a program defines and calls
 
 
 def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
-    """The definitions of `task_program` that stand directly in the module."""
+    """The definitions of `task_program` directly in the module."""
     return [
         node
         for node in tree.body
@@ -111,82 +124,43 @@ def entries(tree: ast.Module) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
 
 
 def bound_names(source: str) -> set[str]:
-    """The names that a source defines or imports at module level; none if it does not parse."""
-    if isinstance(parsed(source, compiled=True), Problem):
-        return set()
-    with reading():
-        table = symtable.symtable(source, "<program>", "exec")
-    return {s.get_name() for s in table.get_symbols() if s.is_assigned() or s.is_imported()}
+    """The names that a source defines or imports at module level; none if it does not compile."""
+    return set() if isinstance(parsed(source, compiled=True), Flaw) else _bound_in_module(source)
 
 
-def called_skills(source: str, skills: SkillTable = SKILLS) -> dict[str, int]:
-    """The skills that a source calls, each with the first line; none if it does not parse.
+def _bound_in_module(source: str) -> set[str]:
+    with _PARSING:
+        symbols = symtable.symtable(source, FILE, "exec").get_symbols()
+    return {s.get_name() for s in symbols if s.is_assigned() or s.is_imported()}
 
-    Args:
-        source: of a program.
-        skills: what it may call; a name that it gives a meaning of its own is no skill.
-    """
-    tree = parsed(source)
-    if isinstance(tree, Problem):
-        return {}
+
+def names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
+    """The names that a program defines anywhere, in whatever scope; `*` after `from x import *`."""
+    names: set[str] = set()
+    skipped = {id(node) for node in besides}
+    for node in ast.walk(tree):
+        if id(node) in skipped:
+            continue
+        match node:
+            case ast.Name(name, ast.Store() | ast.Del()) | ast.arg(name) | ast.MatchMapping(rest=str(name)):
+                names.add(name)
+            case ast.FunctionDef(name) | ast.AsyncFunctionDef(name) | ast.ClassDef(name):
+                names.add(name)
+            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)) | ast.MatchStar(str(name)):
+                names.add(name)
+            case ast.alias(name, asname):
+                names.add(asname or name.split(".", 1)[0])
+    return names
+
+
+def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, int]:
+    """The skills that a program names, unless it redefines them, each with the first line."""
     rebound = names_bound(tree)
     lines: dict[str, int] = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and node.id in skills and node.id not in rebound:
             lines[node.id] = min(node.lineno, lines.get(node.id, node.lineno))
     return lines
-
-
-# --- static problems
-
-
-def _entry_problems(tree: ast.Module, source: str) -> Iterator[Problem]:
-    """Whether `task_program` is there and can be called without arguments."""
-    if TASK not in bound_names(source):
-        yield Problem(None, "NameError", f"the program defines no {TASK} at module level")
-    found = entries(tree)
-    if not found or found[-1].decorator_list or TASK in names_bound(tree, besides=found):
-        return
-    if isinstance(found[-1], ast.AsyncFunctionDef) and not _may_begin(tree, found[-1]):
-        yield Problem(found[-1].lineno, "TypeError", f"{TASK} is a coroutine, which nobody awaits")
-    given = found[-1].args
-    positional = [*given.posonlyargs, *given.args]
-    required = positional[: len(positional) - len(given.defaults)]
-    required += [a for a, default in zip(given.kwonlyargs, given.kw_defaults, strict=True) if default is None]
-    if required:
-        names = listed([a.arg for a in required])
-        yield Problem(
-            found[-1].lineno, "TypeError", f"{TASK} takes {names}, but it is called without arguments"
-        )
-
-
-def _may_begin(tree: ast.Module, task: ast.AsyncFunctionDef) -> bool:
-    """Whether something names a coroutine that may then begin it, or it is an asynchronous generator."""
-    names = (node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
-    return TASK in names or any(isinstance(node, ast.Yield) for node in ast.walk(task))
-
-
-def _name_problems(tree: ast.Module, skills: SkillTable) -> Iterator[Problem]:
-    for line, name, is_local in [*undefined_names(tree, skills), *_missing_here(tree, skills)]:
-        if is_local:
-            yield Problem(
-                line, "UnboundLocalError", f"the local variable {name} is used before it has a value"
-            )
-        else:
-            yield Problem(line, "NameError", f"the name {name} is not defined")
-
-
-def _missing_here(tree: ast.Module, skills: SkillTable) -> Iterator[tuple[int, str, bool]]:
-    """What pyflakes takes for defined, and is not: names of a console, and those only declared global."""
-    bound = names_bound(tree)
-    if "*" in bound:
-        return
-    declared = {name for node in ast.walk(tree) if isinstance(node, ast.Global) for name in node.names}
-    missing = (NOT_IN_A_RUN | (declared - {*dir(builtins), *skills, *GIVEN})) - bound
-    for node in ast.walk(tree):
-        match node:
-            case ast.Name(name, ast.Load()) if name in missing:
-                yield node.lineno, name, False
 
 
 def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str, bool]]:
@@ -197,7 +171,7 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
 
     # Names in annotations that are texts are never looked up when a program runs.
     spelled = {(n.lineno, n.col_offset) for n in ast.walk(tree) if isinstance(n, ast.Name)}
-    with reading():
+    with _PARSING:
         found = Checker(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
     return [
         # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
@@ -208,8 +182,48 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
     ]
 
 
-def _call_problems(tree: ast.Module, skills: SkillTable) -> Iterator[Problem]:
-    """The calls of skills that cannot succeed; a name that it gives a meaning of its own is no skill."""
+# --- what is certainly wrong
+
+
+def flaws_of(tree: ast.Module, source: str, skills: SkillTable = SKILLS) -> tuple[Flaw, ...]:
+    """What is certainly wrong with a program that compiles, by line."""
+    try:
+        found = [*_entry_flaws(tree, source), *_name_flaws(tree, skills), *_call_flaws(tree, skills)]
+    except (RecursionError, MemoryError) as error:
+        found = [_too_deep(error)]
+    return tuple(sorted(dict.fromkeys(found), key=lambda flaw: flaw.line or 0))
+
+
+def _entry_flaws(tree: ast.Module, source: str) -> Iterator[Flaw]:
+    """Whether `task_program` is there and can be called without arguments."""
+    if TASK not in _bound_in_module(source):
+        yield Flaw(None, "NameError", f"the program defines no {TASK} at module level")
+    found = entries(tree)
+    if not found or found[-1].decorator_list or TASK in names_bound(tree, besides=found):
+        return
+    entry = found[-1]
+    if isinstance(entry, ast.AsyncFunctionDef):
+        yield Flaw(entry.lineno, "TypeError", f"{TASK} is a coroutine, which is never awaited")
+    given = entry.args
+    positional = [*given.posonlyargs, *given.args]
+    required = positional[: len(positional) - len(given.defaults)]
+    required += [a for a, default in zip(given.kwonlyargs, given.kw_defaults, strict=True) if default is None]
+    if required:
+        names = listed([a.arg for a in required])
+        yield Flaw(entry.lineno, "TypeError", f"{TASK} takes {names}, but it is called without arguments")
+
+
+def _name_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
+    for line, name, is_local in undefined_names(tree, skills):
+        if is_local:
+            message = f"the local variable {name} is used before it has a value"
+            yield Flaw(line, "UnboundLocalError", message)
+        else:
+            yield Flaw(line, "NameError", f"the name {name} is not defined")
+
+
+def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
+    """The calls of skills that cannot succeed."""
     rebound = names_bound(tree)
     if "*" in rebound:
         return
@@ -219,16 +233,18 @@ def _call_problems(tree: ast.Module, skills: SkillTable) -> Iterator[Problem]:
                 yield from _wrong_call(node, skills[name])
 
 
-def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Problem]:
+def _wrong_call(node: ast.Call, skill: Skill) -> Iterator[Flaw]:
     is_open = any(isinstance(a, ast.Starred) for a in node.args) or any(k.arg is None for k in node.keywords)
-    message = None if is_open else _mismatch(node, skill)
-    if message:
-        yield Problem(node.lineno, "TypeError", message)
+    if is_open:
         return
-    given = dict(zip((p.name for p in skill.parameters), _leading(node.args), strict=False))
+    message = _mismatch(node, skill)
+    if message:
+        yield Flaw(node.lineno, "TypeError", message)
+        return
+    given = dict(zip((p.name for p in skill.parameters), node.args, strict=False))
     given |= {k.arg: k.value for k in node.keywords if k.arg}
     for parameter in skill.parameters:
-        if parameter.type is list and parameter.name in given:
+        if parameter.type is list:
             yield from _wrong_options(given[parameter.name], skill, parameter)
 
 
@@ -248,74 +264,26 @@ def _mismatch(node: ast.Call, skill: Skill) -> str | None:
     return f"{takes}, but {count or 'no'} argument{'s are' if count > 1 else ' is'} given"
 
 
-def _leading(arguments: Sequence[ast.expr]) -> Iterator[ast.expr]:
-    """The arguments whose place is known: those before the first `*args`."""
-    for argument in arguments:
-        if isinstance(argument, ast.Starred):
-            return
-        yield argument
-
-
-def _wrong_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Problem]:
+def _wrong_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:
+    what = f"the {parameter.name} of {skill.name}"
     if isinstance(node, ast.List):
         if not node.elts:
-            yield Problem(
-                node.lineno, "AskEmptyOptions", f"the {parameter.name} of {skill.name} are an empty list"
-            )
-        for element in node.elts:
-            if what := _literal(element, wanted="a string"):
-                yield Problem(
-                    element.lineno,
-                    "AskInvalidOptions",
-                    f"the {parameter.name} of {skill.name} must be strings, but {what} is among them",
-                )
-    elif what := _literal(node, wanted="a list"):
-        yield Problem(
-            node.lineno,
-            "TypeError",
-            f"the {parameter.name} of {skill.name} must be a list, but {what} is given",
-        )
+            yield Flaw(node.lineno, "AskEmptyOptions", f"{what} are an empty list")
+    elif given := _literal(node):
+        yield Flaw(node.lineno, "TypeError", f"{what} must be a list, but {given} is given")
 
 
 _LITERALS: dict[type[ast.expr], str] = {
     ast.Tuple: "a tuple",
     ast.Dict: "a dictionary",
-    ast.DictComp: "a dictionary",
     ast.Set: "a set",
-    ast.SetComp: "a set",
     ast.GeneratorExp: "a generator",
     ast.JoinedStr: "a string",
-    ast.List: "a list",
-    ast.ListComp: "a list",
-    ast.Lambda: "a function",
 }
 
 
-def _literal(node: ast.expr, *, wanted: str) -> str | None:
-    """What a literal is, unless it is of the type that is wanted; None also for what is no literal."""
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
-        node = node.operand
+def _literal(node: ast.expr) -> str | None:
+    """What a literal is; None for what is none."""
     if isinstance(node, ast.Constant):
-        what = "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"
-    else:
-        what = _LITERALS.get(type(node), "")
-    return what if what and what != wanted else None
-
-
-def names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
-    """The names that a program gives a meaning anywhere, in whatever scope; `*` where nobody can tell."""
-    names: set[str] = set()
-    skipped = {id(node) for node in besides}
-    for node in ast.walk(tree):
-        if id(node) in skipped:
-            continue
-        match node:
-            case ast.Name(name, ast.Store() | ast.Del()) | ast.arg(name) | ast.MatchMapping(rest=str(name)):
-                names.add(name)
-            case ast.FunctionDef(name) | ast.AsyncFunctionDef(name) | ast.ClassDef(name):
-                names.add(name)
-            case ast.ExceptHandler(name=str(name)) | ast.MatchAs(name=str(name)) | ast.MatchStar(str(name)):
-                names.add(name)
-            case ast.alias(name, asname):
-                names.add(asname or name.split(".", 1)[0])
-    return names
+        return "a string" if isinstance(node.value, str) else f"the value {node.value!r:.40}"
+    return _LITERALS.get(type(node))

@@ -1,7 +1,7 @@
-"""The skill table: the one place that knows what a robot can be asked to do.
+"""The skill table: what a robot can do, from its Python signature to its ROS action and its verbs.
 
-Prompts, the simulator, the sandbox, RTL, ROS types, explanations and the page are all derived from it: one
-more skill is one more row here and one more behaviour in `codebotler.simulator.robot`.
+Everything else is derived from it: one more skill is one more row here and one more behaviour in
+`codebotler.simulator.robot`.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ class Parameter:
 
     Args:
         name: the keyword by which a program may pass it.
-        type: `str` or `list`; exactly this type is asked for, no subclass and no other sequence.
-        annotation: how the type is written for a reader, such as `list[str]`.
+        type: `str` or `list`; an argument must have exactly this type.
+        annotation: the type as a reader sees it, such as `list[str]`.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Recording:
     """What a skill leaves in the trace.
 
     Args:
-        kind: the event's kind, which is also the name of its element in RTL, such as `goto`.
+        kind: the event's kind, which is also its name in RTL, such as `goto`.
         text: the parameter whose value is the event's text.
         options: the parameter whose value is the event's list of options, for a question.
     """
@@ -42,7 +42,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Verb:
-    """What a skill is called when people read about it; the event's text follows it.
+    """A skill in English; the event's text follows it.
 
     Args:
         base: the infinitive without "to", such as `pick up`.
@@ -92,10 +92,10 @@ class Skill:
         name: the function a program calls.
         parameters: its arguments, in order.
         returns: the annotation of what comes back.
-        doc: what it does, in a sentence meant for the person or model who writes programs.
-        recording: what it leaves in the trace; None for skills that leave nothing.
+        doc: what it does, in a sentence for the person or model that writes programs.
+        recording: its event in the trace; None for skills without one.
         ros: the action on a robot.
-        verb: for people; without one they read the skill's name and its arguments.
+        verb: for people; without one, they read the skill's name and its arguments.
     """
 
     name: str
@@ -155,13 +155,17 @@ class SkillTable(Mapping[str, Skill]):
 
     @property
     def recordings(self) -> Mapping[str, Recording]:
-        """What can stand in a trace, by kind of event."""
+        """The events that a trace can have, by kind."""
         return {s.recording.kind: s.recording for s in self.rows if s.recording}
 
     @property
     def verbs(self) -> Mapping[str, Verb]:
-        """What people read of an event, by its kind; kinds without a verb are absent."""
+        """The verbs of events, by kind; kinds without a verb are absent."""
         return {s.recording.kind: s.verb for s in self.rows if s.recording and s.verb}
+
+
+def _verb(base: str, rest: str) -> Verb:
+    return Verb(*(f"{base}{end} {rest}" for end in ("", "s", "ed", "ing")))
 
 
 SKILLS = SkillTable(
@@ -172,12 +176,7 @@ SKILLS = SkillTable(
             "str",
             "Name the room the robot is in.",
             ros=RosAction("GetCurrentLocation", "/get_current_location_server", result="string"),
-            verb=Verb(
-                "look up where it is",
-                "looks up where it is",
-                "looked up where it is",
-                "looking up where it is",
-            ),
+            verb=_verb("look", "up where it is"),
         ),
         Skill(
             "get_all_rooms",
@@ -185,12 +184,7 @@ SKILLS = SkillTable(
             "list[str]",
             "List the names of all rooms.",
             ros=RosAction("GetAllRooms", "/get_all_rooms_server", result="string[]"),
-            verb=Verb(
-                "look up which rooms there are",
-                "looks up which rooms there are",
-                "looked up which rooms there are",
-                "looking up which rooms there are",
-            ),
+            verb=_verb("look", "up which rooms there are"),
         ),
         Skill(
             "is_in_room",

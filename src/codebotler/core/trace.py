@@ -26,11 +26,11 @@ class Event:
 
     Args:
         kind: goto, say, ask, check, pick or place, or the kind of a further skill.
-        text: the request as the program made it, without spaces at its ends.
+        text: the program's request, without spaces at its ends.
         options: what a question offered; empty for other kinds.
-        answer: the chosen option's text; None where nobody answered, and for other kinds.
-        found: what a look saw; None for other kinds.
-        place: the room in which it happened, as the world names it (for a drive, the room it started in).
+        answer: the text of the chosen option; None without an answer, and for other kinds.
+        found: the result of a look; None for other kinds.
+        place: the room where it happened, as the world names it (for a drive, the room where it started).
         time: simulated seconds since the start of the run.
     """
 
@@ -72,7 +72,7 @@ class RunError:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one run of a program in a world ended, and what the robot did until then.
+    """How a run of a program in a world ended, and what the robot did until then.
 
     Args:
         status: how it ended.

@@ -1,4 +1,4 @@
-"""English that sentences of all parts share."""
+"""English for messages: enumerations, numbers and plurals."""
 
 from __future__ import annotations
 
@@ -6,31 +6,17 @@ from collections.abc import Sequence
 
 
 def listed(parts: Sequence[str], last: str = "and") -> str:
-    """An enumeration: `a, b and c`.
-
-    Args:
-        parts: what to enumerate.
-        last: the word before the last part.
-    """
+    """An enumeration: `a, b and c`."""
     if len(parts) <= 1:
         return "".join(parts)
     return f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
 def counted(number: int, noun: str) -> str:
-    """How many: `1 world`, `2,000 worlds`.
-
-    Args:
-        number: 0 or more.
-        noun: in the singular; its plural ends in `s`.
-    """
+    """A number with a noun whose plural ends in `s`: `1 world`, `2,000 worlds`."""
     return f"{number:,} {noun}{'s' * (number != 1)}"
 
 
 def times(number: int) -> str:
-    """How often: `once`, `twice`, `3 times`.
-
-    Args:
-        number: 0 or more.
-    """
+    """A frequency: `once`, `twice`, `3 times`."""
     return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number:,} times")

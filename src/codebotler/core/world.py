@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import re
+import warnings
 from dataclasses import dataclass, replace
+from math import dist
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -20,12 +21,12 @@ from pydantic import (
     model_validator,
 )
 
-from codebotler.core.errors import Place, YamlFile
-from codebotler.core.unwarned import unwarned
 from codebotler.core.words import counted
+from codebotler.core.yaml_files import Place, YamlFile
+
+warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # odd regexes, which still work
 
 Point: TypeAlias = tuple[float, float]
-
 
 Answer: TypeAlias = str | int
 """A regex for the option that is chosen, or its position: 1 is the first, -1 the last."""
@@ -33,13 +34,13 @@ Answer: TypeAlias = str | int
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody in a room who answers questions.
+    """A person in a room who answers questions.
 
     Args:
         name: a regex for the names they answer to.
         answers: one per question, in order; the last one stays for ever. Without any, every question fails.
-        topics: regexes, and what is answered to a question in which one is found, instead of the next answer.
-        after_looks: how often the robot looks into the room in vain before they come; 0 if they are there.
+        topics: regexes, and the answer to a question in which one is found, instead of the next answer.
+        after_looks: how often the robot looks for them in vain before they come; 0 if they are there.
         leaves: whether they go when they have given their last answer.
     """
 
@@ -58,7 +59,7 @@ class Room:
         name: a regex that is looked for in what a program asks for.
         objects: labels of what lies there, in order.
         people: who is there, in order.
-        footprint: its corners in metres; None where nobody measured it.
+        footprint: its corners in metres; None if unknown.
         stand_at: where the robot stops in it, in metres.
     """
 
@@ -90,20 +91,16 @@ class World:
 
     @classmethod
     def read(cls, path: Path) -> World:
-        """Read a world file.
-
-        Raises:
-            UserError: the file is missing or wrong; the sentence names the line and the mend.
-        """
+        """Read a world file; a UserError names the line of what is wrong, and how to mend it."""
         file = YamlFile.read(path)
         return file.validate(WorldFile).world(file)
 
     def to_yaml(self) -> str:
         """This world as the text of a world file."""
-        return yaml.dump(self.to_data(), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+        return yaml.safe_dump(self.to_data(), sort_keys=False, allow_unicode=True, width=100)
 
     def to_data(self) -> dict[str, object]:
-        """What a world file would say of this world."""
+        """The content of a world file for this world."""
         data: dict[str, object] = {
             "about": self.about,
             "robot": self.robot,
@@ -128,7 +125,7 @@ ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
 def laid_out(world: World) -> World:
     """The world with a footprint and a standing point for every room: a grid on both sides of a hallway.
 
-    Rooms that have a footprint keep it; the others are placed beyond the rightmost of them.
+    Rooms with a footprint keep it; the others are placed to the right of them.
     """
     taken = [x for room in world.rooms for x, _ in room.footprint or ()]
     start = max(taken, default=0.0) + (HALLWAY if taken else 0.0)
@@ -166,7 +163,7 @@ def _not_zero(option: int) -> int:
 
 
 class OptionFile(_Form):
-    """An answer as a world file writes it where it is a position among the options."""
+    """An answer by its position among the options, in a world file."""
 
     option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
 
@@ -181,7 +178,7 @@ AnswerFile = Annotated[
 
 
 class PersonFile(_Form):
-    """A person as a world file writes them."""
+    """A person in a world file."""
 
     name: Name
     answers: list[AnswerFile] = []
@@ -190,7 +187,7 @@ class PersonFile(_Form):
     leaves: Annotated[bool, Field(strict=True)] = False
 
     def person(self) -> Person:
-        """The person it describes."""
+        """The person that it describes."""
         topics = tuple((topic, _answer(answer)) for topic, answer in self.topics.items())
         answers = tuple(map(_answer, self.answers))
         return Person(self.name, answers, topics, self.after_looks, self.leaves)
@@ -201,7 +198,7 @@ def _answer(form: AnswerFile) -> Answer:
 
 
 class RoomFile(_Form):
-    """A room as a world file writes it: its name alone, or with geometry."""
+    """A room in a world file: its name alone, or with geometry."""
 
     name: Name
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
@@ -214,7 +211,7 @@ class RoomFile(_Form):
 
 
 class WorldFile(_Form):
-    """A world as a file writes it, alone or inside a task."""
+    """A world in a file, alone or inside a task."""
 
     about: Text = ""
     robot: Name
@@ -224,25 +221,21 @@ class WorldFile(_Form):
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
 
     def world(self, file: YamlFile, at: Place = ()) -> World:
-        """The world it describes.
+        """The world that it describes, or a UserError about a room or a regex.
 
         Args:
-            file: where it stands, for the sentences of errors.
-            at: where in the file.
-
-        Raises:
-            UserError: a room does not exist or stands twice, or a regex is invalid.
+            file: the file, for errors.
+            at: its place in the file.
         """
         names = [room.name for room in self.rooms]
-        for index, name in enumerate(names):
-            expect_regex(name, file, (*at, "rooms", index))
-            if name in names[:index]:
-                raise file.wrong(f'the room "{name}" stands here twice; remove one', *at, "rooms", index)
-            room = self.rooms[index]
+        for index, room in enumerate(self.rooms):
+            expect_regex(room.name, file, (*at, "rooms", index))
+            if room.name in names[:index]:
+                raise file.wrong(f'the room "{room.name}" is here twice; remove one', *at, "rooms", index)
             if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
-                sentence = f'the robot would stand at {point}, outside of the footprint of "{name}"; move one'
-                raise file.wrong(sentence, *at, "rooms", index, "stand_at")
+                sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
+                raise file.wrong(f"{sentence}; move one of them", *at, "rooms", index, "stand_at")
         self._check_places(file, at, names)
         return World(
             rooms=tuple(
@@ -264,18 +257,17 @@ class WorldFile(_Form):
         known = ", ".join(rooms)
         if self.robot not in rooms:
             raise file.wrong(f'the robot starts in "{self.robot}", but the rooms are: {known}', *at, "robot")
+        for key, named in (("objects", self.objects), ("people", self.people)):
+            for room in named:
+                if room not in rooms:
+                    raise file.wrong(f'there is no room "{room}"; the rooms are: {known}', *at, key, room)
+        self._check_regexes(file, at)
+
+    def _check_regexes(self, file: YamlFile, at: Place) -> None:
         for room, labels in self.objects.items():
-            if room not in rooms:
-                raise file.wrong(
-                    f'there are objects in "{room}", but the rooms are: {known}', *at, "objects", room
-                )
             for index, label in enumerate(labels):
                 expect_regex(label, file, (*at, "objects", room, index))
         for room, people in self.people.items():
-            if room not in rooms:
-                raise file.wrong(
-                    f'there are people in "{room}", but the rooms are: {known}', *at, "people", room
-                )
             for index, person in enumerate(people):
                 here = (*at, "people", room, index)
                 expect_regex(person.name, file, (*here, "name"))
@@ -295,52 +287,21 @@ def _is_within(point: Point, corners: list[Point]) -> bool:
     odd = False
     size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
     for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
+        detour = dist(point, (x1, y1)) + dist(point, (x2, y2)) - dist((x1, y1), (x2, y2))
+        if detour <= _ON_EDGE * size:
             return True
         if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
             odd = not odd
     return odd
 
 
-def _distance(point: Point, start: Point, end: Point) -> float:
-    """How far a point is from a line between two others."""
-    (x, y), (x1, y1), (x2, y2) = point, start, end
-    dx, dy = x2 - x1, y2 - y1
-    square = dx * dx + dy * dy
-    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
-    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
-
-
 def expect_regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
-    """Refuse a text of a file that is no regular expression.
-
-    Args:
-        text: what stands there; an option by its position is none.
-        file: the file.
-        place: where in it.
-
-    Raises:
-        UserError: it is none.
-    """
-    if isinstance(text, OptionFile):
-        return
+    """Refuse a text that is no regular expression."""
     try:
-        with unwarned():
+        if isinstance(text, str):
             re.compile(text)
     except (re.error, RecursionError, OverflowError) as error:
         raise file.wrong(f'"{text}" is no valid regular expression: {error}', *place) from None
-
-
-class _Dumper(yaml.SafeDumper):
-    """Writes texts so that they read back; PyYAML folds rare line breaks away where it need not quote."""
-
-
-def _written_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
-    rare = any(character in text for character in "\x85\u2028\u2029")
-    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"' if rare else None)
-
-
-_Dumper.add_representer(str, _written_text)
 
 
 def _person_data(person: Person) -> dict[str, object]:

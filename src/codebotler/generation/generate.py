@@ -155,9 +155,8 @@ def write_checked_program(
     with WorkerPool(1) as pool:
 
         def problems_of(program: str) -> list[str]:
-            return [
-                problem.sentence for problem in check(program, rooms=rooms, plan=room_map, pool=pool).problems
-            ]
+            found = check(program, rooms=rooms, room_map=room_map, pool=pool)
+            return [problem.sentence for problem in found.problems]
 
         def result() -> Generation:
             return asyncio.run(

@@ -14,7 +14,7 @@ from uuid import uuid4
 from mcap.writer import Writer
 
 from codebotler import __version__
-from codebotler.core.replacing import expect_replaceable
+from codebotler.core.files import expect_replaceable
 from codebotler.core.skills import SKILLS, Skill, SkillTable
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.pictures import picture_of

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeAlias
 
-from codebotler.core.home import make_folder
+from codebotler.core.files import make_folder
 from codebotler.core.terminal import visible
 from codebotler.core.trace import Outcome, RunError, Status, Trace
 from codebotler.missions.live import LiveRobot, StoppedError

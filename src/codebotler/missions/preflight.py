@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from codebotler.checking.problems import no_room
 from codebotler.checking.room_names import named_rooms
-from codebotler.core.program import called_skills
+from codebotler.core.program import called_skills, tree_of
 from codebotler.core.terminal import note, shortened, visible
 from codebotler.missions.live import answered
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
@@ -65,13 +65,13 @@ def unknown_rooms(program: str, room_map: RoomMap) -> list[str]:
     def is_part(name: str) -> bool:
         return any(name.casefold() in room.casefold() for room in room_map.rooms)
 
-    named = named_rooms(program)
+    named = named_rooms(tree_of(program))
     return [no_room(name, room_map) for name in named if room_map.room(name) is None and not is_part(name)]
 
 
 def missing_skills(program: str, robot: Robot) -> list[str]:
     """A sentence for each skill that a program calls and a connected robot lacks."""
-    called = called_skills(program, robot.skills)
+    called = called_skills(tree_of(program), robot.skills)
     return [
         f"line {line}: the robot cannot {skill}: {visible(robot.missing[skill])}"
         for skill, line in sorted(called.items(), key=lambda item: item[1])

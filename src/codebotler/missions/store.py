@@ -9,7 +9,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 from codebotler.core.errors import UserError
-from codebotler.core.pasted import mission_command
 from codebotler.missions.log import SUMMARY, Line, Log, Summary, doing, events_of
 from codebotler.missions.mission import STEPS, State
 from codebotler.missions.wording import call_text
@@ -28,8 +27,7 @@ def find(home: Path, name: str) -> Path:
         return home / "missions" / known[-1].id
     folder = home / "missions" / name
     if not ID.fullmatch(name) or not (folder / SUMMARY).is_file():
-        lists = mission_command("missions")
-        raise UserError(f'there is no mission "{name}"; `{lists}` lists those there are')
+        raise UserError(f'there is no mission "{name}"; `codebotler missions` lists them')
     return folder
 
 

@@ -10,7 +10,6 @@ from functools import partial
 from typing import Protocol, TypeAlias
 from urllib.parse import urlsplit
 
-from codebotler.core.arguments import expect_number, expect_whole
 from codebotler.core.errors import UserError
 from codebotler.prompts import Prompt
 from codebotler.prompts.extract import program_of
@@ -48,18 +47,12 @@ class SamplingSettings:
     base_url: str | None = None
 
     def __post_init__(self) -> None:
-        if self.temperature is not None:
-            expect_number(self.temperature, "the temperature")
-            if not 0 <= self.temperature <= 100:  # noqa: PLR2004 - a typo beyond it
-                raise UserError(f"the temperature is {self.temperature:g}, but it must be between 0 and 100")
-        if self.top_p is not None:
-            expect_number(self.top_p, "top-p")
-            if not 0 < self.top_p <= 1:
-                raise UserError(f"top-p is {self.top_p:g}, but it must be above 0 and at most 1")
-        expect_whole(self.max_tokens, "the limit of tokens", least=1)
-        if self.seed is not None:
-            expect_whole(self.seed, "the seed")
-        expect_number(self.timeout, "the timeout")
+        if self.temperature is not None and not 0 <= self.temperature <= 100:  # noqa: PLR2004 - a typo beyond it
+            raise UserError(f"the temperature is {self.temperature:g}, but it must be between 0 and 100")
+        if self.top_p is not None and not 0 < self.top_p <= 1:
+            raise UserError(f"top-p is {self.top_p:g}, but it must be above 0 and at most 1")
+        if self.max_tokens < 1:
+            raise UserError(f"the limit of tokens is {self.max_tokens}, but it must be at least 1")
         if not 0 < self.timeout < math.inf:
             raise UserError(f"the timeout is {self.timeout:g} seconds, but it must be above 0")
         if self.base_url is not None:

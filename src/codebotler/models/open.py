@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from codebotler.core.arguments import expect_text
 from codebotler.core.errors import UserError
 from codebotler.models.base import Model, SamplingSettings
 from codebotler.models.recorded import RecordedModel, recorded_model
@@ -25,7 +24,6 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
     Raises:
         UserError: there is no such model, a key is not in the environment, or something is not installed.
     """
-    expect_text(name, "the model's name")
     kind, rest = kind_of(name), name.partition(":")[2]
     # Each of these imports a large library, which only who uses it should wait for.
     match kind:

@@ -15,7 +15,8 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.errors import UserError, YamlFile
+from codebotler.core.errors import UserError
+from codebotler.core.yaml_files import YamlFile
 from codebotler.models import base
 from codebotler.models.base import Heard, ModelError, Usage, unheard
 from codebotler.prompts import Prompt

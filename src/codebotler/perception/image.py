@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -11,7 +12,6 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 
 from codebotler.core.errors import UserError
-from codebotler.core.unwarned import unwarned
 from codebotler.models.server_errors import brief
 from codebotler.perception.base import Sighting
 
@@ -48,7 +48,7 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
         raise UserError(f"{name} is larger than {MAX_BYTES:,} bytes; take a smaller one")
     try:
         # A picture that says it is huge is refused here before anything of it is unpacked.
-        with unwarned([Image.DecompressionBombWarning]):
+        with warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning):
             opened = Image.open(io.BytesIO(data), formats=FORMATS)
         _check_size(*opened.size, name)
         opened.load()

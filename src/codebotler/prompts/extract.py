@@ -9,8 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from codebotler.core.arguments import expect_text
-from codebotler.core.program import TASK, Problem, Program, bound_names, entries, parsed, undefined_names
+from codebotler.core.program import TASK, Flaw, Program, bound_names, entries, parsed, undefined_names
 from codebotler.core.skills import SKILLS
 
 
@@ -25,11 +24,7 @@ def program_of(reply: str) -> Program:
 
     Args:
         reply: code with or without fences and prose, or the indented body of `task_program` alone.
-
-    Raises:
-        UserError: the reply is no text.
     """
-    expect_text(reply, "the reply")
     lines = re.split(r"\r\n|\r|\n", reply)
     if _is_plain(lines):
         return Program(_text(lines))
@@ -109,7 +104,7 @@ def _is_plain(lines: Sequence[str]) -> bool:
     """Whether a reply is a program as it stands."""
     source = "\n".join(lines)
     tree = parsed(source)
-    return not isinstance(tree, Problem) and TASK in bound_names(source) and len(entries(tree)) <= 1
+    return not isinstance(tree, Flaw) and TASK in bound_names(source) and len(entries(tree)) <= 1
 
 
 def _blocks(lines: Sequence[str]) -> Iterator[_Block]:
@@ -143,7 +138,7 @@ def _closes(marks: str, line: str) -> bool:
 
 def _runs(lines: Sequence[str]) -> Iterator[Sequence[str]]:
     """The stretches of lines between paragraphs of prose, without empty ones."""
-    if not isinstance(parsed("\n".join(_headless(lines) or _dedented(lines))), Problem):
+    if not isinstance(parsed("\n".join(_headless(lines) or _dedented(lines))), Flaw):
         if _code_of(lines):
             yield lines
         return
@@ -165,7 +160,7 @@ def _is_prose(line: str) -> bool:
     """Whether a line can be nothing but prose; in doubt it is code, so that no code is ever lost."""
     if _INTERJECTION.match(line):
         return True
-    return bool(_PROSE.match(line)) and not _CODE.match(line) and isinstance(parsed(line.strip()), Problem)
+    return bool(_PROSE.match(line)) and not _CODE.match(line) and isinstance(parsed(line.strip()), Flaw)
 
 
 def _goes_on(line: str) -> bool:
@@ -197,7 +192,7 @@ def _headless(lines: Sequence[str]) -> list[str] | None:
 
 
 def _tree_is_fine(lines: Sequence[str]) -> bool:
-    return not isinstance(parsed("\n".join(lines)), Problem)
+    return not isinstance(parsed("\n".join(lines)), Flaw)
 
 
 def _code_of(lines: Sequence[str]) -> list[int]:
@@ -219,7 +214,7 @@ def _without_next_example(lines: Sequence[str]) -> Sequence[str]:
     """The lines up to a second `def task_program` and the comment that introduces it."""
     tree = parsed("\n".join(lines))
     starts = [i for i, line in enumerate(lines) if _ENTRY.match(line) and "=" not in line.split("(", 1)[0]]
-    if len(starts) <= 1 or (not isinstance(tree, Problem) and len(entries(tree)) <= 1):
+    if len(starts) <= 1 or (not isinstance(tree, Flaw) and len(entries(tree)) <= 1):
         return lines
     end = starts[1]
     while not lines[end - 1].strip() or lines[end - 1].startswith(("#", "@")):
@@ -249,7 +244,7 @@ def _choose(blocks: Sequence[_Block]) -> _Block | None:
 def _is_outline(block: _Block) -> bool:
     """Whether nothing is done in it: its program is a docstring, `...` or `pass`."""
     tree = parsed("\n".join(block.lines))
-    return not isinstance(tree, Problem) and any(all(map(_is_idle, e.body)) for e in entries(tree))
+    return not isinstance(tree, Flaw) and any(all(map(_is_idle, e.body)) for e in entries(tree))
 
 
 def _is_idle(statement: ast.stmt) -> bool:
@@ -340,13 +335,13 @@ def _starred(source: str) -> set[str]:
 
 def _nodes(source: str) -> Iterator[ast.AST]:
     tree = parsed(source)
-    return iter(()) if isinstance(tree, Problem) else ast.walk(tree)
+    return iter(()) if isinstance(tree, Flaw) else ast.walk(tree)
 
 
 def _undefined(source: str) -> list[tuple[int, str]]:
     """Where a program uses names that nothing defines; none can be told of one that does not parse."""
     tree = parsed(source)
-    if isinstance(tree, Problem):
+    if isinstance(tree, Flaw):
         return []
     try:
         return [(line, name) for line, name, _ in undefined_names(tree, SKILLS)]

@@ -13,10 +13,9 @@ from pathlib import Path
 from string import Template
 from typing import Literal, TypeAlias
 
-from codebotler.core.arguments import expect_skills, expect_text, expect_texts
-from codebotler.core.program import TASK
+from codebotler.core.errors import expect_list
+from codebotler.core.program import TASK, parse
 from codebotler.core.skills import SKILLS, Skill, SkillTable
-from codebotler.core.syntaxtree import parse
 
 Role: TypeAlias = Literal["system", "user", "assistant"]
 
@@ -130,11 +129,9 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
         skills: what a program may call.
 
     Raises:
-        UserError: the instruction is no text, the rooms are no list of texts, or the skills no table of them.
+        UserError: the rooms are a single text.
     """
-    expect_text(instruction, "the instruction")
-    expect_texts(rooms, "the rooms")
-    expect_skills(skills)
+    expect_list(rooms, "the rooms")
     about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
     wish = "\n\n".join(filter(None, (instruction.strip(), about_rooms)))
     stubs = [_stub(skill) for skill in skills.values()]

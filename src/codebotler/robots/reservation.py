@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Self
 from urllib.parse import quote
 
-from codebotler.core.home import make_folder
+from codebotler.core.files import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
 LONGEST = 200  # characters of the name of a lock; no file system takes more than 255

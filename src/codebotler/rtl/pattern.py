@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import re
 
-from codebotler.core.unwarned import unwarned
-
 
 def compile_regex(pattern: str) -> re.Pattern[str]:
     """A regex as RTL reads it: case is ignored, and `.` matches line breaks as well."""
-    # `[[` and the like may mean something else in a later Python; in this one they are plain.
-    with unwarned():
-        return re.compile(pattern, re.IGNORECASE | re.DOTALL)
+    return re.compile(pattern, re.IGNORECASE | re.DOTALL)
 
 
 def whole_word(pattern: str) -> re.Pattern[str]:

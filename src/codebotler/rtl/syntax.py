@@ -9,8 +9,8 @@ from dataclasses import replace
 from difflib import get_close_matches
 from typing import get_args
 
+from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.syntaxtree import parse_expression
 from codebotler.rtl.formula import (
     ActAtFirst,
     ActAtSome,

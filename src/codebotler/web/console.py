@@ -11,7 +11,7 @@ from typing import Self
 
 from codebotler.checking.check import check
 from codebotler.checking.problems import Check
-from codebotler.core.home import make_folder
+from codebotler.core.files import make_folder
 from codebotler.core.world import World
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.mission import GRACE, MissionError
@@ -170,7 +170,7 @@ class Console:
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))
-            return check(program, plan=room_map, pool=self._pool)
+            return check(program, room_map=room_map, pool=self._pool)
 
 
 class Notifier:

@@ -102,7 +102,7 @@ def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Ma
 
 def _holds(formula: Formula, data: Iterable[object]) -> bool:
     try:
-        return holds(formula, _driven(trace_from(data, further=True)))
+        return holds(formula, _driven(trace_from(data)))
     except Inconclusive:
         return False
 

@@ -114,13 +114,9 @@ def load(suite: str) -> Suite:
     return load_suite(suite)
 
 
-def command(
-    verb: str, *arguments: object, suite: str, ablated: bool = False, program: str | None = None
-) -> str:
-    """A command to paste; by default it calls roboeval by the path or name that works in this shell."""
-    from codebotler.core.pasted import runnable
-
-    words = [program or runnable("roboeval"), verb, *map(str, arguments)]
+def command(verb: str, *arguments: object, suite: str, ablated: bool = False) -> str:
+    """A command line to paste."""
+    words = ["roboeval", verb, *map(str, arguments)]
     words += [] if suite == "paper" else ["--suite", suite]
     words += ["--ablation"] if ablated else []
     return shlex.join(words)

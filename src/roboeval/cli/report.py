@@ -63,7 +63,7 @@ def report(
     options += [] if beside is None else ["--beside", beside]
     options += ["--no-check"] * (not check)
     options += [word for text in price or () for word in ("--price", text)]
-    again = command("report", *runs, *options, suite=suite, program="roboeval")
+    again = command("report", *runs, *options, suite=suite)
     with busy("putting together"):
         parts = sections(read, with_published=published, prices=prices, command=again)
     written = write_report(*headline(read), parts, out)

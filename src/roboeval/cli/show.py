@@ -110,7 +110,7 @@ def export(
     ablation: AblationOption = False,
 ) -> None:
     """Write a run's verdicts as one flat table."""
-    from codebotler.core.replacing import expect_replaceable
+    from codebotler.core.files import expect_replaceable
     from roboeval.evaluation.runs.table import BEGINNINGS, kind_of, write_table
 
     kind = format or kind_of(out)

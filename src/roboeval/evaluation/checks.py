@@ -8,7 +8,9 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from codebotler import __version__
-from codebotler.checking.check import Check, CheckSettings, check_on
+from codebotler.checking.check import check_on
+from codebotler.checking.problems import Check
+from codebotler.checking.sampled import CheckSettings
 from codebotler.core.files import Appender, to_line, to_text, write_whole
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.simulator.worker import Worker

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager
 from typing import Protocol, Self, TypeAlias, TypeVar
 
-from codebotler.core.arguments import expect_whole
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.worker import Worker
@@ -38,8 +37,6 @@ class Local:
     """The cores of this machine: given pool, or some of its own, which end with the context."""
 
     def __init__(self, pool: WorkerPool | int, *, require_isolation: bool = False) -> None:
-        if not isinstance(pool, WorkerPool):
-            expect_whole(pool, "the number of workers", least=1)
         self._given, self._required = pool, require_isolation
 
     def __enter__(self) -> Self:

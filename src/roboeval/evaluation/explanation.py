@@ -80,7 +80,7 @@ def _scenario(suite: Suite | None, row: Mapping[str, Any], number: int, *, ablat
 
 
 def _trace(verdict: Mapping[str, Any], scenario: Scenario | None) -> Trace:
-    trace = trace_from(verdict["trace"], further=True)
+    trace = trace_from(verdict["trace"])
     return trace if scenario is None else located(trace, scenario.world)
 
 

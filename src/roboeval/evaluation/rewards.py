@@ -12,8 +12,7 @@ from functools import partial
 from os import PathLike
 from statistics import fmean
 
-from codebotler.core.arguments import expect_texts
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import shared_pool
@@ -59,7 +58,7 @@ def reward(
             a program is no text.
         EngineError: no isolated process could be started.
     """
-    expect_texts(programs, "the programs")
+    expect_list(programs, "the programs")
     chosen = suite if isinstance(suite, Suite) else load_suite(suite)
     if worlds is not None or seed is not None:
         chosen = chosen.with_worlds(worlds, seed)

@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from codebotler.core.syntaxtree import parse_expression
+from codebotler.core.program import parse_expression
 from codebotler.core.world import Room
 from codebotler.rtl import EventPattern, Regex
 from codebotler.rtl.reasoning.alphabet import elements

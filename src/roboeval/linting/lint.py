@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
-from codebotler.core.errors import YamlFile
+from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Not
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from roboeval.linting.findings import Finding

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import NamedTuple
 
-from codebotler.core.errors import YamlFile
 from codebotler.core.world import World
+from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.robot import whole_words

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.errors import YamlFile
 from codebotler.core.words import listed
+from codebotler.core.yaml_files import YamlFile
 from codebotler.rtl import Formula, Regex, Text
 from codebotler.rtl.reasoning import Reasoner, Undecided
 from codebotler.rtl.reasoning.alphabet import elements

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypeVar
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.program import Problem, parsed
+from codebotler.core.program import Flaw, parsed
 from codebotler.core.skills import SKILLS
 
 Node = TypeVar("Node", bound=ast.AST)
@@ -57,7 +57,7 @@ def read(program: str) -> ProgramTree | None:
     """The tree of a program; None if it does not parse, or is nested too deeply to be unparsed."""
     tree = parsed(program, compiled=True)
     try:
-        return None if isinstance(tree, Problem) else ProgramTree(tree, ast.unparse(tree))
+        return None if isinstance(tree, Flaw) else ProgramTree(tree, ast.unparse(tree))
     except RecursionError:
         return None
 
@@ -89,7 +89,7 @@ def changed(program: ProgramTree, edit: Edit) -> str | None:
         text = ast.unparse(ast.fix_missing_locations(rewritten(program.tree, edit)))
     except RecursionError:
         return None
-    return None if isinstance(parsed(text, compiled=True), Problem) else text
+    return None if isinstance(parsed(text, compiled=True), Flaw) else text
 
 
 # --- what stands in a tree

@@ -12,7 +12,7 @@ import polars as pl
 import yaml
 from matplotlib.figure import Figure
 
-from codebotler.core.errors import Loader
+from codebotler.core.yaml_files import Loader
 from roboeval.analysis.cluster import Cluster
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.table import write_table

@@ -11,7 +11,7 @@ from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
-from codebotler.core.syntaxtree import parse_expression
+from codebotler.core.program import parse_expression
 
 Names = Mapping[str, Any]  # texts, numbers, lists, and people and things as namespaces
 

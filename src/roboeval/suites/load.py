@@ -11,10 +11,10 @@ from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 
-from codebotler.core.arguments import expect_whole
-from codebotler.core.errors import UserError, YamlFile
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.words import counted
+from codebotler.core.yaml_files import YamlFile
 from codebotler.simulator.rules import Rules
 from roboeval.suites.installed import installed_folder, installed_suites
 from roboeval.suites.schema import MOST_WORLDS, Accepted, Fact, SuiteFile
@@ -87,8 +87,8 @@ class Suite:
         """
         if self.worlds is None or self.folder is None:
             raise UserError(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
-        if count is not None:
-            expect_whole(count, "the number of worlds", least=1, most=MOST_WORLDS)
+        if count is not None and not 1 <= count <= MOST_WORLDS:
+            raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MOST_WORLDS:,}")
         return _read_suite(
             self.folder, self.skills, count or self.worlds, self.seed if seed is None else seed
         )

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from codebotler.core.errors import YamlFile
 from codebotler.core.world import Name, Text
+from codebotler.core.yaml_files import YamlFile
 from codebotler.models.recorded import NAMES, Recording, Solution
 from roboeval.suites.load import Task
 

@@ -8,10 +8,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from codebotler.core.errors import Place, UserError, YamlFile
+from codebotler.core.errors import UserError
+from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.syntaxtree import parse_expression
 from codebotler.core.world import expect_regex
+from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
 from roboeval.suites.schema import DrawnTaskFile, ScenarioFile, TaskFile
 from roboeval.suites.task import Check, Requirement, Scenario, Task

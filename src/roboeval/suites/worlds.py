@@ -13,8 +13,8 @@ from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.errors import YamlFile
 from codebotler.core.world import OptionFile, Person, Room, World
+from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
 from roboeval.suites.pairwise import Row, spread
 from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorldsFile

@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 from nicegui import html, ui
 
 from codebotler.core.errors import UserError
-from codebotler.core.pasted import runnable
 from codebotler.core.terminal import shortened
 from codebotler.web.elements import Button, PlainText
 from roboeval.web.heat_map import NONE, address
@@ -53,7 +52,7 @@ class _Table:
         self._empty = ui.element("div").classes("first-run")
         with self._empty:
             PlainText("p", NOTHING, "quiet")
-            PlainText("pre", f"{runnable('roboeval')} {FIRST}", "source").props("tabindex=0")
+            PlainText("pre", f"roboeval {FIRST}", "source").props("tabindex=0")
         self._form = ui.element("form").props("action=/side-by-side method=get")
         with self._form:
             region = ui.element("div").classes("sideways").props('tabindex=0 role=region aria-label="Runs"')

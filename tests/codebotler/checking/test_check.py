@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from codebotler.checking.check import MORE, Check, CheckSettings, Sample, check, check_on
+from codebotler.checking.check import check, check_on
+from codebotler.checking.problems import Check, Sample
+from codebotler.checking.sampled import MORE, CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
 from codebotler.simulator.fact_sampler import FactSampler
@@ -245,13 +247,13 @@ def test_waiting_at_several_lines_is_one_problem(checks: Checks) -> None:
 
 def test_what_waits_for_ever_without_a_look_is_run_once() -> None:
     known: dict[RoomMap, list[Sample]] = {}
-    plan = RoomMap(ROOMS, ROOMS[0])
+    room_map = RoomMap(ROOMS, ROOMS[0])
     worker = Worker()
     try:
-        found = check_on(worker, START + "while True:\n        time.sleep(1)\n", plan, known=known)
+        found = check_on(worker, START + "while True:\n        time.sleep(1)\n", room_map, known=known)
     finally:
         worker.close()
-    assert len(known[plan]) == 1
+    assert len(known[room_map]) == 1
     assert len(found.samples) == 5
     assert "imagined worlds" not in found.problems[0].message
 
@@ -317,7 +319,7 @@ def test_where_the_robot_starts(pool: WorkerPool) -> None:
     assert said(("lab", "hall"), "hall") == "hall"
     assert said(()) == "start_loc"
     assert said((), "hall") == "hall"
-    assert check(source, start="hall", pool=pool).plan.start == "hall"
+    assert check(source, start="hall", pool=pool).room_map.start == "hall"
     with pytest.raises(UserError, match=r'"hal".* lab, hall$'):
         said(("lab", "hall"), "hal")
 
@@ -362,15 +364,15 @@ def test_other_seeds_draw_other_worlds_and_the_same_seed_the_same(checks: Checks
 def test_runs_that_are_known_change_nothing() -> None:
     source = START + "\n    ".join(WAITS) + "\n"
     known: dict[RoomMap, list[Sample]] = {}
-    plan = RoomMap(ROOMS, ROOMS[0])
+    room_map = RoomMap(ROOMS, ROOMS[0])
     worker = Worker()
     try:
         for seed in range(6):
-            alone = check_on(worker, source, plan, CheckSettings(seed=seed))
-            assert check_on(worker, source, plan, CheckSettings(seed=seed), known) == alone
+            alone = check_on(worker, source, room_map, CheckSettings(seed=seed))
+            assert check_on(worker, source, room_map, CheckSettings(seed=seed), known) == alone
     finally:
         worker.close()
-    assert len(known[plan]) == 2
+    assert len(known[room_map]) == 2
 
 
 def test_data_is_what_json_can_hold(checks: Checks) -> None:

@@ -1,12 +1,13 @@
 import pytest
 
 from codebotler.checking.room_names import fixed_drives, lists_rooms, named_rooms
+from codebotler.core.program import tree_of
 
 START = "def task_program():\n    "
 
 
 def rooms(*lines: str) -> tuple[str, ...]:
-    return named_rooms(START + "\n    ".join(lines) + "\n")
+    return named_rooms(tree_of(START + "\n    ".join(lines) + "\n"))
 
 
 @pytest.mark.parametrize(
@@ -76,13 +77,13 @@ def test_long_programs_name_a_hundred_rooms_at_most() -> None:
 
 
 def test_deep_programs_name_none() -> None:
-    assert named_rooms(START + "go_to(" + "-" * 5_000 + "1)\n") == ()
-    assert fixed_drives(START + "x = " + " + ".join(["a"] * 5_000) + "\n") == []
+    assert named_rooms(tree_of(START + "go_to(" + "-" * 5_000 + "1)\n")) == ()
+    assert fixed_drives(tree_of(START + "x = " + " + ".join(["a"] * 5_000) + "\n")) == []
 
 
 def test_drives_that_are_written_out() -> None:
     source = START + 'go_to("lab")\n    go_to(location="hall")\n    go_to(x)\n'
-    assert fixed_drives(source) == [(2, "lab"), (3, "hall")]
+    assert fixed_drives(tree_of(source)) == [(2, "lab"), (3, "hall")]
 
 
 @pytest.mark.parametrize(
@@ -96,10 +97,10 @@ def test_drives_that_are_written_out() -> None:
     ],
 )
 def test_drives_that_may_be_saved_or_mean_something_else_are_no_fixed_ones(source: str) -> None:
-    assert fixed_drives(source) == []
+    assert fixed_drives(tree_of(source)) == []
 
 
 def test_whether_it_asks_for_all_rooms() -> None:
-    assert lists_rooms("rooms = get_all_rooms\n")
-    assert not lists_rooms("rooms = ['get_all_rooms()']\n")
-    assert not lists_rooms("get_all_rooms(\n")
+    assert lists_rooms(tree_of("rooms = get_all_rooms\n"))
+    assert not lists_rooms(tree_of("rooms = ['get_all_rooms()']\n"))
+    assert not lists_rooms(tree_of("get_all_rooms(\n"))

@@ -18,7 +18,7 @@ import pytest
 from mcap.reader import make_reader
 
 from codebotler.core.errors import UserError
-from codebotler.core.home import home
+from codebotler.core.files import home
 from codebotler.models.recorded import recorded_model
 from command_line import Ended, command
 from forked import Forked
@@ -393,28 +393,6 @@ def test_missions_are_listed_and_shown(folder: Path) -> None:
     assert (data["id"], data["events"][-1]["state"]) == (name, "done")
 
 
-@pytest.mark.parametrize("named", ["home", "my state/of 'missions' that has a long name"])
-def test_command_that_shows_it_again_can_be_pasted(folder: Path, named: str) -> None:
-    installed = folder / ".venv" / "bin" / "codebotler"
-    installed.parent.mkdir(parents=True)
-    installed.write_text(f"#!{sys.executable}\nfrom codebotler.cli.app import main\nmain()\n")
-    installed.chmod(0o755)
-    without = {name: value for name, value in os.environ.items() if name != "CODEBOTLER_HOME"}
-    without["PATH"] = os.defpath
-
-    def typed(line: str, **more: str) -> str:
-        environment = {**without, "COLUMNS": "60", **more}
-        return subprocess.run(
-            ["bash", "-c", line], cwd=folder, env=environment, text=True, capture_output=True, check=True
-        ).stdout
-
-    run = ".venv/bin/codebotler run good.py --world world.yaml --speed 0 --yes"
-    *_, last = typed(run, CODEBOTLER_HOME=named).splitlines()
-    again = re.search("`(.*)`", last)
-    assert again is not None, last
-    assert 'picks up "mug"' in typed(again[1])
-
-
 @pytest.mark.parametrize("seconds", ["1e300", "999_999.94", "1_000_000", "5"])
 def test_times_take_little_room_however_long_a_program_sleeps(folder: Path, seconds: str) -> None:
     (folder / "long.py").write_text(f"def task_program():\n    time.sleep({seconds})\n    say('late')\n")
@@ -467,7 +445,7 @@ def test_mission_tells_each_state_once(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["none"], ['"none"', "`CODEBOTLER_HOME="]),
+        (["none"], ['"none"', "`codebotler missions`"]),
         (["--mcap", "x.mcap"], ["--mcap", "`last`"]),
         (["last", "--mcap", "x.mcap"], ['"last"']),
         (["last", "--clock", "sun"], ['"sun"', "wall or robot"]),

@@ -125,7 +125,7 @@ def test_a_check_sees_the_robots_own_words() -> None:
     plan, place = preflight(Answering(knowing(["hall", LAB], LAB)))
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", LAB), LAB, LAB)
-    assert check(TO_THE_LAB, plan=plan).problems == ()
+    assert check(TO_THE_LAB, room_map=plan).problems == ()
     (unknown,) = unknown_rooms('def task_program():\n    go_to("lab (2nd flor)")\n', plan)
     assert '"lab (2nd flor)"' in unknown
     assert f'"{LAB}"' in unknown
@@ -161,7 +161,7 @@ def test_robot_is_where_it_says_even_if_it_does_not_list_that_room(
     assert (plan.rooms, plan.start, place) == (("hall", "lab", "dock"), "dock", "dock")
     assert '"dock"' in capsys.readouterr().err
     starts_there = 'def task_program():\n    if get_current_location() != "dock":\n        raise ValueError\n'
-    assert check(starts_there, plan=plan).problems == ()
+    assert check(starts_there, room_map=plan).problems == ()
 
 
 def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:

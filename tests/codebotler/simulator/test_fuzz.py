@@ -14,7 +14,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, note, settings
 from hypothesis import strategies as st
 
-from codebotler.core.program import Problem, Program
+from codebotler.core.program import Flaw, Program
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
@@ -128,7 +128,7 @@ def names_bound(source: str) -> set[str]:
     return names.union(*(node.names for node in nodes if isinstance(node, ast.Global)))
 
 
-def check_problems(source: str, problems: tuple[Problem, ...], outcome: Outcome) -> None:
+def check_problems(source: str, problems: tuple[Flaw, ...], outcome: Outcome) -> None:
     """What is said of a program before it runs is true.
 
     A name may be bound in a branch that is not taken, or deleted, and a name in a program of a program is not
@@ -139,7 +139,7 @@ def check_problems(source: str, problems: tuple[Problem, ...], outcome: Outcome)
         return
     said = re.fullmatch(r"(?:cannot access free variable|name) '(\w+)' .*", outcome.error.message)
     if outcome.error.kind == "NameError" and said and outcome.line:
-        told = Problem(outcome.line, "NameError", f"the name {said[1]} is not defined")
+        told = Flaw(outcome.line, "NameError", f"the name {said[1]} is not defined")
         assert told in problems or said[1] in names_bound(source)
 
 

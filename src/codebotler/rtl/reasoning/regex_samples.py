@@ -10,7 +10,6 @@ from itertools import chain, zip_longest
 from random import Random
 from typing import Any
 
-from codebotler.core.unwarned import unwarned
 from codebotler.rtl.formula import Regex
 
 Tree = Any
@@ -23,9 +22,8 @@ _LONGEST = 10_000
 
 
 def parse_tree(pattern: str) -> Tree:
-    """The syntax tree of a regex."""
-    with unwarned():
-        return import_module("re._parser").parse(pattern, _FLAGS)
+    """The tree of a regex, as Python parses it."""
+    return import_module("re._parser").parse(pattern, _FLAGS)
 
 
 def inner_trees(op: str, arguments: Any) -> list[Tree]:  # noqa: ANN401 - as Python's parser made them

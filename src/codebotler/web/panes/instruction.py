@@ -8,7 +8,7 @@ from nicegui import html, ui
 
 from codebotler.checking.room_names import named_rooms
 from codebotler.core.errors import UserError
-from codebotler.core.program import called_skills
+from codebotler.core.program import called_skills, tree_of
 from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.log import Summary
 from codebotler.missions.mission import MissionError
@@ -112,8 +112,8 @@ def _examples(console: Console) -> list[str]:
         recorded_model("recorded").replies.items(), key=lambda known: len(known[0])
     ):
         program = replies[0].program
-        if plan is None or (named_rooms(program) and not unknown_rooms(program, plan)):
-            found.setdefault(frozenset(called_skills(program)), instruction)
+        if plan is None or (named_rooms(tree_of(program)) and not unknown_rooms(program, plan)):
+            found.setdefault(frozenset(called_skills(tree_of(program))), instruction)
     return list(found.values())[:MOST_EXAMPLES]
 
 

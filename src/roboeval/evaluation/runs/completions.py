@@ -11,7 +11,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, SupportsIndex, TypeAlias
 
-from codebotler.core.arguments import expect_text, expect_whole
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
 from codebotler.core.words import counted
@@ -55,18 +54,13 @@ class Completion:
     more: Mapping[str, Any] = field(default_factory=dict, repr=False, hash=False)
 
     def __post_init__(self) -> None:
-        expect_text(self.task, "the task")
         for name, number in (("prompt", self.prompt), ("index", self.index)):
-            expect_whole(number, f"the {name}", least=0)
-            if number >= MOST:
-                raise UserError(f"the {name} is {number}, but it must be below {MOST:,}")
-            if type(number) is not int:  # but of a library's kind, which JSON cannot write
-                object.__setattr__(self, name, int(number))
-        expect_text(self.program, "the program")
-        if self.instruction is not None:
-            expect_text(self.instruction, "the instruction")
-        if self.model is not None:
-            expect_text(self.model, "the model")
+            if type(number) is not int or not 0 <= number < MOST:
+                raise UserError(f"the {name} is {number!r}, but must be a whole number below {MOST:,}")
+        for name in ("task", "program", "instruction", "model"):
+            text = getattr(self, name)
+            if not isinstance(text, str) and (text is not None or name in REQUIRED):
+                raise UserError(f"the {name} is {text!r}, not a text")
 
     @classmethod
     def of(cls, row: Mapping[str, Any]) -> Completion:

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from codebotler import __version__
-from codebotler.core.errors import UserError, read_text
-from codebotler.core.files import sync_folder, to_line, to_text, write_whole, written_whole
+from codebotler.core.errors import UserError
+from codebotler.core.files import read_text, sync_folder, to_line, to_text, write_whole, written_whole
 from roboeval.evaluation.runs.completions import (
     COMPLETIONS,
     EXAMPLE,

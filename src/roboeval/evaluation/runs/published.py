@@ -12,9 +12,9 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TypeAlias
 
-from codebotler.core.errors import UserError, read_text, text_of
-from codebotler.core.files import MAX_ROW
-from codebotler.core.syntaxtree import parse
+from codebotler.core.errors import UserError
+from codebotler.core.files import MAX_ROW, read_text, text_of
+from codebotler.core.program import parse
 from roboeval.evaluation.runs.completions import Completion, Key, check_length, name_of, unknown
 from roboeval.suites.load import Suite
 

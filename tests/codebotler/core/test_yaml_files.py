@@ -1,4 +1,3 @@
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -6,7 +5,8 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.errors import MAX_BYTES, UserError, YamlFile, read_text, text_of
+from codebotler.core.errors import UserError
+from codebotler.core.yaml_files import YamlFile
 
 
 class Inner(BaseModel):
@@ -37,11 +37,7 @@ def test_error_names_the_file_and_the_line_where_there_are_any() -> None:
     assert str(UserError("is wrong", file=Path("a.yaml"), line=3)) == "a.yaml, line 3: is wrong"
 
 
-def too_large(first: str, last: str) -> list[str]:
-    return [f'"{first} ... {last}"', "too large"]
-
-
-TWICE = "second time"
+TWICE = "repeated"
 
 
 @pytest.mark.parametrize(
@@ -53,24 +49,15 @@ TWICE = "second time"
         ("a: 1\n---\nb: 2\n", 2, ["YAML", "found another document"]),
         ("inner: *a\n", 1, ["YAML", "undefined alias"]),
         ("a: \x07\n", 1, ["U+0007"]),
-        ("a: 1\nb: !!python/name:os.system 3\n", 2, ['tag "python/name:os.system"']),
+        ("a: 1\nb: !!python/name:os.system 3\n", 2, ["python/name:os.system"]),
         ("a: 1\n{b: 1}: 2\n", 2, ["key", "no text"]),
-        ("a: 1\nb: x\ud800\n", 2, ["U+D800"]),
-        ("a: 1\ninner: 2001-13-01\n", 2, ['"2001-13-01"', "a date"]),
-        ("a: 1\n0b_: 1\n", 2, ['"0b_"', "a whole number"]),
-        ("inner: !!bool x\n", 1, ['"x"', "true or false"]),
-        ("inner: !!timestamp x\n", 1, ['"x"', "a date"]),
-        (f"a: 1\nb: {'9' * 5000}\n", 2, too_large("9" * 20, "9" * 20)),
-        (f"a: 1\nb: {'9' * 400}\n", 2, too_large("9" * 20, "9" * 20)),
-        (f"a: 1\nb: 0x{'f' * 5000}\n", 2, too_large("0x" + "f" * 18, "f" * 20)),
-        ("a: 1\nb: !!set {x}\n", 2, ['tag "set"']),
-        ("a: 1\n!!set b: x\n", 2, ['tag "set"']),
-        ("a: =\n", 1, ['"="', "quotes"]),
+        ("a: 1\ninner: 2001-13-01\n", 2, ["'2001-13-01'", "quotes"]),
+        ("a: 1\n0b_: 1\n", 2, ["'0b_'", "quotes"]),
+        (f"a: 1\nb: {'9' * 5000}\n", 2, ["9...9", "int"]),
         ("inner: {a: 1\n\n\n", 3, ["YAML", "did not find expected ',' or '}'"]),
         ("inner: 1\nmany: 2\ninner: 3\n", 3, ['"inner"', TWICE]),
         ("1: a\n2: b\n'1': c\n", 3, ['"1"', TWICE]),
         ("words:\n  a: x\n  b: y\n  a: z\n", 4, ['"a"', TWICE]),
-        ("inner:\n  <<: {name: a}\n", 2, ['"<<"']),
     ],
 )
 def test_what_is_no_yaml_is_told_in_a_sentence_with_the_line(text: str, line: int, named: list[str]) -> None:
@@ -117,7 +104,7 @@ BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
 )
 
 
-DEEP = "more than 50 deep"
+DEEP = "more than 50 levels deep"
 
 
 @pytest.mark.parametrize(
@@ -126,8 +113,6 @@ DEEP = "more than 50 deep"
         pytest.param("a: 1\ninner: " + "[" * 60 + "]" * 60, 2, id="lists"),
         pytest.param("a: 1\ninner: " + "{a: " * 60 + "1" + "}" * 60, 2, id="mappings"),
         pytest.param("".join(" " * depth + "a:\n" for depth in range(60)), 50, id="indented"),
-        pytest.param("a: 1\ninner: &a [*a]\n", 2, id="a list within itself"),
-        pytest.param("&a\ninner: *a\n", 1, id="a mapping within itself"),
     ],
 )
 def test_yaml_that_is_nested_too_deeply_is_refused_in_a_sentence(text: str, line: int) -> None:
@@ -136,20 +121,22 @@ def test_yaml_that_is_nested_too_deeply_is_refused_in_a_sentence(text: str, line
     assert DEEP in error.sentence
 
 
-def test_anchors_that_explode_are_refused_in_a_sentence() -> None:
-    error = error_about(f"a: 1\n{BOMB}")
-    assert error.line == 2
-    assert "100,000 entries" in error.sentence
+@pytest.mark.parametrize(
+    ("text", "line"), [(f"a: 1\n{BOMB}", 2), ("a: 1\ninner: &a [*a]\n", 2), ("&a\ninner: *a\n", 1)]
+)
+def test_anchors_that_explode_are_refused_in_a_sentence(text: str, line: int) -> None:
+    error = error_about(text)
+    assert error.line == line
+    assert "anchors" in error.sentence
 
 
-def test_a_sentence_is_short_and_one_line() -> None:
-    error = UserError("a\nb" + "c" * 10_000, file="a.yaml", line=1)
-    assert str(error) == "a.yaml, line 1: a b" + "c" * 297 + " ... " + "c" * 300
+def test_an_error_is_one_line() -> None:
+    assert str(UserError("a\nb", file="a.yaml", line=1)) == "a.yaml, line 1: a b"
 
 
 def test_yaml_so_deep_that_the_c_stack_would_overflow_does_not_crash_the_interpreter() -> None:
     code = (
-        "from codebotler.core.errors import YamlFile, UserError\n"
+        "from codebotler.core.errors import UserError\nfrom codebotler.core.yaml_files import YamlFile\n"
         "try:\n"
         "    YamlFile('[' * 1_000_000, 'w.yaml')\n"
         "except UserError as error:\n"
@@ -184,38 +171,3 @@ def test_part_of_a_file_is_validated_where_it_stands() -> None:
     with pytest.raises(UserError, match='"name"') as error:
         file.validate(Inner, file.data[1], at=(1,))
     assert (error.value.file, error.value.line) == ("w.yaml", 2)
-
-
-def test_byte_order_mark_is_no_part_of_the_text() -> None:
-    assert text_of(b"\xef\xbb\xbfdef f(): ...\r\n", "f.py") == "def f(): ...\n"
-
-
-def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_path: Path) -> None:
-    def refused(path: Path, fault: str, line: int | None = None) -> None:
-        with pytest.raises(UserError, match=re.escape(fault)) as caught:
-            YamlFile.read(path)
-        assert (caught.value.file, caught.value.line) == (path, line)
-
-    missing, latin, large = tmp_path / "no.yaml", tmp_path / "latin.yaml", tmp_path / "large.yaml"
-    latin.write_bytes("a: 1\nb: café\n".encode("latin-1"))
-    large.write_bytes(b"a" * (MAX_BYTES + 1))
-    refused(missing, "no such file")
-    refused(tmp_path, "a folder")
-    refused(latin, "UTF-8", 2)
-    refused(large, "5,000,000 bytes")
-    refused(missing / "inside", "no such file")
-    refused(latin / "inside", "(Not a directory)")
-
-
-def test_file_without_an_end_is_too_large_instead_of_being_read_for_ever() -> None:
-    with pytest.raises(UserError, match=r"/dev/zero: .*\b10 bytes"):
-        read_text(Path("/dev/zero"), limit=10)
-
-
-def test_line_ends_of_every_system_are_read_as_one(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    path.write_bytes("ä\r\nb\rc\n".encode())
-    assert read_text(path) == "ä\nb\nc\n"
-    assert read_text(path, limit=8) == "ä\nb\nc\n"
-    with pytest.raises(UserError, match="7 bytes"):
-        read_text(path, limit=7)

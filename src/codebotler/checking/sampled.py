@@ -1,0 +1,149 @@
+"""What sampled worlds show: a program's runs in them, and the problems that these have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from codebotler.checking.problems import Problem, Sample, no_room
+from codebotler.core.errors import UserError
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.trace import Outcome, Status
+from codebotler.core.words import listed
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.isolated_process import PROCESSOR_TIME
+from codebotler.simulator.robot import Behaviour
+from codebotler.simulator.rules import Rules
+from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
+from codebotler.simulator.worker import Worker
+
+SAMPLES, MOST_SAMPLES = 5, 10_000
+MORE = 20  # worlds in addition, where the program waits in vain in all that were drawn before
+MOST_FACTS = 4
+
+
+@dataclass(frozen=True)
+class CheckSettings:
+    """How programs are checked.
+
+    Args:
+        samples: how many worlds to sample, 1 to 10,000.
+        seed: of the worlds: the same ones on every machine.
+        strict: whether to draw also what the program takes for granted.
+        rules: how a run is simulated.
+        skills: what the program may call.
+        behaviours: what each skill does; those of the eight skills by default.
+
+    Raises:
+        UserError: the number of samples is out of range.
+    """
+
+    samples: int = SAMPLES
+    seed: int = 0
+    strict: bool = False
+    rules: Rules = AS_WRITTEN
+    skills: SkillTable = SKILLS
+    behaviours: Mapping[str, Behaviour] | None = None
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.samples <= MOST_SAMPLES:
+            raise UserError(f"the number of samples is {self.samples}; write one from 1 to {MOST_SAMPLES:,}")
+
+
+def run_sample(
+    worker: Worker, program: str, room_map: RoomMap, sampler: FactSampler, settings: CheckSettings
+) -> Sample:
+    """Run a program in one sampled world."""
+    robots: list[SampledRobot] = []
+
+    def new_robot() -> SampledRobot:
+        robots.append(SampledRobot(room_map, sampler, settings.rules, settings.skills, settings.behaviours))
+        return robots[-1]
+
+    outcome = worker.run(program, new_robot)
+    robot = robots[-1]
+    return Sample(
+        sampler.sample, outcome, tuple(robot.facts), tuple(robot.draws), _is_in_vain(outcome, robot)
+    )
+
+
+def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
+    if outcome.status is Status.ROBOT_ERROR and outcome.error is not None:
+        return any(excuse.startswith(outcome.error.message) for excuse in robot.excuses)
+    return outcome.status is Status.TIMEOUT
+
+
+@dataclass
+class SampledRuns:
+    """A program's runs in sampled worlds; worlds that are alike to it are run once."""
+
+    run: Callable[[RoomMap, Iterable[FactSampler]], Iterable[Sample]]
+    width: int = 1  # runs at the same time
+    known: dict[RoomMap, list[Sample]] = field(default_factory=dict)
+
+    def samples(self, room_map: RoomMap, settings: CheckSettings) -> list[Sample]:
+        """The runs in so many worlds, and in more if the program waits or searches in vain in all of them."""
+        first = FactSampler(settings.seed, 0, settings.strict)
+        ran = self._in(room_map, [replace(first, sample=number) for number in range(settings.samples)])
+        for more in range(MORE):
+            if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
+                break
+            # A program that waits in many places needs luck to end; a search, that not all is full of things.
+            ran += self._in(room_map, [replace(first, sample=len(ran), lucky=more % 2 == 1)])
+        return ran
+
+    def _in(self, room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+        known = self.known.setdefault(room_map, [])
+        found = []
+        for start in range(0, len(samplers), self.width):
+            these = samplers[start : start + self.width]
+            known += self.run(room_map, [new for new in these if not any(one.is_as_in(new) for one in known)])
+            for sampler in these:
+                same = next(one for one in known if one.is_as_in(sampler))
+                found.append(replace(same, number=sampler.sample))
+        return found
+
+
+def _only_computed(sample: Sample) -> bool:
+    """Whether a run used up its processor time, which costs seconds, and is no waiting."""
+    error = sample.outcome.error
+    return sample.in_vain and error is not None and error.message.endswith(PROCESSOR_TIME)
+
+
+# --- problems
+
+
+def failures(ran: Sequence[Sample], room_map: RoomMap) -> Iterator[Problem]:
+    """One problem for the runs that ended at the same line in the same way."""
+    in_vain = all(sample.in_vain for sample in ran)
+    groups: dict[tuple[int | None, str], list[Sample]] = {}
+    for sample in ran:
+        outcome = sample.outcome
+        if outcome.error is not None and (in_vain or not sample.in_vain):
+            line = None if outcome.status is Status.TIMEOUT else outcome.line  # any of those where it waits
+            groups.setdefault((line, outcome.error.kind), []).append(sample)
+    for (_, kind), same in groups.items():
+        numbers = tuple(sample.number for sample in same)
+        yield Problem(kind, _message(same, ran, room_map), same[0].outcome.line, _where(same, ran), numbers)
+
+
+def _message(same: Sequence[Sample], ran: Sequence[Sample], room_map: RoomMap) -> str:
+    first = same[0].outcome
+    assert first.error is not None
+    if first.status is Status.TIMEOUT:
+        all_or_some = "each" if len(same) == len(ran) else str(len(same))
+        often = f"in {all_or_some} of {len(ran)} imagined worlds " if same[0].draws else ""
+        return f"the program never ends: {often}it reached a limit, {first.error.message}"
+    if first.error.kind == "GoToInvalidLocation" and first.trace and first.trace[-1].kind == "goto":
+        return no_room(first.trace[-1].text, room_map)
+    return first.error.message
+
+
+def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:
+    """What some runs have in common that the others have not."""
+    others = [sample for sample in ran if sample not in same]
+    shared = [fact for fact in same[0].drawn if all(fact in sample.drawn for sample in same)]
+    telling = [fact for fact in shared if not others or not all(fact in other.drawn for other in others)]
+    facts = telling or list(same[0].drawn if others else ())
+    left = len(facts) - MOST_FACTS
+    return listed([*([f"{left} more such facts hold"] if left > 0 else []), *facts[-MOST_FACTS:]])

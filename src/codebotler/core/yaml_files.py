@@ -1,0 +1,214 @@
+"""YAML files, with the line of everything in them for error messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from codebotler.core.errors import UserError
+from codebotler.core.files import read_text
+
+Place: TypeAlias = tuple[str | int, ...]
+"""A path of keys and positions in a file."""
+
+Model = TypeVar("Model", bound=BaseModel)
+
+Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+MAX_DEPTH = 50
+MAX_PLACES = 100_000
+LONGEST_VALUE = 80  # characters of a value that a message quotes
+MENDS = {
+    "mapping values are not allowed in this context": 'put quotes around a text that contains ": "',
+    "found character that cannot start any token": "put quotes around a text, and indent with spaces",
+}
+
+
+class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chosen above
+    """A loader that stops before the nesting overflows the C stack."""
+
+    yaml_implicit_resolvers = {  # noqa: RUF012 - as in its base class; without "<<" and "=", which are texts
+        first: forms for first, forms in Loader.yaml_implicit_resolvers.items() if first not in {"<", "="}
+    }
+    depth = 0
+
+    def descend_resolver(self, parent: yaml.Node | None, index: object) -> None:
+        self.depth += 1
+        if self.depth > MAX_DEPTH:
+            raise _fault(f"this is nested more than {MAX_DEPTH} levels deep", parent)
+        super().descend_resolver(parent, index)
+
+    def ascend_resolver(self) -> None:
+        self.depth -= 1
+        super().ascend_resolver()
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> object:  # noqa: FBT001, FBT002 - theirs
+        try:
+            return super().construct_object(node, deep)
+        except (ValueError, LookupError, AttributeError):  # no such date, for example
+            problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
+            raise _fault(f"{problem}; put quotes around a text", node) from None
+
+
+def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=None if node is None else node.start_mark)
+
+
+def _quoted(value: object) -> str:
+    text, half = repr(value), LONGEST_VALUE // 2
+    return text if len(text) <= LONGEST_VALUE else f"{text[:half]}...{text[-half:]}"
+
+
+class YamlFile:
+    """A parsed YAML file that knows the line of everything in it.
+
+    Args:
+        text: the file's content.
+        name: what error messages call the file.
+
+    Raises:
+        UserError: this is not valid YAML, or a key is repeated in one mapping.
+    """
+
+    def __init__(self, text: str, name: Path | str) -> None:
+        self.name = name
+        self._text = text
+        self._lines: dict[Place, int] = {}
+        try:
+            loader = _BoundedLoader(text)
+            node = loader.get_single_node()
+            if node is not None:
+                self._remember(node, ())
+            self.data: object = None if node is None else loader.construct_document(node)
+        except yaml.YAMLError as error:
+            raise self._syntax_error(error) from None
+
+    @classmethod
+    def read(cls, path: Path) -> YamlFile:
+        """Read and parse a file, or raise a UserError."""
+        return cls(read_text(path), path)
+
+    def line(self, place: Sequence[str | int]) -> int | None:
+        """The line of a place, or of the nearest thing around it."""
+        path = tuple(place)
+        while path not in self._lines:
+            if not path:
+                return None
+            *around, last = path  # a number may be a key, which is kept as it is spelt
+            path = (*around, str(last)) if isinstance(last, int) else tuple(around)
+        return self._lines[path]
+
+    def wrong(self, sentence: str, *place: str | int) -> UserError:
+        """The error for a place in this file."""
+        return UserError(sentence, file=self.name, line=self.line(place))
+
+    def validate(self, model: type[Model], data: object = None, *, at: Place = ()) -> Model:
+        """The content as a model, or a UserError about the first fault.
+
+        Args:
+            model: what it must look like.
+            data: a part of the content; everything by default.
+            at: the place of that part.
+        """
+        try:
+            return model.model_validate(self.data if data is None and not at else data)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            place = (*at, *first["loc"])
+            raise self.wrong(_sentence(first, self._name(place)), *place) from None
+
+    def _name(self, place: Place) -> str:
+        if not place:
+            return "the file"
+        if place[-1] == "[key]":
+            return "this key"
+        return f'"{place[-1]}"' if isinstance(place[-1], str) and place in self._lines else "this entry"
+
+    def _syntax_error(self, error: yaml.YAMLError) -> UserError:
+        problem, context = getattr(error, "problem", None), getattr(error, "context", None)
+        mark: Any = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
+        if isinstance(error, yaml.reader.ReaderError):
+            problem = f"the character U+{error.character:04X} is not allowed"
+            line = self._text.encode()[: error.position].count(b"\n") + 1
+        else:
+            line = min(mark.line + 1, len(self._text.splitlines()))  # it may be behind the end
+        sentence = ", ".join(part for part in (context, problem) if part).replace(", but", " but")
+        mend = f"; {MENDS[problem]}" if problem in MENDS else ""
+        return UserError(f"not valid YAML: {sentence}{mend}", file=self.name, line=line)
+
+    def _remember(self, node: yaml.Node, place: Place) -> None:
+        self._lines[place] = node.start_mark.line + 1
+        if len(place) > MAX_DEPTH or len(self._lines) > MAX_PLACES:
+            raise _fault("this is nested too deeply, or its anchors repeat too much", node)
+        if isinstance(node, yaml.SequenceNode):
+            for index, item in enumerate(node.value):
+                self._remember(item, (*place, index))
+        elif isinstance(node, yaml.MappingNode):
+            for key, value in node.value:
+                if not isinstance(key, yaml.ScalarNode):
+                    raise _fault("this key is no text; write one word or put quotes around it", key)
+                inner = (*place, str(key.value))
+                if inner in self._lines:
+                    raise _fault(f'the key "{key.value}" is repeated; keep one of them', key)
+                self._remember(value, inner)
+                self._lines[inner] = key.start_mark.line + 1
+
+
+# --- what pydantic finds, in plain English
+
+EXPECTED = {
+    "string_type": "a text",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a mapping of keys to values",
+    "model_type": "a mapping of keys to values",
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+}
+FAULTS = {
+    "extra_forbidden": "the key {name} is unknown; remove it or correct its spelling",
+    "invalid_key": "this key is no text; remove it or put quotes around it",
+    "string_too_short": "{name} is empty; write a text",
+    "too_short": "{name} has too few entries; it needs at least {min_length}",
+    "too_long": "{name} has too many entries; it takes {max_length}",
+    "finite_number": "{name} is not a finite number",
+}
+WHAT = (
+    (bool, "a truth value"),
+    (int | float, "a number"),
+    (str, "a text"),
+    (date, "a date"),
+    (Mapping, "a mapping"),
+    (object, "a list"),
+)
+
+
+def _sentence(error: ErrorDetails, name: str) -> str:
+    kind, value = error["type"], error["input"]
+    if kind == "missing":
+        last = error["loc"][-1]
+        if isinstance(last, str):
+            return f'the key "{last}" is missing'
+        return f"this entry has too few values; it needs at least {last + 1}"
+    if kind in EXPECTED:
+        return f"{name} {_instead_of(EXPECTED[kind], value)}"
+    if kind in FAULTS:
+        return FAULTS[kind].format(name=name, **error.get("ctx", {}))
+    plain = error["msg"].removeprefix("Value error, ").replace("Input should be", "it should be")
+    return f"{name} is {_quoted(value)}, but {plain[:1].lower()}{plain[1:]}"
+
+
+def _instead_of(expected: str, value: object) -> str:
+    if value is None:
+        return "is empty; fill it in or remove it"
+    sentence = f"is {next(word for kind, word in WHAT if isinstance(value, kind))}, not {expected}"
+    if expected != "a text" or not isinstance(value, int | float | date):
+        return sentence
+    word = {True: ' ("yes")', False: ' ("no")'}[value] if isinstance(value, bool) else ""
+    return f"{sentence}; put quotes around it{word}"

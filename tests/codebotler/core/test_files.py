@@ -1,0 +1,120 @@
+"""Files are read or refused in a sentence; logs and replaced files survive a crash."""
+
+import os
+import re
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.errors import UserError
+from codebotler.core.files import MAX_BYTES, Appender, make_folder, read_text, text_of, written_whole
+
+NOBODY = 65534
+
+
+def test_byte_order_mark_is_no_part_of_the_text() -> None:
+    assert text_of(b"\xef\xbb\xbfdef f(): ...\r\n", "f.py") == "def f(): ...\n"
+
+
+def test_missing_file_folder_no_utf8_and_too_large_are_told_in_a_sentence(tmp_path: Path) -> None:
+    def refused(path: Path, fault: str, line: int | None = None) -> None:
+        with pytest.raises(UserError, match=re.escape(fault)) as caught:
+            read_text(path)
+        assert (caught.value.file, caught.value.line) == (path, line)
+
+    latin, large = tmp_path / "latin.yaml", tmp_path / "large.yaml"
+    latin.write_bytes("a: 1\nb: café\n".encode("latin-1"))
+    large.write_bytes(b"a" * (MAX_BYTES + 1))
+    refused(tmp_path / "no.yaml", "no such file")
+    refused(tmp_path, "a folder")
+    refused(latin, "UTF-8", 2)
+    refused(large, "5,000,000 bytes")
+    refused(latin / "inside", "(Not a directory)")
+
+
+def test_file_without_an_end_is_too_large_instead_of_being_read_for_ever() -> None:
+    with pytest.raises(UserError, match=r"/dev/zero: .*\b10 bytes"):
+        read_text(Path("/dev/zero"), limit=10)
+
+
+def test_line_ends_of_every_system_are_read_as_one(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    path.write_bytes("ä\r\nb\rc\n".encode())
+    assert read_text(path) == "ä\nb\nc\n"
+    assert read_text(path, limit=8) == "ä\nb\nc\n"
+    with pytest.raises(UserError, match="7 bytes"):
+        read_text(path, limit=7)
+
+
+@pytest.mark.parametrize("torn", [b"", b"{", b"x" * 100_000])
+def test_a_torn_last_line_is_cut_off_before_more_are_added(tmp_path: Path, torn: bytes) -> None:
+    path = tmp_path / "a.jsonl"
+    path.write_bytes(b"1\n2\n" + torn)
+    log = Appender(path)
+    log.append(b"3\n")
+    log.close()
+    assert path.read_bytes() == b"1\n2\n3\n"
+
+
+def test_a_log_is_locked_before_it_is_mended(tmp_path: Path) -> None:
+    path = tmp_path / "a.jsonl"
+    log = Appender(path, exclusive=True)
+    path.write_bytes(b"1\n2")
+    with pytest.raises(BlockingIOError):
+        Appender(path, exclusive=True)
+    assert path.read_bytes() == b"1\n2"
+    log.close()
+    Appender(path, exclusive=True).close()
+    assert path.read_bytes() == b"1\n"
+
+
+def test_a_line_that_does_not_fit_is_taken_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "a.jsonl"
+    log = Appender(path)
+    log.append(b"1\n")
+    real, sizes = os.write, iter([3, None])
+
+    def full(file: int, data: bytes) -> int:
+        size = next(sizes)
+        if size is None:
+            raise OSError(28, "No space left on device")
+        return real(file, data[:size])
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(OSError, match=re.escape(str(path))):
+        log.append(b"12345\n")
+    monkeypatch.undo()
+    log.close()
+    assert path.read_bytes() == b"1\n"
+
+
+def test_a_file_that_is_not_finished_leaves_the_old_one(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    path.write_bytes(b"old")
+    with pytest.raises(KeyboardInterrupt), written_whole(path):
+        raise KeyboardInterrupt
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_is_made_with_those_above_it(tmp_path: Path) -> None:
+    for _ in range(2):
+        make_folder(tmp_path / "state" / "missions")
+        assert (tmp_path / "state" / "missions").is_dir()
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o555)
+        user = os.geteuid()
+        os.seteuid(user or NOBODY)  # root may write everywhere
+        try:
+            for there in (folder, folder / "missions"):
+                with pytest.raises(UserError, match="CODEBOTLER_HOME") as error:
+                    make_folder(there)
+                assert error.value.file == there
+        finally:
+            os.seteuid(user)
+            folder.chmod(0o755)
