@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
-from codebotler.core.files import expect_replaceable
+from codebotler.core.files import Appender, expect_replaceable, to_line
 from codebotler.core.terminal import busy, note, print_source, visible
 from codebotler.core.world import World
 from codebotler.generation.generate import Attempt, ignore, write_checked_program
@@ -70,22 +68,15 @@ def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None
         return
     expect_replaceable(path, b"{")
     failed: OSError | None = None
-    with path.open("ab", buffering=0) as file:
+    with closing(Appender(path)) as file:
 
         def add(attempt: Attempt) -> None:
             nonlocal failed
-            if failed is not None:
-                return
-            start = os.fstat(file.fileno()).st_size
-            text = json.dumps(attempt.data(model), ensure_ascii=False) + "\n"
-            line = memoryview(text.encode(errors="backslashreplace"))
-            try:
-                while line:
-                    line = line[file.write(line) :]
-            except OSError as error:
-                failed = OSError(error.errno, error.strerror, str(path))
-                with suppress(OSError):  # a device or a pipe has nothing to take back
-                    file.truncate(start)
+            if failed is None:
+                try:
+                    file.append(to_line(attempt.data(model)))
+                except OSError as error:
+                    failed = error
 
         yield add
     if failed is not None:

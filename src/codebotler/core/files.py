@@ -143,7 +143,8 @@ class Appender:
                 fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if is_new:
                 sync_folder(path.parent)
-            if path.is_file():  # no device or pipe
+            self._is_file = path.is_file()  # and no device or pipe
+            if self._is_file:
                 self._file.truncate(_whole_length(path))
         except BaseException:
             self._file.close()
@@ -164,8 +165,9 @@ class Appender:
 
     def sync(self) -> None:
         """Flush everything to the disk; may be called from another thread."""
-        with naming(self.path):
-            os.fsync(self._file.fileno())
+        if self._is_file:
+            with naming(self.path):
+                os.fsync(self._file.fileno())
 
     def close(self) -> None:
         """Flush everything to the disk and close the file."""

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import json
 import math
-import os
 import threading
 import time
 from collections.abc import Iterable, Mapping
@@ -16,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
+from codebotler.core.files import Appender, write_whole
 
 EVENTS, SUMMARY = "events.jsonl", "mission.json"
 TEXTS = ("id", "state", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
@@ -95,12 +93,7 @@ class Summary:
         Raises:
             OSError: it cannot be written.
         """
-        new = folder / f"{SUMMARY}.new"
-        try:
-            new.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
-            new.replace(folder / SUMMARY)
-        except OSError as error:
-            raise OSError(error.errno, error.strerror, str(folder / SUMMARY)) from None
+        write_whole(folder / SUMMARY, json.dumps(asdict(self), indent=1).encode())
 
 
 class Log:
@@ -115,14 +108,7 @@ class Log:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._lock, self._path = threading.Lock(), folder / EVENTS
-        self._file = os.open(self._path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._drop_torn_line()
-        except BaseException:
-            os.close(self._file)
-            raise
+        self._lock, self._lines = threading.Lock(), Appender(folder / EVENTS, exclusive=True)
         self.is_open = True
 
     def add(self, event: str, *, clock: float = 0.0, **data: object) -> Line:
@@ -139,7 +125,7 @@ class Log:
         with self._lock:
             line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
             if self.is_open:
-                self._write(json.dumps(line).encode() + b"\n")
+                self._lines.append(json.dumps(line).encode() + b"\n")
         return line
 
     def close(self) -> None:
@@ -147,25 +133,7 @@ class Log:
         with self._lock:
             if self.is_open:
                 self.is_open = False
-                os.close(self._file)
-
-    def _write(self, data: bytes) -> None:
-        """Write a line at once; what is left of one that does not fit on the disk is taken back."""
-        size = os.fstat(self._file).st_size
-        try:
-            while data:
-                data = data[os.write(self._file, data) :]
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                os.truncate(self._file, size)
-            raise OSError(error.errno, error.strerror, str(self._path)) from None
-
-    def _drop_torn_line(self) -> None:
-        """Forget a last line that was cut off in the middle."""
-        data = os.pread(self._file, os.fstat(self._file).st_size, 0)
-        whole = data.rfind(b"\n") + 1
-        if whole < len(data):
-            os.truncate(self._file, whole)
+                self._lines.close()
 
 
 def events_of(folder: Path) -> list[Line]:

@@ -9,12 +9,11 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any, Literal, TypeAlias
-from uuid import uuid4
 
 from mcap.writer import Writer
 
 from codebotler import __version__
-from codebotler.core.files import expect_replaceable
+from codebotler.core.files import expect_replaceable, written_whole
 from codebotler.core.skills import SKILLS, Skill, SkillTable
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.pictures import picture_of
@@ -184,12 +183,5 @@ def export(
         write_mcap(whole, summary, events, folder=folder, clock=clock)
         path.write_bytes(whole.getvalue())
         return
-    new = path.with_name(f".{uuid4().hex}.mcap")  # nobody's own file, and not too long where the name is
-    try:
-        with new.open("xb") as file:
-            write_mcap(file, summary, events, folder=folder, clock=clock)
-        new.replace(path)
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(path)) from None
-    finally:
-        new.unlink(missing_ok=True)
+    with written_whole(path) as file:
+        write_mcap(file, summary, events, folder=folder, clock=clock)

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from codebotler.core.files import write_whole
+
 FOLDER = "pictures"
 MOST_BYTES = 2_000_000  # of one picture
 MOST_IN_ALL = 200_000_000  # bytes of all pictures of a mission
@@ -33,13 +35,7 @@ class Pictures:
             return _left_out(f"a mission keeps {MOST_IN_ALL:,} bytes of them at most")
         name = f"{FOLDER}/{self._count + 1}.{kind}"
         path = self._folder / name
-        path.parent.mkdir(exist_ok=True)
-        new = path.with_name(f"{path.name}.new")
-        try:
-            new.write_bytes(data)
-            new.replace(path)
-        finally:
-            new.unlink(missing_ok=True)
+        write_whole(path, data)
         self._count += 1
         self._bytes += len(data)
         return {"file": name}

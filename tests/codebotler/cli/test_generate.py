@@ -188,8 +188,7 @@ def test_a_full_disk_under_the_record_is_told_and_costs_no_program(tmp_path: Pat
 
 def test_a_record_that_does_not_fit_keeps_only_whole_lines(tmp_path: Path, paper: Suite) -> None:
     record = tmp_path / "attempts.jsonl"
-    record.write_text("{")
-    os.truncate(record, LIMIT - 100)
+    record.write_text("{" + " " * (LIMIT - 102) + "\n")
     words = ("generate", instruction(paper), "--record", record.name)
     ended = codebotler(*words, cwd=tmp_path, before=f"trap '' XFSZ; ulimit -f {LIMIT // 1024};")
     assert ended.status == 1

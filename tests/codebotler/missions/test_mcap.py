@@ -154,15 +154,6 @@ def test_link_and_pipe_stay_what_they_are(mission: tuple[Summary, list[Line]], t
     assert pipe.is_fifo()
 
 
-def test_no_other_file_is_touched(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
-    path, other = tmp_path / f"{'m' * 245}.mcap", tmp_path / f"{'m' * 245}.mcap.new"
-    other.write_text("of the user")
-    export(path, *mission, "wall")
-    assert other.read_text() == "of the user"
-    assert sorted(tmp_path.iterdir()) == [path, other]
-    assert path.stat().st_mode == other.stat().st_mode
-
-
 def test_file_is_written_whole_or_not_at_all(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
     path = tmp_path / "mission.mcap"
     export(path, *mission, "wall")

@@ -569,7 +569,7 @@ def test_events_that_cannot_be_written_stop_the_robot(home: Path, monkeypatch: p
                 raise OSError(28, "No space left on device")
             return real(file, data)
 
-        monkeypatch.setattr("codebotler.missions.log.os.write", full)
+        monkeypatch.setattr("codebotler.core.files.os.write", full)
         with pytest.raises(OSError, match="No space left") as error:
             mission.run(reserved)
         assert error.value.filename == str(mission.folder / EVENTS)
