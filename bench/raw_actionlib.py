@@ -14,7 +14,8 @@ sys.path.insert(0, sys.argv[1])
 
 import actionlib
 import rospy
-from ros1_worker import message_types
+
+from message_types import message_types
 
 rospy.init_node("raw", anonymous=True, disable_signals=True, log_level=rospy.FATAL)
 action = json.loads(sys.argv[2])

@@ -21,11 +21,11 @@ from statistics import median
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, events_of
 from codebotler.missions.mission import Mission
-from codebotler.robots import pyrobosim, ros1
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, untold
-from codebotler.robots.pyrobosim import Pyrobosim
+from codebotler.robots.open import all_readiness
+from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.ros1 import Ros1
+from codebotler.robots.ros1.robot import Ros1
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.virtual import VirtualRobot
 
@@ -195,8 +195,9 @@ def main() -> int:
             report("simulated, Mission.stop", list(by_call(home))),
             report("simulated, Ctrl-C", list(by_signal(home))),
         ]
-        for name, module, rows in (("ros1", ros1, by_ros1), ("pyrobosim", pyrobosim, by_pyrobosim)):
-            if module.readiness().works:
+        works = {kind.name: kind.works for kind in all_readiness()}
+        for name, rows in (("ros1", by_ros1), ("pyrobosim", by_pyrobosim)):
+            if works[name]:
                 hold.append(report(f"{name}, Mission.stop", list(rows(home))))
             else:
                 print(f"{name}: there is none here")

@@ -12,7 +12,10 @@ from codebotler.core.trace import Option
 
 SOURCES = Path(__file__).parent.parent / "src"
 ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError"}
-WITHIN = {"codebotler.robots.ros1_worker", "codebotler.simulator.sandbox.execution"}  # of another Python
+WITHIN = {
+    "codebotler.robots.ros1.worker.channel",
+    "codebotler.simulator.sandbox.execution",
+}  # of another Python
 A_SENTENCE = ("a sentence",)
 MADE_OF: dict[str, tuple[tuple[object, ...], dict[str, object]]] = {
     "codebotler.core.errors.UserError": (("is wrong " * 66,), {"file": Path("a/task.yaml"), "line": 3}),

@@ -31,7 +31,7 @@ MODULES = {
         *("codebotler.core.trace", "codebotler.core.tracefile", "codebotler.core.skills", "codebotler.rtl"),
         *("codebotler.rtl.reasoning", "codebotler.missions.mission"),
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
-        *("codebotler.robots.ros", "codebotler.robots.ros1", "codebotler.robots.virtual"),
+        *("codebotler.robots.ros", "codebotler.robots.ros1.robot", "codebotler.robots.virtual"),
         *("codebotler.robots.worker", "codebotler.models.base", "codebotler.models.open"),
         *("codebotler.models.rate_limit", "codebotler.perception", "codebotler.web.frame"),
     ),

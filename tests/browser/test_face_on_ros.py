@@ -16,7 +16,7 @@ from playwright.sync_api import expect
 
 from codebotler.robots.faced import unspoken
 from codebotler.robots.ros import PYTHON
-from codebotler.robots.ros1 import MEND, NEEDS
+from codebotler.robots.ros1.robot import MEND, NEEDS
 from codebotler.robots.worker import lacks
 from faces import SPEAKING
 from pageserver import WORLD, PageServer

@@ -13,7 +13,8 @@ sys.path.insert(0, sys.argv[1])
 import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from ros1_worker import message_types
+
+from message_types import message_types
 
 ABORTS = {
     "abort": "the door is shut",

@@ -14,7 +14,8 @@ sys.path.insert(0, sys.argv[1])
 import actionlib_msgs.msg
 import genpy.message
 import rospy
-from ros1_worker import message_types
+
+from message_types import message_types
 
 LOCK = threading.Lock()
 

@@ -8,7 +8,8 @@ import sys
 sys.path.insert(0, sys.argv[1])
 
 import rospy
-from ros1_worker import picture_types
+
+from message_types import picture_types
 
 topic, kind, fields = sys.argv[2], sys.argv[3], json.loads(sys.argv[4])
 rospy.init_node("camera", anonymous=True, disable_signals=True, log_level=rospy.FATAL)

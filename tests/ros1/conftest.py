@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.robots.ros import PYTHON
-from codebotler.robots.ros1 import MEND, NEEDS
+from codebotler.robots.ros1.robot import MEND, NEEDS
 from codebotler.robots.worker import lacks
 from ros_graph import Graph
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from codebotler.core.skills import SKILLS, Skill
 from codebotler.robots.ros import PYTHON, Waits
-from codebotler.robots.ros1 import SCRIPT, Ros1
+from codebotler.robots.ros1.robot import WORKER, Ros1
 
 HERE = Path(__file__).parent
 MASTER = HERE / "ros_master.py"
@@ -90,7 +90,7 @@ class Graph:
     def serve(self, *skills: Skill, **environment: str) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
         actions = [[s.ros.type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
-        server = Process(SERVER, str(SCRIPT.parent), json.dumps(actions), master=self.uri, **environment)
+        server = Process(SERVER, str(WORKER), json.dumps(actions), master=self.uri, **environment)
         self.processes.append(server)
         server.expect("ready")
         return server
@@ -129,7 +129,7 @@ def started(does: Callable[[], object]) -> Iterator[dict[str, object]]:
 INSTALLED = """
 import sys
 sys.path.insert(0, {worker!r})
-from ros1_worker import build
+from message_types import build
 build(sys.modules[__name__], {name!r}, {definition!r})
 """
 
@@ -139,6 +139,6 @@ def installed(folder: Path, name: str, definition: str) -> str:
     package = folder / "robot_actions_pkg" / "msg"
     package.mkdir(parents=True)
     package.with_name("__init__.py").touch()
-    code = INSTALLED.format(worker=str(SCRIPT.parent), name=name, definition=definition)
+    code = INSTALLED.format(worker=str(WORKER), name=name, definition=definition)
     (package / "__init__.py").write_text(code)
     return str(folder)

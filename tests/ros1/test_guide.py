@@ -12,7 +12,7 @@ import pytest
 
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError
-from codebotler.robots.ros1 import MEND, SCRIPT
+from codebotler.robots.ros1.robot import MEND
 from codebotler.simulator.robot import RobotError
 from ros_graph import GO_TO, Graph, Process, free_port, installed, started
 
@@ -47,7 +47,7 @@ def test_two_commands_are_the_whole_path(tmp_path: Path) -> None:
     port = free_port()
     environment = {
         **os.environ,
-        "PYTHONPATH": str(SCRIPT.parents[2]),
+        "PYTHONPATH": str(Path(__file__).parents[2] / "src"),
         "CODEBOTLER_HOME": str(tmp_path),
         "ROS_MASTER_URI": f"http://localhost:{port}",
     }
@@ -103,7 +103,9 @@ VARIES = (
 
 
 def test_every_error_on_the_page_is_one_that_is_raised() -> None:
-    sources = [path.read_text() for path in SCRIPT.parent.glob("ros*.py")]
+    sources = [
+        path.read_text() for path in (Path(__file__).parents[2] / "src/codebotler/robots").rglob("*.py")
+    ]
     text = re.sub(r'"\s*\n\s*f?"', "", "".join(sources))
     text = re.sub(r'"\s*\n\s*\+ \(f" ', " ", text)
     text = re.sub(r"\{[^}]*\}", "…", text)

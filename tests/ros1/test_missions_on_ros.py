@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.skills import SKILLS
-from codebotler.robots.ros1 import SCRIPT
 from ros_graph import GO_TO, Graph
 
 FETCH = 'def task_program():\n    go_to("the hall")\n    if is_in_room("mug"):\n        pick("mug")\n'
@@ -32,7 +31,7 @@ def begun(graph: Graph, folder: Path, program: str, *options: str) -> subprocess
         cwd=folder,
         env={
             **os.environ,
-            "PYTHONPATH": str(SCRIPT.parents[2]),
+            "PYTHONPATH": str(Path(__file__).parents[2] / "src"),
             "CODEBOTLER_HOME": str(folder),
             "ROS_MASTER_URI": graph.uri,
         },

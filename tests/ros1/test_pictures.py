@@ -25,7 +25,7 @@ from codebotler.missions.log import events_of
 from codebotler.perception import image_of
 from codebotler.robots.base import CancelledError, Picture
 from codebotler.robots.ros import PYTHON, Waits
-from codebotler.robots.ros1 import SCRIPT
+from codebotler.robots.ros1.robot import WORKER
 from codebotler.simulator.robot import RobotError
 from ros_graph import LONG, Graph, Process, free_port, started
 from server import Fault, Request, Server
@@ -106,7 +106,7 @@ def looking(graph: Graph, model: Server, *arguments: str) -> Iterator[None]:
 
 def camera(graph: Graph, kind: str, fields: dict[str, Any], topic: str = TOPIC) -> Process:
     """A camera that publishes until it is ended."""
-    process = Process(CAMERA, str(SCRIPT.parent), topic, kind, json.dumps(fields), master=graph.uri)
+    process = Process(CAMERA, str(WORKER), topic, kind, json.dumps(fields), master=graph.uri)
     graph.processes.append(process)
     process.expect("ready")
     return process
@@ -303,8 +303,8 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import base64, os, threading, time
 import actionlib, rospy
-from ros1_pictures import Show
-from ros1_worker import message_types
+from pictures import Show
+from message_types import message_types
 
 def look(goal):
     if goal.object == "late":
@@ -334,7 +334,7 @@ def test_any_server_may_show_what_it_sees(graph: Graph, tmp_path: Path) -> None:
     assert action is not None
     script = tmp_path / "eyes.py"
     script.write_text(SHOWS)
-    process = Process(script, str(SCRIPT.parent), action.definition, master=graph.uri)
+    process = Process(script, str(WORKER), action.definition, master=graph.uri)
     graph.processes.append(process)
     process.expect("ready")
     robot = graph.robot(waits=Waits(patience=1.5, silence=1.5, longest=20.0))
@@ -358,13 +358,11 @@ def test_any_server_may_show_what_it_sees(graph: Graph, tmp_path: Path) -> None:
 
 def test_messages_made_in_memory_are_those_of_ros() -> None:
     code = (
-        "from ros1_worker import made_pictures; import json; t = made_pictures();"
+        "from message_types import made_pictures; import json; t = made_pictures();"
         "made = [t.Image, t.CompressedImage];"
         "print(json.dumps({c._type: [c._md5sum, c._type, c.__slots__] for c in made}))"
     )
-    done = subprocess.run(
-        [str(PYTHON), "-c", code], cwd=SCRIPT.parent, capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([str(PYTHON), "-c", code], cwd=WORKER, capture_output=True, text=True, check=True)
     assert json.loads(done.stdout) == {  # as `rosmsg md5` and `rosmsg show` tell them
         "sensor_msgs/Image": [
             "060021388200f6f0f447d0fcd9c64743",

@@ -20,7 +20,7 @@ from codebotler.core.skills import SKILLS, Parameter, RosAction, Skill
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import PYTHON, Ros, RosRobot, Waits
-from codebotler.robots.ros1 import SCRIPT, Ros1
+from codebotler.robots.ros1.robot import WORKER, Ros1
 from codebotler.simulator.robot import RobotError
 from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
 
@@ -303,7 +303,7 @@ def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
 
 TOOL = """
 import sys
-from codebotler.robots.ros1 import Ros1
+from codebotler.robots.ros1.robot import Ros1
 robot = Ros1(sys.argv[1])
 robot.connect()
 robot.perform("go_to", ["never"])
@@ -350,7 +350,7 @@ def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: G
     server.expect("goal", "no result")
     robot.disconnect()
     environment = {"ROS_MASTER_URI": graph.uri}
-    other = RosRobot(Ros("ros1", SCRIPT, PYTHON, environment, graph.uri, node="somebody_else"))
+    other = RosRobot(Ros("ros1", WORKER, PYTHON, environment, graph.uri, node="somebody_else"))
     other.connect()
     with started(lambda: other.perform("say", ["never"])) as ended:  # stands for what nobody looks after
         server.expect("goal", "never")
@@ -366,12 +366,13 @@ def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: G
 
 
 CANCELLED = """
-import ros1_worker
-class Cancelled(ros1_worker.Ros1Worker):
+from channel import main
+from goals import Ros1Worker
+class Cancelled(Ros1Worker):
     def _send(self, goal, arguments):
         goal.cancel()
         super()._send(goal, arguments)
-ros1_worker.main(Cancelled)
+main(Cancelled)
 """
 
 
@@ -379,7 +380,7 @@ def test_goal_that_is_cancelled_before_it_is_sent_never_is(graph: Graph, tmp_pat
     server = graph.serve(SAY)
     script = tmp_path / "cancelled.py"
     script.write_text(CANCELLED)
-    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(SCRIPT.parent)}
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKER)}
     robot = RosRobot(Ros("ros1", script, PYTHON, environment, graph.uri))
     robot.connect()
     with pytest.raises(CancelledError):
@@ -421,8 +422,9 @@ def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> Non
 
 LATE = f"""
 import subprocess, sys, time
-import ros1_worker
-class Late(ros1_worker.Ros1Worker):
+from channel import main
+from goals import Ros1Worker
+class Late(Ros1Worker):
     def _servers(self, actions):
         servers = super()._servers(actions)
         other = "import rospy; rospy.init_node('codebotler', disable_signals=True); rospy.sleep({LONG})"
@@ -437,7 +439,7 @@ class Late(ros1_worker.Ros1Worker):
         assert all("another node called /codebotler has taken over" in why for why in said), said
         self.other.kill()
         return missing
-ros1_worker.main(Late)
+main(Late)
 """
 
 
@@ -445,7 +447,7 @@ def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_pa
     graph.serve(GO_TO)
     script = tmp_path / "late.py"
     script.write_text(LATE)
-    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(SCRIPT.parent)}
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKER)}
     robot = RosRobot(Ros("ros1", script, PYTHON, environment, graph.uri), waits=Waits(patience=LONG))
     began = time.monotonic()
     with pytest.raises(NotReadyError, match="node called /codebotler"):
@@ -525,7 +527,7 @@ def test_installed_messages_are_preferred_and_their_feedback_is_told(
 MD5 = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
-from ros1_worker import message_types
+from message_types import message_types
 for name, spec in message_types(json.loads(sys.argv[2])).items():
     a = spec()
     for part in (a, a.action_goal, a.action_result, a.action_feedback,
@@ -545,7 +547,7 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
 
     actions = [{"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None]
     said = subprocess.run(
-        [str(PYTHON), "-c", MD5, str(SCRIPT.parent), json.dumps(actions)],
+        [str(PYTHON), "-c", MD5, str(WORKER), json.dumps(actions)],
         capture_output=True,
         text=True,
         check=True,
@@ -573,6 +575,6 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
         assert made[f"{name}Action"][0] == action
 
 
-@pytest.mark.parametrize("name", ["ros1_worker.py", "ros1_servers.py"])
-def test_workers_are_read_by_python_3_8(name: str) -> None:
-    ast.parse(SCRIPT.with_name(name).read_text(), feature_version=(3, 8))
+@pytest.mark.parametrize("path", sorted(WORKER.glob("*.py")))
+def test_workers_are_read_by_python_3_8(path: Path) -> None:
+    ast.parse(path.read_text(), feature_version=(3, 8))

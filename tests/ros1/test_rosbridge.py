@@ -24,7 +24,7 @@ from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.ros import Waits
-from codebotler.robots.rosbridge import Rosbridge
+from codebotler.robots.rosbridge.robot import Rosbridge
 from codebotler.simulator.robot import RobotError
 from processes import are_gone, children_of
 from ros_graph import GO_TO, SAY, Graph, free_port, started
@@ -168,7 +168,7 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
 
 TOOL = """
 import sys, time
-from codebotler.robots.rosbridge import Rosbridge
+from codebotler.robots.rosbridge.robot import Rosbridge
 robot = Rosbridge(sys.argv[1])
 robot.connect()
 robot.perform("get_all_rooms", [])

@@ -19,7 +19,7 @@ from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
-from codebotler.robots.ros1 import Ros1
+from codebotler.robots.ros1.robot import Ros1
 from codebotler.robots.scripted import AS_WRITTEN
 from codebotler.robots.virtual import VirtualRobot
 from codebotler.simulator.engine import run

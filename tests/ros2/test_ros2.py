@@ -19,7 +19,7 @@ from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
 from codebotler.robots.ros import Waits
-from codebotler.robots.ros2 import NOTE, SCRIPT, Ros2, readiness
+from codebotler.robots.ros2.robot import NOTE, WORKER, Ros2, readiness
 from codebotler.simulator.robot import RobotError
 
 STUB = Path(__file__).parent / "stub"
@@ -154,4 +154,4 @@ def test_address_is_a_domain() -> None:
 
 
 def test_worker_is_read_by_python_3_8() -> None:
-    ast.parse(SCRIPT.read_text(), feature_version=(3, 8))
+    ast.parse(WORKER.read_text(), feature_version=(3, 8))

@@ -14,10 +14,10 @@ from codebotler.robots.faced import Faced, unspoken
 
 KINDS = {
     "sim": "simulated",
-    "pyrobosim": "pyrobosim",
-    "ros1": "ros1",
-    "rosbridge": "rosbridge",
-    "ros2": "ros2",
+    "pyrobosim": "pyrobosim.robot",
+    "ros1": "ros1.robot",
+    "rosbridge": "rosbridge.robot",
+    "ros2": "ros2.robot",
 }
 """Kinds of robots as a user names them, with the module of each."""
 

@@ -13,12 +13,12 @@ from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.world import World
 from codebotler.robots.base import Argument, CancelledError, RobotLostError, untold
 from codebotler.robots.ros import PYTHON, actions_of
-from codebotler.robots.ros1 import master_uri
+from codebotler.robots.ros1.robot import WORKER, master_uri
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.worker import Message, RosWorker
 from codebotler.simulator.robot import RobotError
 
-SCRIPT = Path(__file__).with_name("ros1_servers.py")
+SERVERS = WORKER / "servers.py"
 NODE = "virtual_robot"
 HERE = ("localhost", "127.0.0.1")
 HEARS = 3600.0  # seconds of one turn of listening
@@ -75,7 +75,7 @@ class VirtualRobot:
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
         self._worker = RosWorker(
-            self._python, SCRIPT, {"node": NODE, "actions": actions, "port": port}, environment
+            self._python, SERVERS, {"node": NODE, "actions": actions, "port": port}, environment
         )
         self._threads = [threading.Thread(target=run, daemon=True) for run in (self._listen, self._work)]
         for thread in self._threads:

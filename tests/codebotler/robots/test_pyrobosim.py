@@ -23,7 +23,7 @@ from codebotler.missions.preflight import preflight
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, Picture
 from codebotler.robots.open import all_readiness
-from codebotler.robots.pyrobosim import Pyrobosim
+from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY
 from codebotler.simulator.engine import run
@@ -313,7 +313,7 @@ watched = ("socket.", "subprocess.", "os.posix_spawn", "webbrowser.")
 sys.addaudithook(lambda event, _: event.startswith(watched) and seen.append(event))
 import numpy
 before = numpy.random.get_state()[1].tolist()
-from codebotler.robots.pyrobosim import Pyrobosim
+from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.core.world import World
 from pathlib import Path
 robot = Pyrobosim(World.read(Path(sys.argv[1])), speed=None)

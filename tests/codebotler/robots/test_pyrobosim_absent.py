@@ -12,7 +12,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
 from codebotler.robots.base import NotReadyError, Options, Robot
 from codebotler.robots.open import all_readiness, open_robot
-from codebotler.robots.pyrobosim import Pyrobosim, readiness
+from codebotler.robots.pyrobosim.robot import Pyrobosim, readiness
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
 MEND = 'pip install "codebotler[pyrobosim]"'

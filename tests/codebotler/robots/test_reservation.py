@@ -11,8 +11,8 @@ import pytest
 from codebotler.robots.address import endpoint
 from codebotler.robots.base import NotReadyError
 from codebotler.robots.reservation import Reservation, machine_wide
-from codebotler.robots.ros1 import Ros1
-from codebotler.robots.rosbridge import Rosbridge
+from codebotler.robots.ros1.robot import Ros1
+from codebotler.robots.rosbridge.robot import Rosbridge
 from doubles import Answering
 
 

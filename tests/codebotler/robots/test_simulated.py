@@ -12,10 +12,10 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.world import Person, Room, World
-from codebotler.robots import ros1
 from codebotler.robots.base import CancelledError, Options, Picture, Robot
 from codebotler.robots.open import all_readiness, open_robot
-from codebotler.robots.ros2 import mend_of
+from codebotler.robots.ros1.robot import MEND
+from codebotler.robots.ros2.robot import mend_of
 from codebotler.robots.scripted import METRES_PER_SECOND
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.robot import RobotError
@@ -153,7 +153,7 @@ def test_each_mend_is_a_command(tmp_path: Path) -> None:
     mends = [
         kind.mend for path in (sys.executable, "/no", "/bin/false") for kind in all_readiness(Path(path))
     ]
-    mends += [ros1.MEND, mend_of(["robot_actions_pkg"]), mend_of(["rclpy", "robot_actions_pkg"], tmp_path)]
+    mends += [MEND, mend_of(["robot_actions_pkg"]), mend_of(["rclpy", "robot_actions_pkg"], tmp_path)]
     for version in ("humble", "noetic"):
         (tmp_path / version / "share").mkdir(parents=True)
         (tmp_path / version / "setup.bash").touch()

@@ -8,11 +8,17 @@ from __future__ import annotations
 
 import importlib
 import os
+import sys
 import threading
 import time
+from pathlib import Path
 from typing import Any
 
-from ros1_worker import PACKAGE, Goal, Message, NotReadyError, Ros1Worker, main
+sys.path.insert(0, str(Path(__file__).parents[1] / "ros1" / "worker"))
+
+from channel import Message, NotReadyError, main
+from goals import Goal, Ros1Worker
+from message_types import PACKAGE
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
@@ -127,7 +133,7 @@ class Server2:
         self._cancel_all.call_async(self._request())
 
 
-class Ros2Worker(Ros1Worker):  # type: ignore[misc]  # found only where it runs
+class Ros2Worker(Ros1Worker):
     """Executes skills over ROS 2, one at a time."""
 
     def _entered(self, node: str) -> Any:

@@ -10,8 +10,10 @@ import socket
 import threading
 from typing import Any
 
-from ros1_pictures import Camera, Show
-from ros1_worker import Channel, Graph, Message, NotReadyError, main, message_types, no_master
+from channel import Channel, Message, NotReadyError, main
+from graph import Graph, no_master
+from message_types import message_types
+from pictures import Camera, Show
 
 
 class Servers:

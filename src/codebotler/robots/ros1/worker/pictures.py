@@ -6,7 +6,7 @@ import base64
 import time
 from typing import Any
 
-from ros1_worker import BUFFER, COMPRESSED, in_text, picture_types
+from message_types import BUFFER, COMPRESSED, in_text, picture_types
 
 MOST = 64_000_000  # bytes of a picture that is passed on
 

@@ -13,7 +13,7 @@ from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
 
-SCRIPT = Path(__file__).with_name("ros1_worker.py")
+WORKER = Path(__file__).with_name("worker")
 MASTER = "http://localhost:11311"
 NEEDS = ("rospy", "actionlib", "actionlib_msgs", "genpy", "genmsg", "netifaces")
 MEND = (
@@ -46,7 +46,7 @@ class Ros1(RosRobot):
         waits: Waits | None = None,
     ) -> None:
         uri = master_uri(master)
-        ros = Ros("ros1", SCRIPT, python, {"ROS_MASTER_URI": uri}, endpoint(uri))
+        ros = Ros("ros1", WORKER, python, {"ROS_MASTER_URI": uri}, endpoint(uri))
         super().__init__(ros, skills, speed, waits)
 
 

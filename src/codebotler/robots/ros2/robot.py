@@ -15,7 +15,7 @@ from codebotler.robots.base import Options, Readiness
 from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
 from codebotler.robots.worker import lacks
 
-SCRIPT = Path(__file__).with_name("ros2_worker.py")
+WORKER = Path(__file__).with_name("worker.py")
 NEEDS = ("rclpy", "action_msgs", "robot_actions_pkg")
 INSTALL = "apt-get install -y ros-jazzy-ros-base && source /opt/ros/jazzy/setup.bash"
 BUILD = "cd ~/ros2_ws && colcon build --packages-select robot_actions_pkg && source install/setup.bash"
@@ -43,7 +43,7 @@ class Ros2(RosRobot):
         waits: Waits | None = None,
     ) -> None:
         address = domain or os.environ.get("ROS_DOMAIN_ID") or "0"
-        ros = Ros("ros2", SCRIPT, python, {"ROS_DOMAIN_ID": address}, address)
+        ros = Ros("ros2", WORKER, python, {"ROS_DOMAIN_ID": address}, address)
         super().__init__(ros, skills, speed, waits)
 
 

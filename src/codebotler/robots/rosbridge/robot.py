@@ -30,15 +30,15 @@ from codebotler.robots.base import (
     RobotLostError,
     untold,
 )
-from codebotler.robots.bridge_guard import CLOSES, Voice
-from codebotler.robots.bridged import Dialect, Message, News, Operations, Topics
 from codebotler.robots.clock import Clock
 from codebotler.robots.ros import Waits, error_of
+from codebotler.robots.rosbridge.protocol import Dialect, Message, News, Operations, Topics
+from codebotler.robots.rosbridge.watchdog import CLOSES, Voice
 from codebotler.robots.worker import RosWorker
 from codebotler.simulator.robot import RobotError
 
 ADDRESS = "ws://localhost:9090"
-GUARD = Path(__file__).with_name("bridge_guard.py")
+GUARD = Path(__file__).with_name("watchdog.py")
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell which ROS it has; one without rosapi cannot
 AGAIN = 0.5  # seconds after which what nobody has taken notice of is said again

@@ -30,7 +30,7 @@ from codebotler.robots.scripted import AS_WRITTEN, SECONDS, performed
 from codebotler.simulator.robot import SimulatedRobot, Thing, resolve_room
 
 if TYPE_CHECKING:
-    from codebotler.robots.pyrobosim_world import Stage
+    from codebotler.robots.pyrobosim.world import Stage
 
 MEND = 'pip install "codebotler[pyrobosim]"'
 OLDEST = 5
@@ -72,7 +72,7 @@ class Pyrobosim:
         logger = logging.getLogger("pyrobosim")
         if not logger.handlers:  # or it logs to the terminal
             logger.addHandler(logging.NullHandler())
-        from codebotler.robots.pyrobosim_world import Stage  # noqa: PLC0415 - takes a second, and is an extra
+        from codebotler.robots.pyrobosim.world import Stage  # noqa: PLC0415 - takes a second, and is an extra
 
         self.clock.restart()
         self._stage = Stage(self._world, self.clock)

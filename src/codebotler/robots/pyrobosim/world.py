@@ -23,7 +23,7 @@ from shapely.geometry import LineString
 from codebotler.core.world import World
 from codebotler.robots.base import CancelledError, Feedback, untold
 from codebotler.robots.clock import Clock
-from codebotler.robots.floorplan import RADIUS, Floorplan, Table, planned
+from codebotler.robots.pyrobosim.floorplan import RADIUS, Floorplan, Table, planned
 from codebotler.robots.scripted import METRES_PER_SECOND, SECONDS, TELLS_EVERY
 from codebotler.simulator.robot import RobotError
 
