@@ -18,7 +18,8 @@ from statistics import median, quantiles
 
 from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.robots.ros import PYTHON, actions_of
+from codebotler.robots.base import ROS_PYTHON
+from codebotler.robots.ros import actions_of
 from codebotler.robots.ros1.robot import WORKER, Ros1
 from codebotler.robots.virtual import VirtualRobot
 
@@ -35,7 +36,7 @@ def raw(robot: VirtualRobot, goals: int) -> list[float]:
     script = str(Path(__file__).with_name("raw_actionlib.py"))
     action = json.dumps(actions_of(SKILLS)["say"])
     done = subprocess.run(
-        [str(PYTHON), script, str(WORKER), action, str(goals)],
+        [str(ROS_PYTHON), script, str(WORKER), action, str(goals)],
         env={**os.environ, "ROS_MASTER_URI": robot.address},
         stdout=subprocess.PIPE,
         check=True,

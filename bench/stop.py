@@ -21,7 +21,7 @@ from statistics import median
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, events_of
 from codebotler.missions.mission import Mission
-from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, untold
+from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
 from codebotler.robots.open import all_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
@@ -47,7 +47,7 @@ class Timed(Simulated):
         self.told = self.told or time.perf_counter()
         super().cancel()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
+    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = no_feedback) -> Result:
         """Remember when it was ended."""
         try:
             return super().perform(skill, arguments, told)
@@ -96,7 +96,7 @@ class Server(VirtualRobot):
     heard = ended = 0.0
 
     def __init__(self, port: int) -> None:
-        super().__init__(WORLD, port=port, told=self._note)
+        super().__init__(WORLD, port=port, show=self._note)
         self.drives = threading.Event()
 
     def _note(self, what: str) -> None:

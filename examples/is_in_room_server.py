@@ -79,7 +79,7 @@ class Server:
                 case {"is": "cancel", "id": str(goal)}:  # looking moves nothing, so that it has ended at once
                     self.end(goal, do="cancelled")
                 case {"is": "ended"}:
-                    sys.exit(f"the worker has died ({self.worker.epitaph()})")
+                    sys.exit(f"the worker has died ({self.worker.how_it_ended()})")
 
     def work(self) -> None:
         """Look for what goals name."""

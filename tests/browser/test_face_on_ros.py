@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from codebotler.robots.faced import unspoken
-from codebotler.robots.ros import PYTHON
+from codebotler.robots.base import ROS_PYTHON
+from codebotler.robots.face import without_speech
 from codebotler.robots.ros1.robot import MEND, NEEDS
 from codebotler.robots.worker import lacks
 from faces import SPEAKING
@@ -39,9 +39,9 @@ WAITS = """def task_program():
 
 @pytest.fixture
 def graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Graph]:
-    missing = lacks(PYTHON, (*NEEDS, "rosmaster"))
+    missing = lacks(ROS_PYTHON, (*NEEDS, "rosmaster"))
     if missing is None or missing:
-        pytest.skip(f"{PYTHON} lacks {missing or 'Python'}: {MEND}")
+        pytest.skip(f"{ROS_PYTHON} lacks {missing or 'Python'}: {MEND}")
     for name, value in (("ROS_HOME", "ros"), ("ROS_LOG_DIR", "ros/log")):
         monkeypatch.setenv(name, str(tmp_path / value))
     monkeypatch.setenv("ROS_HOSTNAME", "localhost")
@@ -112,7 +112,7 @@ def test_from_an_instruction_to_an_answer_on_a_real_graph(
 def test_a_robot_on_a_graph_needs_no_servers_for_what_its_face_says(
     graph: Graph, tmp_path: Path, opened: OpenPage
 ) -> None:
-    server = graph.serve(*unspoken().rows)
+    server = graph.serve(*without_speech().rows)
     with PageServer(tmp_path, "--robot", "ros1", "--address", graph.uri, "--face", world=WORLD) as page:
         face = opened(page, link=page.face_link, script=SPEAKING)
         page.run("def task_program():\n    say('hello')\n    go_to('study')\n    say('here')\n")

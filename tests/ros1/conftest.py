@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.robots.ros import PYTHON
+from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.ros1.robot import MEND, NEEDS
 from codebotler.robots.worker import lacks
 from ros_graph import Graph
@@ -16,9 +16,9 @@ HERE = Path(__file__).parent
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    missing = lacks(PYTHON, (*NEEDS, "rosmaster"))
+    missing = lacks(ROS_PYTHON, (*NEEDS, "rosmaster"))
     if missing is None or missing:
-        reason = f"{PYTHON} lacks {missing or 'Python'}: {MEND}"
+        reason = f"{ROS_PYTHON} lacks {missing or 'Python'}: {MEND}"
         for item in items:
             if HERE in item.path.parents:
                 item.add_marker(pytest.mark.skip(reason=reason))

@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.core.skills import SKILLS, Skill
-from codebotler.robots.ros import PYTHON, Waits
+from codebotler.robots.base import ROS_PYTHON
+from codebotler.robots.ros import Waits
 from codebotler.robots.ros1.robot import WORKER, Ros1
 
 HERE = Path(__file__).parent
@@ -37,7 +38,7 @@ class Process:
     def __init__(self, script: Path, *arguments: str, master: str = "", **environment: str) -> None:
         self.said: queue.Queue[list[Any]] = queue.Queue()
         self.process = subprocess.Popen(
-            [str(PYTHON), str(script), *arguments],
+            [str(ROS_PYTHON), str(script), *arguments],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

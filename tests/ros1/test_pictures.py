@@ -23,8 +23,8 @@ from PIL import Image
 from codebotler.core.skills import SKILLS
 from codebotler.missions.log import events_of
 from codebotler.perception import image_of
-from codebotler.robots.base import CancelledError, Picture
-from codebotler.robots.ros import PYTHON, Waits
+from codebotler.robots.base import ROS_PYTHON, CancelledError, Picture
+from codebotler.robots.ros import Waits
 from codebotler.robots.ros1.robot import WORKER
 from codebotler.simulator.robot import RobotError
 from ros_graph import LONG, Graph, Process, free_port, started
@@ -303,7 +303,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import base64, os, threading, time
 import actionlib, rospy
-from pictures import Show
+from pictures import PictureTopic
 from message_types import message_types
 
 def look(goal):
@@ -321,7 +321,7 @@ picture = base64.b64encode(b"no picture at all").decode()
 rospy.init_node("eyes", disable_signals=True, log_level=rospy.FATAL)
 spec = message_types([{"type": "IsInRoom", "definition": sys.argv[2]}])["IsInRoom"]
 server = actionlib.SimpleActionServer("/is_in_room_server", spec, look, auto_start=False)
-show = Show("/is_in_room_server")
+show = PictureTopic("/is_in_room_server")
 server.start()
 print('["ready"]', flush=True)
 sys.stdin.read()
@@ -362,7 +362,9 @@ def test_messages_made_in_memory_are_those_of_ros() -> None:
         "made = [t.Image, t.CompressedImage];"
         "print(json.dumps({c._type: [c._md5sum, c._type, c.__slots__] for c in made}))"
     )
-    done = subprocess.run([str(PYTHON), "-c", code], cwd=WORKER, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [str(ROS_PYTHON), "-c", code], cwd=WORKER, capture_output=True, text=True, check=True
+    )
     assert json.loads(done.stdout) == {  # as `rosmsg md5` and `rosmsg show` tell them
         "sensor_msgs/Image": [
             "060021388200f6f0f447d0fcd9c64743",

@@ -20,7 +20,7 @@ from codebotler.missions.live import LiveRobot
 from codebotler.models.recorded import recorded_model
 from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
 from codebotler.robots.ros1.robot import Ros1
-from codebotler.robots.scripted import AS_WRITTEN
+from codebotler.robots.simulated import ROBOT_RULES
 from codebotler.robots.virtual import VirtualRobot
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError
@@ -88,7 +88,7 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
     tasks = [(task.name, task.prompts[0], task.scenarios[0].world) for task in paper.tasks.values()]
     programs = [model.reply(instruction, 0).program for _, instruction, _ in tasks]
     worlds = [world for _, _, world in tasks]
-    simulated = list(run(zip(programs, worlds, strict=True), workers=1, rules=AS_WRITTEN))
+    simulated = list(run(zip(programs, worlds, strict=True), workers=1, rules=ROBOT_RULES))
     assert len(tasks) == 16
 
     virtual = VirtualRobot(worlds[0], speed=SPEED, port=graph.port)
@@ -99,7 +99,7 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
         for (name, _, world), program, expected in zip(tasks, programs, simulated, strict=True):
             virtual.enter(world)
             robot.connect()
-            live = LiveRobot(robot, lambda *_, **__: None, clock_starts=AS_WRITTEN.clock_starts)
+            live = LiveRobot(robot, lambda *_, **__: None, clock_starts=ROBOT_RULES.clock_starts)
             outcome = worker.run_live(program, live)
             assert outcome.status == Status.FINISHED == expected.status, (name, outcome)
             assert outcome.trace == expected.trace, name
@@ -125,11 +125,13 @@ def test_master_elsewhere_is_never_started(monkeypatch: pytest.MonkeyPatch) -> N
 def test_second_virtual_robot_is_refused(graph: Graph, virtual: VirtualRobot) -> None:
     with pytest.raises(NotReadyError, match="node /virtual_robot at http"):
         VirtualRobot(WORLD, port=graph.port).start()
-    assert virtual.pid
+    assert virtual._worker is not None
+    assert virtual._worker.receive(0) is None
 
 
 def test_killed_worker_is_said(virtual: VirtualRobot) -> None:
-    os.kill(virtual.pid, signal.SIGKILL)
+    assert virtual._worker is not None
+    os.kill(virtual._worker.pid, signal.SIGKILL)
     with pytest.raises(RobotLostError, match=r"virtual robot has died \(signal 9\)"):
         virtual.wait()
 

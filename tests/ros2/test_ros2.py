@@ -110,7 +110,7 @@ def test_robot_that_does_not_stop_is_said_not_to(robot: Ros2, notes: Path) -> No
 
 
 def test_server_that_dies_or_takes_no_notice(robot: Ros2) -> None:
-    with pytest.raises(RobotLostError, match=r"take the goal .*1 s"):
+    with pytest.raises(RobotLostError, match=r"accept the goal .*1 s"):
         robot.perform("say", ["ignore"])
     with pytest.raises(RobotLostError, match=r"/go_to_server has died.* 0\.5 s"):
         robot.perform("go_to", ["die"])

@@ -278,7 +278,7 @@ def serve(
     from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
-    from codebotler.robots.open import open_faced, open_robot
+    from codebotler.robots.open import open_robot, open_with_face
     from codebotler.web.access import entrance
     from codebotler.web.console import Console
 
@@ -295,7 +295,7 @@ def serve(
 
     options = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
-    body = open_robot(robot, options) if shown is None else open_faced(robot, options, shown)
+    body = open_robot(robot, options) if shown is None else open_with_face(robot, options, shown)
     desk = Console(body, home(), opened, models=models, world=known, face=shown)
 
     from codebotler.web.frame import installed
@@ -331,7 +331,7 @@ def virtual_robot(
         with suppress(OSError):  # the robot goes on where nobody reads any more
             print_text(line)
 
-    robot = VirtualRobot(World.read(world), speed=speed, port=port, python=ros_python, told=show)
+    robot = VirtualRobot(World.read(world), speed=speed, port=port, python=ros_python, show=show)
     try:
         started = robot.start()
         what = "a ROS master was started" if started else "joined the ROS master"

@@ -1,4 +1,4 @@
-"""What all robots have in common; whatever stands above them knows only this."""
+"""What every robot offers: the `Robot` protocol, its errors and its options."""
 
 from __future__ import annotations
 
@@ -12,29 +12,32 @@ from codebotler.core.world import World
 from codebotler.robots.clock import Clock
 
 Argument: TypeAlias = str | tuple[str, ...]
-"""What a skill is given: a text, or the options of a question."""
+"""An argument of a skill: a text, or the options of a question."""
 
 Result: TypeAlias = str | list[str] | bool | None
-"""What a skill gives back; for a question the text of the chosen option."""
+"""What a skill returns; for a question the text of the chosen option."""
+
+ROS_PYTHON = Path("/usr/bin/python3")
+"""The interpreter that a robot's ROS usually belongs to."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What a robot saw.
+    """Something the robot saw.
 
     Args:
-        data: a JPEG or PNG file, if the robot keeps to that; nobody has looked into it.
+        data: a JPEG or PNG file, not yet validated.
     """
 
     data: bytes
 
 
 Feedback: TypeAlias = Callable[[str | Picture], None]
-"""Told how a skill goes on, in a short phrase such as `at (3.1, 2.0)`, and what is seen; from any thread."""
+"""Called from any thread with the progress of a skill, such as `at (3.1, 2.0)`, and with pictures."""
 
 
-def untold(_what: str | Picture) -> None:
-    """Tell nobody."""
+def no_feedback(_: str | Picture) -> None:
+    """Ignore feedback."""
 
 
 class Robot(Protocol):
@@ -42,68 +45,70 @@ class Robot(Protocol):
 
     @property
     def name(self) -> str:
-        """What kind of robot it is: simulated, pyrobosim, ros1, rosbridge or ros2."""
+        """The kind of robot: simulated, pyrobosim, ros1, rosbridge or ros2."""
 
     @property
     def address(self) -> str:
-        """What tells it from others of its kind, such as the URI of a ROS master; empty if it is ours alone.
+        """What tells it from others of its kind, such as the URI of a ROS master; empty if only we use it.
 
-        Two that lead to the same robot are equal, see `codebotler.robots.address`.
+        Different spellings of a network address are recognised.
         """
 
     @property
     def if_tool_dies(self) -> str:
-        """What becomes of a skill that goes on when this process is killed, without a full stop."""
+        """What happens to a running skill when this process is killed, as a clause without a full stop."""
 
     @property
     def skills(self) -> SkillTable:
-        """What it can be asked to do."""
+        """The skills it may be asked to perform."""
 
     @property
     def missing(self) -> Mapping[str, str]:
-        """Why it cannot perform some skills, by name, as far as it could tell when it was connected."""
+        """Why it cannot perform some of its skills, by name, as far as that was known when it connected."""
 
     @property
     def clock(self) -> Clock:
-        """Its time, by which a program sleeps."""
+        """The time by which a program sleeps."""
 
     def connect(self) -> None:
-        """Make it ready for `perform`, at rest, with its clock at 0; also after a `cancel`.
+        """Make the robot ready and at rest, with its clock at 0; also after a `cancel`.
 
         Raises:
-            NotReadyError: it cannot be used; nothing is held then.
+            NotReadyError: it cannot be used; nothing is left open then.
         """
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
+    def perform(
+        self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback, /
+    ) -> Result:
         """Execute a skill to its end; called from one thread at a time.
 
         Args:
             skill: its name in the table.
             arguments: in the order of its parameters.
-            told: how it goes on, and what is seen.
+            feedback: called with its progress.
 
         Raises:
             RobotError: (of `codebotler.simulator.robot`) the robot cannot do it; the program sees this.
-            CancelledError: `cancel` was called, before or meanwhile, or somebody else stopped the robot.
-            RobotLostError: the robot is gone, or does not answer any more.
+            CancelledError: `cancel` was called before or meanwhile, or another client stopped the robot.
+            RobotLostError: the robot is gone or no longer answers.
         """
 
     def cancel(self) -> None:
-        """End what goes on, if anything does, and all that is asked for before the next `connect`.
+        """End the current skill, if any, and refuse all others until the next `connect`.
 
-        Called from any thread. Back as soon as the robot was told so; what goes on then comes to its end in
-        `perform`. Does nothing where nothing is connected, and raises nothing.
+        Called from any thread. It returns as soon as the robot has been told; `perform` returns when the
+        skill has ended. Without a connection it does nothing, and it raises nothing.
         """
 
     def disconnect(self) -> None:
-        """Give back all that it holds; what still goes on is ended. Again does nothing."""
+        """End whatever goes on and release all resources; may be called again."""
 
 
 class NotReadyError(Exception):
     """A robot cannot be used.
 
     Args:
-        sentence: what is missing, and the mend.
+        sentence: what is missing, and how to fix it.
     """
 
     def __init__(self, sentence: str) -> None:
@@ -112,7 +117,7 @@ class NotReadyError(Exception):
 
 
 class RobotLostError(Exception):
-    """A robot that was connected is gone, or does not answer any more.
+    """A connected robot is gone or no longer answers.
 
     Args:
         sentence: how that was noticed.
@@ -124,19 +129,19 @@ class RobotLostError(Exception):
 
 
 class CancelledError(Exception):
-    """What the robot was doing was ended on demand."""
+    """A skill was ended on demand."""
 
 
 @dataclass(frozen=True)
 class Readiness:
-    """Whether robots of a kind can be used here.
+    """Whether robots of one kind can be used on this machine.
 
     Args:
-        name: of the kind, as a user names it: sim, pyrobosim, ros1, rosbridge or ros2.
+        name: the kind as a user names it: sim, pyrobosim, ros1, rosbridge or ros2.
         works: whether they can, as far as can be seen without connecting.
-        missing: what is missing, in a phrase; empty if it works.
-        mend: the command that mends it, if one does.
-        note: what a user should know of it, such as how far it was tested.
+        missing: what is missing, as a phrase; empty if it works.
+        mend: the command that fixes it, if one does.
+        note: what a user should know about it, such as how far it was tested.
     """
 
     name: str
@@ -148,18 +153,18 @@ class Readiness:
 
 @dataclass(frozen=True)
 class Options:
-    """What a user says about the robot that is to be opened; each kind takes what concerns it.
+    """A user's options for opening a robot; each kind uses those that concern it.
 
     Args:
-        world: where a simulated robot is, and what people answer; None where nobody named one.
-        speed: how many seconds of the robot's clock pass in a real one; None if waiting takes no time.
-        address: of the robot, such as the URI of a ROS master or of a rosbridge; empty for the usual one.
+        world: the world of a simulated robot.
+        speed: seconds of the robot's clock per real second; None if waiting takes no real time.
+        address: of the robot, such as the URI of a ROS master or rosbridge; empty for the default.
         ros_python: the interpreter that the robot's ROS belongs to.
-        skills: what the robot can be asked to do.
+        skills: the skills it may be asked to perform.
     """
 
     world: World | None = None
     speed: float | None = 1.0
     address: str = ""
-    ros_python: Path = Path("/usr/bin/python3")
+    ros_python: Path = ROS_PYTHON
     skills: SkillTable = SKILLS

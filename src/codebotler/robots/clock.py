@@ -1,4 +1,4 @@
-"""A robot's time: as it passes, scaled, or passing only when somebody waits; a stop ends all waiting."""
+"""A robot's clock: in real time, scaled, or advancing only while a program waits."""
 
 from __future__ import annotations
 
@@ -8,23 +8,22 @@ import time
 from codebotler.core.errors import UserError
 
 FASTEST, SLOWEST = 1e6, 1e-6
-"""Speeds beyond which numbers of seconds stop being exact, and nobody would watch."""
 
 
 class Clock:
-    """Time that starts at 0 and goes on by itself, unless nobody waits for it in truth.
+    """Time that starts at 0, and waits that can be stopped.
 
     Args:
-        speed: how many of its seconds pass in a real one, from 0.000001 to 1,000,000; None where waiting
-            takes no real time, and time passes only by waiting.
+        speed: its seconds per real second, from 0.000001 to 1,000,000; None if waiting takes no real time,
+            and time advances only by waiting.
 
     Raises:
-        UserError: the speed is out of its range.
+        UserError: the speed is out of range.
     """
 
     def __init__(self, speed: float | None = 1.0) -> None:
         if speed is not None and not SLOWEST <= speed <= FASTEST:
-            raise UserError(f"the speed is {speed:g}, but it must be from {SLOWEST:f} to {FASTEST:,.0f}")
+            raise UserError(f"the speed is {speed:g}, but must be from {SLOWEST:f} to {FASTEST:,.0f}")
         self.speed = speed
         self._start = time.monotonic()
         self._waited = 0.0
@@ -32,30 +31,24 @@ class Clock:
 
     @property
     def now(self) -> float:
-        """How late it is, in its seconds since the start."""
+        """Seconds since the start."""
         if self.speed is None:
             return self._waited
         return (time.monotonic() - self._start) * self.speed
 
     def wait(self, seconds: float) -> bool:
-        """Wait, and tell whether all of it has passed, and nobody has stopped it.
-
-        Args:
-            seconds: its own, at least 0.
-        """
-        if self.speed is None:
-            self._waited += 0.0 if self._stopped.is_set() else seconds
-            return not self._stopped.is_set()
-        ends = time.monotonic() + seconds / self.speed
-        while (left := ends - time.monotonic()) > 0 and not self._stopped.is_set():
-            self._stopped.wait(min(left, threading.TIMEOUT_MAX))
+        """Wait for at least 0 seconds of this clock; False if it was stopped before or meanwhile."""
+        if self.speed is not None:
+            self._stopped.wait(min(seconds / self.speed, threading.TIMEOUT_MAX))
+        elif not self._stopped.is_set():
+            self._waited += seconds
         return not self._stopped.is_set()
 
     def stop(self) -> None:
-        """End all waiting, from any thread, now and from now on."""
+        """End all waiting, now and until the next restart; from any thread."""
         self._stopped.set()
 
     def restart(self) -> None:
-        """Let it be 0 again, and let it be waited for."""
+        """Start again from 0."""
         self._start, self._waited = time.monotonic(), 0.0
         self._stopped.clear()

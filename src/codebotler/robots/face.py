@@ -1,35 +1,30 @@
-"""A face: what a robot says and asks where people can see it, and what they answer."""
+"""A face on which a robot speaks and asks, shown on any number of screens."""
 
 from __future__ import annotations
 
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from codebotler.robots.base import CancelledError
+from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
+from codebotler.robots.clock import Clock
 from codebotler.simulator.robot import RobotError
 
-PATIENCE = 60.0
-"""Real seconds that people have for an answer, unless somebody says otherwise."""
-
-SILENCE = "AskTimeout"
-"""The kind of the error where nobody answered in time."""
-
+PATIENCE = 60.0  # real seconds that people have for an answer by default
+TIMED_OUT = "AskTimeout"  # kind of the error
 MOST_SAID = 3
+SPOKEN = frozenset({"say", "ask"})
+AT_LEAST, AT_MOST, LETTERS_PER_SECOND = 1.0, 10.0, 20.0  # robot seconds that saying something takes
 
 
 @dataclass(frozen=True)
 class Said:
-    """Something that the robot said.
-
-    Args:
-        number: counted from 1, over all that was said and asked.
-        text: any text.
-    """
+    """Something the robot said; sentences and questions are numbered together, from 1."""
 
     number: int
     text: str
@@ -37,21 +32,13 @@ class Said:
 
 @dataclass(frozen=True)
 class Question:
-    """Something that the robot asks.
-
-    Args:
-        number: counted from 1, over all that was said and asked; who answers names it.
-        person: who is meant; any text.
-        text: the question; any text.
-        options: what can be answered; at least one, any texts.
-        until: when it is too late, on a clock that never goes back.
-    """
+    """Something the robot asks; an answer refers to its number."""
 
     number: int
     person: str
     text: str
     options: tuple[str, ...]
-    until: float = math.inf
+    until: float = math.inf  # deadline by the monotonic clock
 
 
 class Ending(StrEnum):
@@ -64,13 +51,7 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True)
 class Ended:
-    """A question that is none any more.
-
-    Args:
-        question: which it was.
-        how: it ended.
-        answer: the position of the chosen option, if one was.
-    """
+    """A question that has ended, with the position of the chosen option if it was answered."""
 
     question: Question
     how: Ending
@@ -78,14 +59,8 @@ class Ended:
 
 
 @dataclass(frozen=True)
-class Shown:
-    """What all faces show; it never changes.
-
-    Args:
-        said: the last things that the robot said in this mission, in order.
-        question: what it asks just now.
-        ended: the question before.
-    """
+class FaceState:
+    """What all screens show: the last sentences of this mission, the open question, and the one before."""
 
     said: tuple[Said, ...] = ()
     question: Question | None = None
@@ -93,47 +68,31 @@ class Shown:
 
 
 class AnswerError(Exception):
-    """An answer that cannot be taken.
-
-    Args:
-        sentence: why, for whoever gave it.
-    """
+    """An answer that comes too late or is none of the options."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
         self.sentence = sentence
 
 
-def unchanged() -> None:
-    """Tell nobody."""
-
-
 class Face:
-    """Holds what is said and asked, for any number of screens, which all show the same.
+    """What a robot says and asks; thread-safe, and only `ask` blocks.
 
-    All methods are for any thread. All but `ask` are back at once.
-
-    Args:
-        seconds: real ones that people have for an answer, above 0.
+    `seconds` are real ones that people have for an answer; `changed` is called after each change.
     """
 
     def __init__(self, seconds: float = PATIENCE) -> None:
-        self.changed: Callable[[], None] = unchanged
-        self.shown = Shown()
+        self.changed: Callable[[], None] = lambda: None
+        self.shown = FaceState()
+        self.screens = 0
         self._seconds = seconds
-        self._lock = threading.Condition()  # held for moments, and let go while an answer is waited for
+        self._lock = threading.Condition()
         self._number = 0
-        self._screens = 0
         self._is_open = False
-
-    @property
-    def screens(self) -> int:
-        """How many show it just now."""
-        return self._screens
 
     @contextmanager
     def watched(self) -> Iterator[None]:
-        """Be one of those that show it."""
+        """Count as a screen that shows it."""
         self._add_screens(1)
         try:
             yield
@@ -141,41 +100,27 @@ class Face:
             self._add_screens(-1)
 
     def open(self) -> None:
-        """Let it be spoken with, and forget what was said before."""
+        """Clear it for a new mission."""
         with self._lock:
             self._is_open = True
-            self._show(Shown())
+            self._show(FaceState())
 
     def withdraw(self) -> None:
-        """Take back what is asked, and say and ask nothing more before the next `open`."""
+        """Withdraw the question, and refuse to say or ask anything until the next `open`."""
         with self._lock:
             self._is_open = False
             self._end(Ending.WITHDRAWN)
 
     def say(self, text: str) -> None:
-        """Show a text.
-
-        Raises:
-            CancelledError: it was withdrawn.
-        """
+        """Show a sentence, or raise CancelledError if it was withdrawn."""
         with self._lock:
             said = Said(self._next(), text)
             self._show(replace(self.shown, said=(*self.shown.said, said)[-MOST_SAID:]))
 
     def ask(self, person: str, text: str, options: Sequence[str]) -> int:
-        """Ask, and wait for the answer.
+        """Ask, and wait for the position of the chosen option.
 
-        Args:
-            person: who is meant.
-            text: the question.
-            options: what can be answered; at least one.
-
-        Returns:
-            the position of the chosen option.
-
-        Raises:
-            RobotError: nobody answered in time.
-            CancelledError: it was withdrawn.
+        Raises RobotError if nobody answered in time, CancelledError if it was withdrawn.
         """
         with self._lock:
             question = Question(self._next(), person, text, tuple(options), time.monotonic() + self._seconds)
@@ -190,35 +135,27 @@ class Face:
         if ended is None or ended.question is not question or ended.how is Ending.WITHDRAWN:
             raise CancelledError
         if ended.answer is None:
-            raise RobotError(SILENCE, f'nobody answered "{text}" within {self._seconds:g} s')
+            raise RobotError(TIMED_OUT, f'nobody answered "{text}" within {self._seconds:g} s')
         return ended.answer
 
     def answer(self, number: int, option: int) -> None:
-        """Answer a question; the first answer counts.
-
-        Args:
-            number: of the question.
-            option: the position of the chosen one.
-
-        Raises:
-            AnswerError: it is not asked any more, or there is no such option.
-        """
+        """Answer the question with this number; the first answer counts, others raise AnswerError."""
         with self._lock:
             question = self.shown.question
             if question is None or question.number != number:
                 raise AnswerError(self._too_late(number))
             if not 0 <= option < len(question.options):
-                raise AnswerError("that is none of the answers to choose from")
+                raise AnswerError("that is none of the options")
             self._end(Ending.ANSWERED, option)
 
     def _too_late(self, number: int) -> str:
         ended = self.shown.ended
         if ended is None or ended.question.number != number:
-            return "that is not asked any more"
+            return "that question is closed"
         if ended.answer is not None:
-            return f'somebody has answered already: "{ended.question.options[ended.answer]}"'
-        why = "it was withdrawn" if ended.how is Ending.WITHDRAWN else "its time was over"
-        return f"that is not asked any more: {why}"
+            return f'the question was already answered: "{ended.question.options[ended.answer]}"'
+        why = "it was withdrawn" if ended.how is Ending.WITHDRAWN else "its time ran out"
+        return f"that question is closed: {why}"
 
     def _next(self) -> int:
         if not self._is_open:
@@ -231,12 +168,76 @@ class Face:
         if question is not None:
             self._show(replace(self.shown, question=None, ended=Ended(question, how, answer)))
 
-    def _show(self, shown: Shown) -> None:
+    def _show(self, shown: FaceState) -> None:
         self.shown = shown
         self._lock.notify_all()
         self.changed()
 
     def _add_screens(self, more: int) -> None:
         with self._lock:
-            self._screens += more
+            self.screens += more
             self.changed()
+
+
+def without_speech(skills: SkillTable = SKILLS) -> SkillTable:
+    """The skills that the robot behind a face must offer."""
+    return SkillTable(tuple(skill for skill in skills.rows if skill.name not in SPOKEN))
+
+
+class RobotWithFace:
+    """A robot that says and asks on a face, and passes all other skills on to another robot."""
+
+    def __init__(self, robot: Robot, face: Face, skills: SkillTable = SKILLS) -> None:
+        self._robot, self._face, self.skills = robot, face, skills
+        self.name, self.address, self.if_tool_dies = robot.name, robot.address, robot.if_tool_dies
+
+    @property
+    def missing(self) -> Mapping[str, str]:
+        """What the other robot cannot do, apart from speaking."""
+        return {skill: why for skill, why in self._robot.missing.items() if skill not in SPOKEN}
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of the other robot."""
+        return self._robot.clock
+
+    def connect(self) -> None:
+        """Connect the other robot, and clear the face."""
+        self._robot.connect()
+        self._face.open()
+
+    def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
+        """Speak, or have the other robot perform the skill."""
+        if skill not in SPOKEN:
+            return self._robot.perform(skill, arguments, feedback)
+        screens = self._face.screens
+        feedback(
+            f"shown on {screens} {'face' if screens == 1 else 'faces'}" if screens else "no face is open"
+        )
+        if skill == "say":
+            self._say(str(arguments[0]))
+            return None
+        return self._ask(*arguments)
+
+    def cancel(self) -> None:
+        """Withdraw the question, and stop the other robot."""
+        try:
+            self._face.withdraw()
+        finally:
+            self._robot.cancel()
+
+    def disconnect(self) -> None:
+        """Withdraw the question, and disconnect the other robot."""
+        self._face.withdraw()
+        self._robot.disconnect()
+
+    def _say(self, text: str) -> None:
+        self._face.say(text)
+        seconds = min(max(AT_LEAST, len(text) / LETTERS_PER_SECOND), AT_MOST)
+        if not self.clock.wait(seconds):
+            raise CancelledError
+
+    def _ask(self, person: Argument, question: Argument, options: Argument) -> str:
+        if not options:
+            raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
+        return options[self._face.ask(str(person), str(question), tuple(options))]

@@ -1,39 +1,42 @@
-"""Keeps a robot for one mission at a time, also from the other tools on this machine."""
+"""A lock that keeps a robot for one mission at a time, also from other tools on this machine."""
 
 from __future__ import annotations
 
 import fcntl
 import json
 import os
+import socket
 import stat
 import threading
 from contextlib import suppress
 from datetime import datetime
 from hashlib import sha256
+from ipaddress import ip_address
 from pathlib import Path
 from tempfile import gettempdir
 from types import TracebackType
 from typing import Self
-from urllib.parse import quote
+from urllib.parse import urlsplit
 
 from codebotler.core.files import make_folder
 from codebotler.robots.base import NotReadyError, Robot
 
-LONGEST = 200  # characters of the name of a lock; no file system takes more than 255
+PORTS = {"ws": 80, "wss": 443, "http": 80, "https": 443}
+HERE = "127.0.0.1"
 
 
 class Reservation:
-    """A connected robot that nobody else uses; as a context manager, from entering to leaving.
+    """A context manager that locks a robot and connects it.
 
-    The lock belongs to this process: it ends with it, however that ends. A robot with an address is kept from
-    all tools of this user on this machine; one without is kept for the missions of one home.
+    The lock ends with this process, however that ends. A robot with an address is locked for all tools of
+    this user on this machine; one without is locked for the missions of one home.
 
     Args:
         robot: not yet connected.
-        home: the folder of missions, where the lock of a robot without an address lies.
+        home: the folder of missions.
 
     Raises:
-        NotReadyError: another tool uses the robot, it cannot be connected, or locks could be tampered with.
+        NotReadyError: another tool uses the robot, it cannot be connected, or others can write locks.
         OSError: the lock cannot be written.
     """
 
@@ -43,8 +46,7 @@ class Reservation:
         self._is_used = threading.Lock()
 
     def __enter__(self) -> Self:
-        path = self._folder() / f"{self._name()}.lock"
-        self._lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
+        self._lock = os.open(self._path(), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         try:
             self._take()
             try:
@@ -66,74 +68,95 @@ class Reservation:
             os.close(self._lock)
 
     def use(self) -> None:
-        """Take the robot for a mission, the only one: after its end the robot has to be connected again.
+        """Take the robot for a mission; it has to be connected again for the next one.
 
         Raises:
             NotReadyError: it was taken before.
         """
         if not self._is_used.acquire(blocking=False):
-            raise NotReadyError(
-                f"the robot {self.robot.name} is on another mission, or was; connect it again"
-            )
+            raise NotReadyError(f"the robot {self.robot.name} was used for another mission; connect it again")
 
-    def _folder(self) -> Path:
+    def _path(self) -> Path:
         if self.robot.address:
-            return machine_wide()
+            digest = sha256(endpoint(self.robot.address).encode(errors="surrogatepass")).hexdigest()
+            return lock_folder() / f"{self.robot.name} {digest}.lock"
         folder = self._home / "robots"
         make_folder(folder)
-        return folder
-
-    def _name(self) -> str:
-        name = quote(f"{self.robot.name} {self.robot.address}".strip(), safe=" ", errors="surrogatepass")
-        if len(name) <= LONGEST:
-            return name
-        return f"{self.robot.name} {sha256(name.encode()).hexdigest()}"
+        return folder / f"{self.robot.name}.lock"
 
     def _take(self) -> None:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise NotReadyError(
-                f"{self._holder()} uses the robot {self.robot.name}; wait until its mission has ended, "
+                f"{self._holder()} is using the robot {self.robot.name}; wait until its mission has ended, "
                 "or stop it there"
             ) from None
-        mine = {"process": os.getpid(), "since": f"{datetime.now().astimezone():%H:%M:%S}"}
+        holder = {"process": os.getpid(), "since": f"{datetime.now().astimezone():%H:%M:%S}"}
         os.truncate(self._lock, 0)
-        os.pwrite(self._lock, json.dumps(mine).encode(), 0)
+        os.pwrite(self._lock, json.dumps(holder).encode(), 0)
 
     def _holder(self) -> str:
         try:
-            said = json.loads(os.pread(self._lock, 1_000, 0))
-            return f"another tool (process {said['process']}, since {said['since']})"
-        except (ValueError, KeyError, TypeError):  # it is just writing that
+            holder = json.loads(os.pread(self._lock, 1_000, 0))
+            return f"another tool (process {holder['process']}, since {holder['since']})"
+        except ValueError:  # it is being written
             return "another tool"
 
 
-def machine_wide() -> Path:
-    """The folder of this user's locks on this machine, made if it is not there.
+def lock_folder() -> Path:
+    """The folder of this user's locks on this machine, created if necessary.
 
     Raises:
-        NotReadyError: what is there is not ours alone.
-        OSError: it cannot be made.
+        NotReadyError: others could write there.
+        OSError: it cannot be created.
     """
     runtime = Path(os.environ.get("XDG_RUNTIME_DIR", ""))
-    is_usable = runtime.is_absolute() and _is_ours(runtime)  # it may be that of whoever called `sudo`
+    is_usable = runtime.is_absolute() and _is_ours(runtime)  # with `sudo` it may be the caller's
     folder = runtime / "codebotler" if is_usable else Path(gettempdir()) / f"codebotler-{os.getuid()}"
     with suppress(FileExistsError):
         folder.mkdir(mode=0o700)
     if not _is_ours(folder):
         raise NotReadyError(
-            f"{folder} keeps robots from being used by two tools, but it is no folder that only you can "
-            "write in; remove it"
+            f"{folder} holds the locks of robots, but is not a folder that only you can write to; remove it"
         )
     return folder
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether it is a folder and no link, it is this user's, and nobody else can write there."""
+    """Whether it is a real folder of this user in which nobody else can write."""
     try:
         found = folder.lstat()
     except OSError:
         return False
     is_closed = not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
     return stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and is_closed
+
+
+def endpoint(address: str) -> str:
+    """An address with its port, and without user, capitals and trailing slashes.
+
+    All names of this machine become one, and text that is no address stays as it is. Connect to what the user
+    wrote, since a server may listen at only one name of its machine.
+    """
+    try:
+        parts = urlsplit(address.strip())
+        host, port = parts.hostname, parts.port
+    except ValueError:  # the port is no number, or a bracket is open
+        return address
+    if not host or parts.scheme not in PORTS:
+        return address
+    where = _machine(host.rstrip("."))
+    where = f"[{where}]" if ":" in where else where
+    path = parts.path.rstrip("/") + (f"?{parts.query}" if parts.query else "")
+    return f"{parts.scheme}://{where}:{port or PORTS[parts.scheme]}{path}"
+
+
+def _machine(host: str) -> str:
+    if host in {"localhost", socket.gethostname().lower()}:
+        return HERE
+    with suppress(ValueError):  # it is a name
+        number = ip_address(host)
+        number = getattr(number, "ipv4_mapped", None) or number
+        return HERE if number.is_loopback or number.is_unspecified else number.compressed
+    return host

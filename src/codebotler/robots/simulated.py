@@ -1,18 +1,36 @@
-"""A robot in a world of our own: it drives at walking pace, and does the rest as in the simulator."""
+"""The simulated robot: it drives at walking pace, and does all else as in the simulator."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.trace import Option
 from codebotler.core.world import World, laid_out
-from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Readiness, Result, untold
+from codebotler.robots.base import (
+    ROS_PYTHON,
+    Argument,
+    CancelledError,
+    Feedback,
+    Options,
+    Readiness,
+    Result,
+    no_feedback,
+)
 from codebotler.robots.clock import Clock
-from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY, performed
 from codebotler.simulator.robot import SimulatedRobot, resolve_room
+from codebotler.simulator.rules import ENDLESS, Rules
+
+ROBOT_RULES = Rules(literals="as-written", limits=ENDLESS)
+METRES_PER_SECOND = 0.5
+SECONDS: Mapping[str, float] = {"is_in_room": 1.0, "say": 1.0, "ask": 3.0, "pick": 5.0, "place": 3.0}
+"""How long skills take by the robot's clock; `go_to` depends on the distance, and others take no time."""
+
+FEEDBACK_EVERY = 0.25  # real seconds
 
 
 class Simulated:
@@ -20,12 +38,12 @@ class Simulated:
 
     Args:
         world: where it is.
-        speed: how many seconds of its clock pass in a real one; None if nothing takes real time.
-        skills: what it can be asked to do.
+        speed: seconds of its clock per real second; None if nothing takes real time.
+        skills: the skills it may be asked to perform.
         metres_per_second: how fast it drives, above 0; infinite if driving takes no time.
 
     Raises:
-        UserError: the speed is out of its range.
+        UserError: the speed is out of range.
     """
 
     name, address = "simulated", ""
@@ -47,17 +65,13 @@ class Simulated:
         self._place = self._stands_at[world.robot]
 
     def connect(self) -> None:
-        """Put the robot where the world has it; everything there is as at the start."""
-        self._robot = SimulatedRobot(self._world, AS_WRITTEN, self.skills)
+        """Put the robot and all objects where the world has them."""
+        self._robot = SimulatedRobot(self._world, ROBOT_RULES, self.skills)
         self._place = self._stands_at[self._world.robot]
-        self.resume()
-
-    def resume(self) -> None:
-        """Be ready again after a cancel, in the world as it has become."""
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
-        """Execute a skill, taking the time that it takes.
+    def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
+        """Execute a skill, taking its time.
 
         Raises:
             RobotError: the robot cannot do it.
@@ -66,7 +80,7 @@ class Simulated:
         assert self._robot is not None, "the robot is not connected"
         self._wait(0.0)
         if skill == "go_to":
-            self._drive(self._robot, str(arguments[0]), told)
+            self._drive(self._robot, str(arguments[0]), feedback)
         else:
             self._wait(SECONDS.get(skill, 0.0))
         return performed(self._robot, skill, arguments)
@@ -76,17 +90,17 @@ class Simulated:
         self.clock.stop()
 
     def disconnect(self) -> None:
-        """Forget the world as it has become."""
+        """Stop, and forget the world as it is now."""
         self.cancel()
         self._robot = None
 
-    def _drive(self, robot: SimulatedRobot, request: str, told: Feedback) -> None:
+    def _drive(self, robot: SimulatedRobot, request: str, feedback: Feedback) -> None:
         room = resolve_room(robot.rooms, request)
         if room is None:
             return
         start, end = self._place, self._stands_at[room]
         takes = math.dist(start, end) / self._pace
-        step = takes if self.clock.speed is None else max(TELLS_EVERY * self.clock.speed, 1e-3)
+        step = takes if self.clock.speed is None else max(FEEDBACK_EVERY * self.clock.speed, 1e-3)
         driven = 0.0
         while driven < takes:
             self._wait(min(step, takes - driven))
@@ -94,7 +108,7 @@ class Simulated:
             share = driven / takes
             x, y = (a + share * (b - a) for a, b in zip(start, end, strict=True))
             self._place = (x, y)
-            told(f"at ({x:.1f}, {y:.1f})")
+            feedback(f"at ({x:.1f}, {y:.1f})")
         self._place = end
 
     def _wait(self, seconds: float) -> None:
@@ -102,17 +116,23 @@ class Simulated:
             raise CancelledError
 
 
-def readiness() -> Readiness:
+def performed(robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) -> Result:
+    """A skill in the simulator, with texts for options."""
+    given = tuple(a if isinstance(a, str) else tuple(map(Option, a)) for a in arguments)
+    result = robot.perform(skill, given)
+    if isinstance(result, int) and not isinstance(result, bool):
+        (options,) = (a for a in given if not isinstance(a, str))
+        return options[result].text
+    return result
+
+
+def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
     """It works everywhere."""
     return Readiness("sim", works=True, note="drives through --world FILE, with the people of that file")
 
 
 def robot(options: Options) -> Simulated:
-    """The simulated robot that a user means.
-
-    Raises:
-        UserError: no world was named, or the speed is out of its range.
-    """
+    """The simulated robot of these options, which must name a world."""
     if options.world is None:
         raise UserError("the simulated robot needs a world to be in; name one with --world FILE")
     return Simulated(options.world, speed=options.speed, skills=options.skills)

@@ -1,4 +1,4 @@
-"""The virtual robot: a simulated one that offers its skills on a real ROS graph, as a real one does."""
+"""The virtual robot: a simulated one that offers its skills on a real ROS 1 graph."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from urllib.parse import urlsplit
 
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.world import World
-from codebotler.robots.base import Argument, CancelledError, RobotLostError, untold
-from codebotler.robots.ros import PYTHON, actions_of
+from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
+from codebotler.robots.ros import actions_of
 from codebotler.robots.ros1.robot import WORKER, master_uri
 from codebotler.robots.simulated import Simulated
 from codebotler.robots.worker import Message, RosWorker
@@ -21,24 +21,24 @@ from codebotler.simulator.robot import RobotError
 SERVERS = WORKER / "servers.py"
 NODE = "virtual_robot"
 HERE = ("localhost", "127.0.0.1")
-HEARS = 3600.0  # seconds of one turn of listening
+HEARS = 3600.0  # seconds of one wait for messages
 
 
 class VirtualRobot:
     """A robot with one body: goals are executed one after the other.
 
-    Where no master answers, it starts one that is reached from this machine only.
+    If no master answers, it starts one that is reached from this machine only.
 
     Args:
         world: where it is.
-        speed: how many seconds of its clock pass in a real one; None if nothing takes real time.
+        speed: seconds of its clock per real second; None if nothing takes real time.
         port: of the master; None for that of ROS_MASTER_URI.
-        python: an interpreter that has rospy, and rosmaster if a master is to be started.
-        skills: what it offers.
-        told: told what it does, in lines.
+        python: an interpreter that has rospy, and rosmaster if a master must be started.
+        skills: the skills it offers.
+        show: called with a line for each goal and for its end.
 
     Raises:
-        UserError: the speed is out of its range, or ROS_MASTER_URI is no URI.
+        UserError: the speed is out of range, or ROS_MASTER_URI is invalid.
     """
 
     def __init__(
@@ -47,11 +47,11 @@ class VirtualRobot:
         *,
         speed: float | None = 1.0,
         port: int | None = None,
-        python: Path = PYTHON,
+        python: Path = ROS_PYTHON,
         skills: SkillTable = SKILLS,
-        told: Callable[[str], None] = untold,
+        show: Callable[[str], None] = lambda _: None,
     ) -> None:
-        self._speed, self._python, self._skills, self._told = speed, python, skills, told
+        self._speed, self._python, self._skills, self._show = speed, python, skills, show
         self.address = master_uri(f"http://localhost:{port}" if port else "")
         self._body = self._at_start(world)
         self._goals: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
@@ -66,24 +66,24 @@ class VirtualRobot:
         """Offer the skills; whether a master was started for that.
 
         Raises:
-            NotReadyError: there is no ROS, or no master and none may be started.
+            NotReadyError: there is no ROS, or no master and none can be started.
         """
-        actions = actions_of(self._skills)
         where = urlsplit(self.address)
         port = where.port if where.hostname in HERE else None
         environment = {"ROS_MASTER_URI": self.address}
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
-        self._worker = RosWorker(
-            self._python, SERVERS, {"node": NODE, "actions": actions, "port": port}, environment
-        )
-        self._threads = [threading.Thread(target=run, daemon=True) for run in (self._listen, self._work)]
+        start = {"node": NODE, "actions": actions_of(self._skills), "port": port}
+        worker = self._worker = RosWorker(self._python, SERVERS, start, environment)
+        self._threads = [
+            threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
+        ]
         for thread in self._threads:
             thread.start()
-        return bool(self._worker.about["has_master"])
+        return bool(worker.about["has_master"])
 
     def enter(self, world: World) -> None:
-        """Be in another world, at its start; nothing may be going on."""
+        """Move to the start of another world, between two goals."""
         self._body = self._at_start(world)
 
     def wait(self) -> None:
@@ -94,7 +94,7 @@ class VirtualRobot:
         """
         self._ended.wait()
         assert self._worker is not None, "it was not started"
-        raise RobotLostError(f"the worker of the virtual robot has died ({self._worker.epitaph()})")
+        raise RobotLostError(f"the worker of the virtual robot has died ({self._worker.how_it_ended()})")
 
     def stop(self) -> None:
         """End what goes on, and leave the graph."""
@@ -104,21 +104,14 @@ class VirtualRobot:
         for thread in self._threads:
             thread.join(HEARS)
 
-    @property
-    def pid(self) -> int:
-        """Of the process with the action servers."""
-        assert self._worker is not None, "it was not started"
-        return self._worker.pid
-
     def _at_start(self, world: World) -> Simulated:
         body = Simulated(world, speed=self._speed, skills=self._skills)
         body.connect()
         return body
 
-    def _listen(self) -> None:
-        assert self._worker is not None, "it was not started"
+    def _listen(self, worker: RosWorker) -> None:
         while True:
-            match self._worker.receive(HEARS):
+            match worker.receive(HEARS):
                 case {"is": "goal"} as goal:
                     self._goals.put(goal)
                 case {"is": "cancel", "id": str(number)}:
@@ -134,11 +127,11 @@ class VirtualRobot:
             if number == self._current:
                 self._body.cancel()
 
-    def _work(self) -> None:
+    def _work(self, worker: RosWorker) -> None:
         for goal in iter(self._goals.get, None):
             number, skill = goal["id"], goal["skill"]
             arguments = [tuple(a) if isinstance(a, list) else a for a in goal["arguments"]]
-            self._told(f"{skill}({', '.join(map(str, arguments))})")
+            self._show(f"{skill}({', '.join(map(str, arguments))})")
             with self._lock:
                 is_wanted = number not in self._cancelled
                 self._current = number if is_wanted else ""
@@ -147,10 +140,9 @@ class VirtualRobot:
                 self._current = ""
                 if number in self._cancelled:
                     self._cancelled.remove(number)
-                    self._body.resume()
-            self._told("  " + " ".join(str(part) for part in ending.values()))
-            assert self._worker is not None, "it was not started"
-            self._worker.send({**ending, "id": number})
+                    self._body.clock.restart()
+            self._show("  " + " ".join(str(part) for part in ending.values()))
+            worker.send({**ending, "id": number})
 
     def _ending(self, skill: str, arguments: Sequence[Argument]) -> Message:
         try:

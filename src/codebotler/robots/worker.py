@@ -1,4 +1,4 @@
-"""A worker, seen from outside: a process of the robot's own Python that speaks lines of JSON."""
+"""A worker process of the robot's own Python, seen from the tool: lines of JSON in both directions."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ import threading
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, TypeAlias
+from typing import IO, Any, TypeAlias, cast
 
 from codebotler.robots.base import NotReadyError
 
 Message: TypeAlias = dict[str, Any]
 
-READY = 30.0  # seconds within which it must say whether it can work
+READY = 30.0  # seconds within which it must report that it is ready
 LEAVES = 4.0  # seconds that it may take to end by itself
-LAST_LINES = 5  # of what it printed, for the sentence about its end
-ENDED = "ended"  # what is received when it has
+LAST_LINES = 5  # of its error output, kept for error messages
 
 
 class RosWorker:
-    """A process that runs one of our scripts.
+    """A process that runs one of our scripts; when it has ended, `{"is": "ended"}` is received.
 
     It has a session of its own, so that Ctrl-C does not reach it before the robot was told to stop.
 
     Args:
         python: the interpreter.
-        script: the file.
-        start: the first line it is told.
-        environment: what is set beyond our own environment.
+        script: a file, or a folder with a `__main__.py`.
+        start: the first message it receives.
+        environment: variables beyond those of this process.
 
     Raises:
-        NotReadyError: it cannot be started, or says that it cannot work.
+        NotReadyError: it cannot be started, or reports that it cannot work.
     """
 
     def __init__(self, python: Path, script: Path, start: Message, environment: Mapping[str, str]) -> None:
@@ -58,12 +58,11 @@ class RosWorker:
             )
         except OSError as error:
             raise NotReadyError(
-                f"{python}: {error.strerror}; name the robot's Python by --ros-python"
+                f"{python}: {error.strerror}; name the robot's Python with --ros-python"
             ) from None
-        self._readers = [
-            threading.Thread(target=self._listen, args=(self._process.stdout,), daemon=True),
-            threading.Thread(target=self._keep, args=(self._process.stderr,), daemon=True),
-        ]
+        pipes = (self._process.stdin, self._process.stdout, self._process.stderr)
+        self._stdin, self._stdout, self._stderr = cast("tuple[IO[str], IO[str], IO[str]]", pipes)
+        self._readers = [threading.Thread(target=read, daemon=True) for read in (self._listen, self._keep)]
         for reader in self._readers:
             reader.start()
         self.send(start)
@@ -71,40 +70,32 @@ class RosWorker:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """The ID of the process."""
         return self._process.pid
 
     def send(self, message: Message) -> None:
-        """Tell it something; in vain if it has died, which is then received."""
-        with self._writing:
-            try:
-                assert self._process.stdin is not None
-                self._process.stdin.write(json.dumps(message) + "\n")
-                self._process.stdin.flush()
-            except (OSError, ValueError):
-                pass
+        """Send a message; if the process has died, that is received."""
+        with self._writing, suppress(OSError, ValueError):
+            self._stdin.write(json.dumps(message) + "\n")
+            self._stdin.flush()
 
     def receive(self, seconds: float) -> Message | None:
-        """What it says next; None if it says nothing for so long."""
+        """Its next message; None if none comes for so many seconds."""
         try:
             return self._messages.get(timeout=seconds)
         except queue.Empty:
             return None
 
     def cancel(self, seconds: float) -> bool:
-        """Have it cancel what goes on, and tell whether it has passed that on within so many seconds."""
+        """Have it cancel what goes on; False if it did not pass that on within so many seconds."""
         self._cancel_sent.clear()
         self.send({"do": "cancel"})
         return self._cancel_sent.wait(seconds)
 
     def leave(self) -> bool:
-        """End it, gently if it can, and tell whether it could."""
-        with self._writing:
-            try:
-                assert self._process.stdin is not None
-                self._process.stdin.close()
-            except OSError:
-                pass
+        """End it by closing its input, or by force; False if it had to be killed, or failed."""
+        with self._writing, suppress(OSError):
+            self._stdin.close()
         try:
             self._process.wait(LEAVES)
         except subprocess.TimeoutExpired:
@@ -114,19 +105,18 @@ class RosWorker:
         return self._process.returncode == 0
 
     def kill(self) -> None:
-        """End it at once, and whatever it has started."""
+        """End it and all its children at once."""
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
         self._close()
 
-    def epitaph(self) -> str:
-        """How it ended, in a phrase."""
+    def how_it_ended(self) -> str:
+        """Its exit status or signal, and the last line it printed."""
         self._process.wait(LEAVES)
         status = self._process.returncode
         how = f"signal {-status}" if status < 0 else f"status {status}"
-        said = f": {self._printed[-1]}" if self._printed else ""
-        return f"{how}{said}"
+        return f"{how}: {self._printed[-1]}" if self._printed else how
 
     def _ready(self, python: Path) -> Message:
         until = time.monotonic() + READY
@@ -138,15 +128,13 @@ class RosWorker:
                     self.leave()
                     raise NotReadyError(text)
                 case {"is": "ended"}:
-                    for reader in self._readers:
-                        reader.join(LEAVES)
                     self.kill()
-                    raise NotReadyError(f"the worker of {python} ended at once ({self.epitaph()})")
+                    raise NotReadyError(f"the worker of {python} ended at once ({self.how_it_ended()})")
         self.kill()
         raise NotReadyError(f"the worker of {python} was not ready within {READY:g} s")
 
-    def _listen(self, lines: IO[str]) -> None:
-        for line in lines:
+    def _listen(self) -> None:
+        for line in self._stdout:
             try:
                 message = json.loads(line)
             except ValueError:
@@ -154,23 +142,19 @@ class RosWorker:
                 continue
             if message["is"] == "cancel-sent":
                 self._cancel_sent.set()
-            elif message["is"] != "alive" or self._messages.empty():  # where nobody asks, one will do
+            elif message["is"] != "alive" or self._messages.empty():  # one sign of life is enough
                 self._messages.put(message)
-        self._messages.put({"is": ENDED})
+        self._messages.put({"is": "ended"})
 
-    def _keep(self, lines: IO[str]) -> None:
-        self._printed.extend(line.strip() for line in lines if line.strip())
+    def _keep(self) -> None:
+        self._printed.extend(line.strip() for line in self._stderr if line.strip())
 
     def _close(self) -> None:
         for reader in self._readers:
-            if reader is not threading.current_thread():
-                reader.join(LEAVES)
-        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
-            try:
-                if pipe is not None:
-                    pipe.close()
-            except OSError:  # what was not yet written
-                pass
+            reader.join(LEAVES)
+        for pipe in (self._stdin, self._stdout, self._stderr):
+            with suppress(OSError):  # of what was not yet written
+                pipe.close()
 
 
 def lacks(python: Path, modules: Sequence[str]) -> list[str] | None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 from codebotler.core.skills import SKILLS
-from codebotler.robots.base import Argument, CancelledError, Feedback, Result, untold
+from codebotler.robots.base import Argument, CancelledError, Feedback, Result, no_feedback
 from codebotler.robots.clock import Clock
 
 
@@ -30,7 +30,7 @@ class Answering:
         self.cancels = 0
         self.clock.restart()
 
-    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = untold) -> Result:
+    def perform(self, skill: str, arguments: Sequence[Argument], told: Feedback = no_feedback) -> Result:
         if self.cancels:
             raise CancelledError
         first = str(arguments[0]) if arguments else ""

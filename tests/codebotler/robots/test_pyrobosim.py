@@ -25,7 +25,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, Picture
 from codebotler.robots.open import all_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.scripted import AS_WRITTEN, METRES_PER_SECOND, SECONDS, TELLS_EVERY
+from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, ROBOT_RULES, SECONDS
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError
 from codebotler.simulator.worker import Worker
@@ -68,15 +68,15 @@ def places(told: Sequence[str | Picture]) -> list[Point]:
 
 
 def position(robot: Pyrobosim) -> Point:
-    assert robot._stage is not None
-    pose = robot._stage.robot.get_pose()
+    assert robot._drivable is not None
+    pose = robot._drivable.robot.get_pose()
     return pose.x, pose.y
 
 
 def lying(robot: Pyrobosim) -> dict[str, list[str]]:
     """What lies where, as pyrobosim has it."""
-    assert robot._stage is not None
-    rooms = {room.name: robot._stage.lying_in(room.name) for room in robot._world.rooms}
+    assert robot._drivable is not None
+    rooms = {room.name: robot._drivable.lying_in(room.name) for room in robot._world.rooms}
     return {name: [robot._things[body].label for body in bodies] for name, bodies in rooms.items() if bodies}
 
 
@@ -99,10 +99,10 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
         if not scenario.world.may_wait_forever
     ]
     pairs = [(program, world) for _, program, world in tasks]
-    expected = list(run(pairs, workers=1, rules=AS_WRITTEN))
+    expected = list(run(pairs, workers=1, rules=ROBOT_RULES))
     manipulating = set()
     for (name, program, world), outcome in zip(tasks, expected, strict=True):
-        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=AS_WRITTEN.clock_starts)
+        robot = LiveRobot(connected(world), lambda *_, **__: None, clock_starts=ROBOT_RULES.clock_starts)
         found = worker.run_live(program, robot)
         assert (found.status, found.error) == (outcome.status, outcome.error), name
         assert found.trace == outcome.trace, name
@@ -176,8 +176,8 @@ def test_what_is_held_moves_with_the_robot() -> None:
     robot.perform("go_to", ["lab"])
     robot.perform("pick", ["laser"])
     robot.perform("go_to", ["hall"])
-    assert robot._stage is not None
-    held = robot._stage.held
+    assert robot._drivable is not None
+    held = robot._drivable.held
     assert held is not None
     assert (held.pose.x, held.pose.y) == position(robot)
 
@@ -195,7 +195,7 @@ def test_robot_drives_to_the_table_for_it() -> None:
 def test_pyrobosim_is_who_knows() -> None:
     robot = connected()
     robot.perform("go_to", ["lab"])
-    stage = robot._stage
+    stage = robot._drivable
     assert stage is not None
     stage.robot.battery_level = 0.0
     with pytest.raises(RobotError, match=r'"laser".*Out of battery') as error:
@@ -224,8 +224,8 @@ def test_many_objects_find_a_place() -> None:
 
 
 def goes_through_no_wall(robot: Pyrobosim, way: Sequence[Point]) -> bool:
-    assert robot._stage is not None
-    return bool(robot._stage._world.total_internal_polygon.buffer(0.1).covers(LineString(way)))
+    assert robot._drivable is not None
+    return bool(robot._drivable._world.total_internal_polygon.buffer(0.1).covers(LineString(way)))
 
 
 def test_it_drives_around_walls_and_takes_its_time() -> None:
@@ -247,7 +247,7 @@ def test_feedback_tells_places_on_the_way() -> None:
     robot, told = connected(speed=10), list[str | Picture]()
     began = time.monotonic()
     robot.perform("go_to", ["study"], told.append)
-    assert len(told) <= 2 + (time.monotonic() - began) / TELLS_EVERY
+    assert len(told) <= 2 + (time.monotonic() - began) / FEEDBACK_EVERY
     assert len(places(told)) >= 3
     assert robot.clock.now == pytest.approx(10 * (time.monotonic() - began), rel=0.5)
 
@@ -264,7 +264,7 @@ def test_measured_rooms_are_where_they_are_and_all_can_be_reached() -> None:
 
 def test_closed_door_is_an_error_and_nothing_has_moved() -> None:
     robot = connected()
-    at, stage = position(robot), robot._stage
+    at, stage = position(robot), robot._drivable
     assert stage is not None
     for hallway in stage._world.hallways:
         stage._world.close_location(hallway)
@@ -384,7 +384,7 @@ def test_cancel_ends_a_drive_on_the_way_and_all_that_comes_after(*, held: bool) 
 
 def test_cancel_while_it_plans_is_not_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, told = connected(), list[str | Picture]()
-    at, stage = position(robot), robot._stage
+    at, stage = position(robot), robot._drivable
     assert stage is not None
     plan = stage.robot.plan_path
 
@@ -412,8 +412,8 @@ def test_cancel_before_the_hand_has_closed_leaves_the_object(monkeypatch: pytest
     with pytest.raises(CancelledError):
         robot.perform("pick", ["mug"])
     assert lying(robot)["kitchen"] == ["cup", "mug", "mug"]
-    assert robot._stage is not None
-    assert robot._stage.held is None
+    assert robot._drivable is not None
+    assert robot._drivable.held is None
 
 
 def test_cancel_before_anything_goes_on_is_not_forgotten() -> None:

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.robots.address import endpoint
 from codebotler.robots.base import NotReadyError
-from codebotler.robots.reservation import Reservation, machine_wide
+from codebotler.robots.reservation import Reservation, endpoint, lock_folder
 from codebotler.robots.ros1.robot import Ros1
 from codebotler.robots.rosbridge.robot import Rosbridge
 from doubles import Answering
@@ -31,7 +30,6 @@ def addressed(address: str) -> Answering:
 )
 def test_addresses_of_one_robot_are_one(address: str) -> None:
     assert endpoint(address) == "ws://robot:9090"
-    assert Rosbridge(address).address == "ws://robot:9090"
 
 
 @pytest.mark.parametrize(
@@ -42,9 +40,9 @@ def test_addresses_of_one_robot_are_one(address: str) -> None:
     ],
 )
 def test_names_of_this_machine_are_one(host: str) -> None:
-    assert Ros1(f"http://{host}:11311/").address == "http://127.0.0.1:11311"
-    assert Rosbridge(f"ws://{host}").address == "ws://127.0.0.1:80"
-    assert Rosbridge().address == "ws://127.0.0.1:9090"
+    assert endpoint(Ros1(f"http://{host}:11311/").address) == "http://127.0.0.1:11311"
+    assert endpoint(Rosbridge(f"ws://{host}").address) == "ws://127.0.0.1:80"
+    assert endpoint(Rosbridge().address) == "ws://127.0.0.1:9090"
 
 
 @pytest.mark.parametrize("address", ["nonsense", "", "ws://", "ws://robot:a", "ws://[::1", "ftp://robot"])
@@ -85,7 +83,7 @@ def test_any_address_can_be_locked(address: str, tmp_path: Path) -> None:
 def test_locks_lie_where_nobody_else_can_write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     tmp_path.chmod(0o700)
-    assert machine_wide() == tmp_path / "codebotler"
+    assert lock_folder() == tmp_path / "codebotler"
     assert (tmp_path / "codebotler").stat().st_mode & 0o777 == 0o700
 
 
@@ -102,7 +100,7 @@ def test_without_a_runtime_folder_locks_are_temporary(
         monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "run"))
     else:
         monkeypatch.setenv("XDG_RUNTIME_DIR", runtime)
-    assert machine_wide() == tmp_path / f"codebotler-{os.getuid()}"
+    assert lock_folder() == tmp_path / f"codebotler-{os.getuid()}"
 
 
 @pytest.mark.parametrize("what", ["link", "file", "open", "somebody else's"])

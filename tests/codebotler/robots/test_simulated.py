@@ -16,8 +16,7 @@ from codebotler.robots.base import CancelledError, Options, Picture, Robot
 from codebotler.robots.open import all_readiness, open_robot
 from codebotler.robots.ros1.robot import MEND
 from codebotler.robots.ros2.robot import mend_of
-from codebotler.robots.scripted import METRES_PER_SECOND
-from codebotler.robots.simulated import Simulated
+from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
 from codebotler.simulator.robot import RobotError
 
 WORLD = World(

@@ -1,4 +1,4 @@
-"""Where walls, doors and tables stand in a world that a robot drives through. Importing this is heavy."""
+"""A floor plan with walls, doors and tables for a world file. Importing this is slow."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import shapely
 from shapely.geometry import LineString, MultiPoint, Point, Polygon, box
@@ -16,61 +15,52 @@ from shapely.ops import nearest_points
 from codebotler.core.world import HALLWAY, ROOM_DEPTH, World, laid_out
 from codebotler.robots.base import NotReadyError
 
-XY: TypeAlias = tuple[float, float]
+XY = tuple[float, float]
 
-RADIUS = 0.15  # metres, of the robot
-WALL = 0.1  # metres; half of it stands on either side of the edge of a footprint
-DOORS = (0.8, 0.5)  # metres that a passage is wide; the first that fits
-DEEP = 0.25  # metres from all walls, where passages begin and end
-BEYOND = 0.1  # metres that they go on there, so that the free spaces of rooms and passages overlap
-STEP = 0.2  # metres between two places where a passage could begin
-LINES = 300  # at most so many ways to go from one room to another are tried
-TABLES = ((1.2, 0.6), (0.8, 0.5), (0.4, 0.4), (0.2, 0.2), (0.1, 0.1))  # metres; the first that fits
-PLACES = 12  # in each direction, where a table could stand
-SLACK = 0.02  # metres by which what touches nothing stays away
+# All in metres.
+RADIUS = 0.15  # of the robot
+WALL = 0.1  # half of it stands on either side of the edge of a footprint
+DOORS = (0.8, 0.5)  # widths of passages; the first that fits
+DEEP = 0.25  # from all walls, where passages begin and end
+BEYOND = 0.1  # that they go on there, so that the free spaces of rooms and passages overlap
+STEP = 0.2  # between two places where a passage could begin
+TABLES = ((1.2, 0.6), (0.8, 0.5), (0.4, 0.4), (0.2, 0.2), (0.1, 0.1))  # the first that fits
+SLACK = 0.02  # between things that do not touch
+
+LINES = 300  # ways from one room to another that are tried at most
+PLACES = 12  # for a table, in each direction
 
 
 @dataclass(frozen=True)
 class Passage:
-    """A door, or a way between two rooms that do not touch.
+    """A door, or a way between two rooms that do not touch."""
 
-    Args:
-        ends: which floors it joins.
-        line: in its middle, from within one floor to within the other.
-        width: in metres.
-    """
-
-    ends: tuple[int, int]
-    line: LineString
+    ends: tuple[int, int]  # the floors it joins
+    line: LineString  # in its middle, from within one floor to within the other
     width: float
 
     @property
     def area(self) -> Polygon:
-        """The ground that it takes."""
+        """The ground it takes."""
         return self.line.buffer(self.width / 2, cap_style="flat")
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table, along the axes.
-
-    Args:
-        centre: of it, in metres.
-        size: along x and y, in metres.
-    """
+    """A table, with its sides along the axes."""
 
     centre: XY
-    size: tuple[float, float]
+    size: XY
 
     @property
     def area(self) -> Polygon:
-        """The ground that it takes."""
+        """The ground it takes."""
         (x, y), (width, depth) = self.centre, self.size
         return box(x - width / 2, y - depth / 2, x + width / 2, y + depth / 2)
 
     @property
     def stands(self) -> list[tuple[float, float, float]]:
-        """Before each side, where the robot can reach it: from the centre, and the angle to look at it."""
+        """Where the robot can reach it, before each side: from its centre, and the angle to face it."""
         along, across = (side / 2 + RADIUS + SLACK for side in self.size)
         return [
             (-along, 0.0, 0.0),
@@ -80,7 +70,7 @@ class Table:
         ]
 
     def cells(self, count: int) -> tuple[list[XY], float]:
-        """The middles of at least so many cells of the table, and how wide each is at its narrowest."""
+        """The middles of at least so many cells of its top, and the narrower side of a cell."""
         columns = math.ceil(math.sqrt(count))
         rows = math.ceil(count / columns)
         left, low, _, _ = self.area.bounds
@@ -91,37 +81,30 @@ class Table:
 
 @dataclass(frozen=True)
 class Floorplan:
-    """A world's rooms with all that a robot must know to drive through them.
+    """The rooms of a world with all that a robot must know to drive through them."""
 
-    Args:
-        floors: of the rooms within their walls, in the order of the world; the last may be a corridor.
-        stands: for each of them, where the robot stops.
-        passages: between them.
-        tables: for each of the rooms, the table in it, if there is any.
-    """
-
-    floors: tuple[Polygon, ...]
-    stands: tuple[Point, ...]
+    floors: tuple[Polygon, ...]  # of rooms within their walls, in the order of the world; perhaps a corridor
+    stands: tuple[Point, ...]  # where the robot stops on each floor
     passages: tuple[Passage, ...]
-    tables: tuple[Table | None, ...]
+    tables: tuple[Table | None, ...]  # one for each room
 
     def corners(self, number: int) -> list[XY]:
-        """What the robot drives around in a room: the corners of its free space that point into it."""
+        """What the robot drives around on a floor: the corners of its free space that point into it."""
         table = self.tables[number] if number < len(self.tables) else None
         space = orient(_without(_free(self.floors[number]), table))
         rings = (space.exterior, *space.interiors)
         return [corner for ring in rings for corner in _turning_right(ring.coords[:-1])]
 
 
-def planned(world: World) -> Floorplan:
-    """RoomMap a world.
+def plan_floor(world: World) -> Floorplan:
+    """The floor plan of a world.
 
-    Rooms that nobody measured stand on both sides of a corridor, with a door each. Of the others each has a
-    passage to what is nearest, until all of them can be reached. If there is any object, there is a table in
-    each room that has a place for one.
+    Rooms without a footprint stand on both sides of a corridor, with a door each. Of the others, each has a
+    passage to the nearest one, until all can be reached. If there are objects, each room has a table if one
+    fits.
 
     Raises:
-        NotReadyError: rooms overlap or are too narrow, or there is no place for a table that holds objects.
+        NotReadyError: rooms overlap or are too narrow, or no table fits into a room with objects.
     """
     rooms = laid_out(world).rooms
     floors = [_floor(room.name, room.footprint or ()) for room in rooms]
@@ -140,7 +123,7 @@ def planned(world: World) -> Floorplan:
     tables = [_table(floors[n], clear[n]) if are_wanted else None for n in range(len(rooms))]
     for room, table in zip(rooms, tables, strict=True):
         if room.objects and table is None:
-            raise NotReadyError(f'no table has room in "{room.name}", but objects lie there; make it larger')
+            raise NotReadyError(f'no table fits into "{room.name}", which has objects; make it larger')
     return Floorplan(tuple(floors), tuple(stands), tuple(passages), tuple(tables))
 
 
@@ -155,7 +138,7 @@ def _floor(name: str, footprint: Sequence[XY]) -> Polygon:
     if floor.geom_type != "Polygon" or passable.geom_type != "Polygon" or passable.is_empty:
         raise NotReadyError(
             f'the robot cannot pass everywhere in "{name}"; its footprint must be more than '
-            f"{WALL + 2 * DEEP:g} m wide at each place, and its edges must not cross"
+            f"{WALL + 2 * DEEP:g} m wide everywhere, and its edges must not cross"
         )
     return floor
 
@@ -180,7 +163,7 @@ def _without(free: Polygon, table: Table | None) -> Polygon:
 
 
 def _turning_right(ring: Sequence[XY]) -> Iterator[XY]:
-    """The corners at which one who has the free space to the left turns to the right."""
+    """The corners that turn right, with the free space on the left."""
     for (ax, ay), (bx, by), (cx, cy) in zip(ring, [*ring[1:], ring[0]], [*ring[2:], *ring[:2]], strict=True):
         if (bx - ax) * (cy - by) - (by - ay) * (cx - bx) < 0:
             yield bx, by
@@ -190,12 +173,12 @@ def _turning_right(ring: Sequence[XY]) -> Iterator[XY]:
 
 
 def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passage]:
-    """Join what is nearest, until all can be reached, or nothing more can be joined."""
+    """Join the nearest floors, until all can be reached or no more can be joined."""
     joined = list(range(len(floors)))
     found: list[Passage] = []
 
     def distance(pair: tuple[int, int]) -> tuple[float, int]:
-        """Of those that are as near, the corridor comes first, which is the last of the floors."""
+        """Of equal distances, that to the corridor comes first, which is the last of the floors."""
         first, second = pair
         return round(floors[first].distance(floors[second]), 3), -second
 
@@ -210,7 +193,7 @@ def _passages(floors: Sequence[Polygon], stands: Sequence[Point]) -> list[Passag
 def _passage(
     ends: tuple[int, int], floors: Sequence[Polygon], stands: Sequence[Point], others: Sequence[Passage]
 ) -> Passage | None:
-    """The shortest way between two rooms that crosses no others, and of those the nearest to both stands."""
+    """The shortest way between two floors that crosses no others; of equals, the nearest to both stands."""
     first, second = (floors[end] for end in ends)
     obstacles = [floor.buffer(WALL / 2) for n, floor in enumerate(floors) if n not in ends]
     obstacles += [passage.area.buffer(WALL / 2) for passage in others]
@@ -243,7 +226,7 @@ def _lines(first: Polygon, second: Polygon) -> Iterator[LineString]:
 
 
 def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> Table | None:
-    """The largest table that fits, as far as can be from where the robot stops and passes."""
+    """The largest table that fits, as far as possible from where the robot stops and passes."""
     left, low, right, high = floor.bounds
     width, depth = (right - left) / PLACES, (high - low) / PLACES
     clear = shapely.union_all(keep_clear)
@@ -260,7 +243,7 @@ def _table(floor: Polygon, keep_clear: Sequence[shapely.Geometry]) -> Table | No
 
 
 def _fits(table: Table, floor: Polygon, clear: shapely.Geometry) -> bool:
-    """Whether the robot can reach the table, and still pass all the rest."""
+    """Whether the robot can reach the table, and still pass everywhere else."""
     if not floor.contains(table.area) or table.area.distance(clear) <= RADIUS + SLACK:
         return False
     space = _without(_free(floor), table)

@@ -1,4 +1,4 @@
-"""A world of ours as pyrobosim has it, with a robot that plans and drives. Importing this is heavy."""
+"""A world file built in pyrobosim, with a robot that plans its way and drives. Importing this is slow."""
 
 from __future__ import annotations
 
@@ -21,35 +21,27 @@ from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
 from shapely.geometry import LineString
 
 from codebotler.core.world import World
-from codebotler.robots.base import CancelledError, Feedback, untold
+from codebotler.robots.base import CancelledError, Feedback, no_feedback
 from codebotler.robots.clock import Clock
-from codebotler.robots.pyrobosim.floorplan import RADIUS, Floorplan, Table, planned
-from codebotler.robots.scripted import METRES_PER_SECOND, SECONDS, TELLS_EVERY
+from codebotler.robots.pyrobosim.floorplan import RADIUS, Floorplan, Table, plan_floor
+from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, SECONDS
 from codebotler.simulator.robot import RobotError
 
 RADIANS_PER_SECOND = math.pi / 2
-MOVES_EVERY = 0.05
-"""Real seconds from one place on the way to the next."""
-
-NEAR = 1e-6  # metres by which what is computed may miss the edge that it lies on
+MOVES_EVERY = 0.05  # real seconds between two places on the way
+WALLS = 0.001  # metres around a floor in which pyrobosim puts nothing else; the floor plan has left more
+NEAR = 1e-6  # metres by which a computed point may miss the edge it lies on
 T = TypeVar("T")
 
 
-class Stage:
+class DrivableWorld:
     """A world of pyrobosim with a robot in it.
 
     Nothing random of pyrobosim is used: objects lie in cells of tables, and ways are planned on a graph.
-
-    Args:
-        world: as it is at the start.
-        clock: by which the robot drives.
-
-    Raises:
-        NotReadyError: the rooms cannot be built as they are.
     """
 
     def __init__(self, world: World, clock: Clock) -> None:
-        plan = planned(world)
+        plan = plan_floor(world)
         names = [room.name for room in world.rooms]
         self._clock, self._motor = clock, Motor(clock)
         self._world = Pyroworld(name="pyrobosim.world", inflation_radius=RADIUS, object_radius=0.0)
@@ -66,7 +58,7 @@ class Stage:
         self._cells = {name: cells for name, (cells, _) in divided.items()}
         size = min((width for _, width in divided.values()), default=0.0) / 2
         self.objects = {room.name: self._laid(room.name, len(room.objects), size) for room in world.rooms}
-        """What lies in each room at the start, by the room's name, in the order of the world."""
+        """What lies in each room at the start, in the order of the world."""
 
         for number, floor in enumerate(self._floors):
             places = [*plan.stands[number].coords, *plan.corners(number)]
@@ -91,55 +83,30 @@ class Stage:
         """The objects in a room, in the order in which they came there."""
         return list(self._tables[room].children) if room in self._tables else []
 
-    def drive(self, room: str, told: Feedback = untold) -> None:
-        """Drive to where the robot stops in a room.
+    def drive(self, room: str, feedback: Feedback) -> None:
+        """Drive to where the robot stops in a room."""
+        self._navigate(self._pose(room), feedback, "GoToInvalidLocation", f'drive to "{room}"')
 
-        Raises:
-            RobotError: there is no way.
-            CancelledError: the clock was stopped.
-        """
-        self._navigate(self._pose(room), told, "GoToInvalidLocation", f'drive to "{room}"')
-
-    def pick(self, thing: Object, name: str, told: Feedback = untold) -> None:
-        """Drive to the table on which an object of this room lies, and take it.
-
-        Args:
-            thing: the object.
-            name: what a program calls it.
-            told: where the robot is on the way.
-
-        Raises:
-            RobotError: it cannot.
-            CancelledError: the clock was stopped.
-        """
+    def pick(self, thing: Object, name: str, feedback: Feedback) -> None:
+        """Drive to the table with an object of this room, and take it; programs call it `name`."""
         what = f'pick up "{name}"'
-        self._navigate(thing.parent, told, "PickFailed", what)
+        self._navigate(thing.parent, feedback, "PickFailed", what)
         self._wait(SECONDS["pick"])
         _succeed(self.robot.pick_object(thing), "PickFailed", what)
 
-    def place(self, room: str, name: str, told: Feedback = untold) -> None:
-        """Drive to the table in a room, and put down there what the robot holds.
-
-        Args:
-            room: where the robot is.
-            name: what a program calls the object.
-            told: where the robot is on the way.
-
-        Raises:
-            RobotError: it cannot.
-            CancelledError: the clock was stopped.
-        """
+    def place(self, room: str, name: str, feedback: Feedback) -> None:
+        """Drive to the table in the robot's room, and put down there what the robot holds."""
         what, table = f'place "{name}"', self._tables.get(room)
         if table is None:
-            raise RobotError("PlaceFailed", f'the robot cannot {what}: no table has room in "{room}"')
-        self._navigate(table, told, "PlaceFailed", what)
+            raise RobotError("PlaceFailed", f'the robot cannot {what}: no table fits into "{room}"')
+        self._navigate(table, feedback, "PlaceFailed", what)
         self._wait(SECONDS["place"])
         taken = {(lying.pose.x, lying.pose.y) for lying in table.children}
         x, y = next(cell for cell in self._cells[room] if cell not in taken)
         _succeed(self.robot.place_object(Pose(x, y)), "PlaceFailed", what)
 
-    def _navigate(self, goal: Pose | Entity, told: Feedback, kind: str, what: str) -> None:
-        self._motor.told = told
+    def _navigate(self, goal: Pose | Entity, feedback: Feedback, kind: str, what: str) -> None:
+        self._motor.feedback = feedback
         _succeed(self.robot.navigate(goal=goal), kind, what)
 
     def _wait(self, seconds: float) -> None:
@@ -153,54 +120,53 @@ class Stage:
 
     def _built(self, plan: Floorplan) -> list[Room]:
         """The rooms, with passages between them."""
-        walls = 0.001  # metres around a floor, where pyrobosim takes nothing else; the plan has left more
         floors = []
         for number, floor in enumerate(plan.floors):
             corners = list(floor.exterior.coords)
-            added = self._world.add_room(name=f"floor{number}", footprint=corners, wall_width=walls)
-            floors.append(_made(added))
+            added = self._world.add_room(name=f"floor{number}", footprint=corners, wall_width=WALLS)
+            floors.append(_added(added))
         for passage in plan.passages:
             start, end = (floors[number] for number in passage.ends)
             hallway = self._world.add_hallway(
                 room_start=start,
                 room_end=end,
                 width=passage.width,
-                wall_width=walls,
+                wall_width=WALLS,
                 conn_method="points",
                 conn_points=list(passage.line.coords),
             )
-            _made(hallway)
+            _added(hallway)
         return floors
 
     def _furnished(self, floor: Room, table: Table) -> ObjectSpawn:
-        """The top of a table that stands in a room."""
+        """The top of a new table."""
         kind = f"table on {floor.name}"
         self._world.get_location_metadata().data[kind] = {
             "footprint": {"type": "box", "dims": list(table.size)},
             "nav_poses": [[x, y, 0.0, angle] for x, y, angle in table.stands],
             "locations": [{"name": "top"}],
         }
-        made = _made(self._world.add_location(category=kind, parent=floor, pose=Pose(*table.centre)))
-        (top,) = made.children
+        added = _added(self._world.add_location(category=kind, parent=floor, pose=Pose(*table.centre)))
+        (top,) = added.children
         return top
 
     def _laid(self, room: str, count: int, size: float) -> list[Object]:
-        """Objects on the table in a room."""
+        """New objects on the table in a room."""
         metadata = self._world.get_object_metadata().data
         metadata["thing"] = {"footprint": {"type": "box", "dims": [size, size]}}
         return [
-            _made(self._world.add_object(category="thing", parent=self._tables[room], pose=Pose(x, y)))
+            _added(self._world.add_object(category="thing", parent=self._tables[room], pose=Pose(x, y)))
             for x, y in self._cells.get(room, [])[:count]
         ]
 
 
 class Roadmap(WorldGraphPlanner):
-    """pyrobosim's planner on a graph; whether places see each other is computed, where that one samples."""
+    """pyrobosim's planner on a graph; it samples whether places see each other, and this computes it."""
 
     plugin_name = "codebotler"
 
     def reset(self) -> None:
-        """Draw the graph of the world as it is."""
+        """Rebuild the graph from the world as it is now."""
         world = self.robot and self.robot.world
         if world is not None:
             self._space = world.total_internal_polygon.buffer(NEAR)
@@ -208,7 +174,7 @@ class Roadmap(WorldGraphPlanner):
         super().reset()
 
     def connect_neighbors(self, node: Node) -> None:
-        """Join a place with all that are seen from there."""
+        """Join a place with all others in sight."""
         here = (node.pose.x, node.pose.y)
         for other in self.graph.nodes:
             if other is not node and self._space.covers(LineString([here, (other.pose.x, other.pose.y)])):
@@ -216,24 +182,21 @@ class Roadmap(WorldGraphPlanner):
 
 
 class Motor(PathExecutor):
-    """Drives along a path by a clock, and stands still where it is when that is stopped.
+    """Drives along a path by a clock, and stands still when that is stopped.
 
-    pyrobosim's own looks for a cancel between naps, and forgets one that comes before it has begun.
-
-    Args:
-        clock: by which it drives.
+    pyrobosim's own executor checks for a cancel only between naps, and forgets one that comes too early.
     """
 
     def __init__(self, clock: Clock) -> None:
         super().__init__()
         self.clock = clock
-        self.told: Feedback = untold
+        self.feedback: Feedback = no_feedback
 
     def execute(self, path: Path, *_: float, **__: float) -> ExecutionResult:
-        """Drive along a path to its end, or until the clock is stopped; the clock has the speed."""
+        """Drive along a path to its end, or until the clock is stopped."""
         way = get_constant_speed_trajectory(path, METRES_PER_SECOND, RADIANS_PER_SECOND)
         corners = [float(corner) for corner in way.t_pts]
-        moment, told, tells = -1.0, "", 0.0
+        moment, last, due = -1.0, "", 0.0
         self.following_path = True
         for moment in self._moments(corners):
             pose = _pose_at(way, moment)
@@ -241,20 +204,16 @@ class Motor(PathExecutor):
             if self.robot.manipulated_object is not None:
                 self.robot.manipulated_object.set_pose(_pose_at(way, moment))
             phrase, now = f"at ({pose.x:.1f}, {pose.y:.1f})", time.monotonic()
-            is_due = now >= tells or moment >= corners[-1] or self.clock.speed is None
-            if is_due and phrase != told:
-                self.told(phrase)
-                told, tells = phrase, now + TELLS_EVERY
+            is_due = now >= due or moment >= corners[-1] or self.clock.speed is None
+            if is_due and phrase != last:
+                self.feedback(phrase)
+                last, due = phrase, now + FEEDBACK_EVERY
         self.following_path = False
         arrived = moment >= corners[-1]
         return ExecutionResult(ExecutionStatus.SUCCESS if arrived else ExecutionStatus.CANCELED)
 
     def _moments(self, corners: list[float]) -> Iterator[float]:
-        """Seconds since the beginning of a drive, each when it has come, until its end or a stop.
-
-        Args:
-            corners: when each corner of the way is passed.
-        """
+        """Seconds since the start of a drive, as they come, until its end or a stop."""
         speed, began, moment = self.clock.speed, self.clock.now, 0.0
         if speed is None:
             for corner in corners:
@@ -269,7 +228,7 @@ class Motor(PathExecutor):
 
 
 def _pose_at(way: Trajectory, moment: float) -> Pose:
-    """Where one is at a moment of a way, between its corners on a straight line."""
+    """The pose at a moment of a drive, between its corners on a straight line."""
     number = min(bisect.bisect_right(way.t_pts, moment), len(way.t_pts) - 1)
     start, end = way.poses[number - 1], way.poses[number]
     begins, ends = way.t_pts[number - 1], way.t_pts[number]
@@ -282,14 +241,13 @@ def _pose_at(way: Trajectory, moment: float) -> Pose:
     )
 
 
-def _made(made: T | None) -> T:
-    """What pyrobosim has added; None is what it does not take, of which the plan has nothing."""
-    assert made is not None, "pyrobosim does not take a part of the plan"
+def _added(made: T | None) -> T:
+    assert made is not None, "pyrobosim refuses a part of the floor plan"
     return made
 
 
 def _succeed(result: ExecutionResult, kind: str, what: str) -> None:
-    """Raise the error for an action that has not succeeded."""
+    """Raise the error of an action that failed or was stopped."""
     if result.status == ExecutionStatus.CANCELED:
         raise CancelledError
     if not result.is_success():

@@ -8,9 +8,8 @@ from urllib.parse import urlsplit
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.robots.address import endpoint
-from codebotler.robots.base import Options, Readiness
-from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
+from codebotler.robots.base import ROS_PYTHON, Options, Readiness
+from codebotler.robots.ros import OTHER_PYTHON, RosRobot, Waits
 from codebotler.robots.worker import lacks
 
 WORKER = Path(__file__).with_name("worker")
@@ -28,33 +27,33 @@ class Ros1(RosRobot):
     Args:
         master: the URI of its master; empty for that of ROS_MASTER_URI.
         python: the interpreter that has its rospy.
-        skills: what it can be asked to do.
+        skills: the skills it may be asked to perform.
         speed: of its clock.
-        waits: for how long what is waited for.
+        waits: time limits.
 
     Raises:
-        UserError: the URI is none.
+        UserError: the URI is invalid.
     """
 
     def __init__(
         self,
         master: str = "",
         *,
-        python: Path = PYTHON,
+        python: Path = ROS_PYTHON,
         skills: SkillTable = SKILLS,
         speed: float | None = 1.0,
         waits: Waits | None = None,
     ) -> None:
         uri = master_uri(master)
-        ros = Ros("ros1", WORKER, python, {"ROS_MASTER_URI": uri}, endpoint(uri))
-        super().__init__(ros, skills, speed, waits)
+        environment = {"ROS_MASTER_URI": uri}
+        super().__init__("ros1", uri, WORKER, python, environment, skills=skills, speed=speed, waits=waits)
 
 
 def master_uri(address: str = "") -> str:
-    """The URI of a master: the one that is named, that of ROS_MASTER_URI, or the usual one.
+    """The URI of a master: the given one, that of ROS_MASTER_URI, or the default one.
 
     Raises:
-        UserError: it is no URI of a master.
+        UserError: it is not the URI of a master.
     """
     uri = address or os.environ.get("ROS_MASTER_URI") or MASTER
     try:
@@ -63,25 +62,21 @@ def master_uri(address: str = "") -> str:
     except ValueError:  # the port is no number
         is_whole = False
     if not is_whole:
-        raise UserError(f'"{uri}" is no URI of a ROS master; write one such as {MASTER}')
+        raise UserError(f'"{uri}" is not the URI of a ROS master; write one such as {MASTER}')
     return uri
 
 
-def readiness(python: Path = PYTHON) -> Readiness:
-    """Whether the interpreter has rospy and what belongs to it."""
+def readiness(python: Path = ROS_PYTHON) -> Readiness:
+    """Whether the interpreter has rospy and its companions."""
     missing = lacks(python, NEEDS)
     if missing is None:
         return Readiness("ros1", works=False, missing=f"{python} cannot be run", mend=OTHER_PYTHON)
     if missing:
-        mend = MEND if python == PYTHON else OTHER_PYTHON
+        mend = MEND if python == ROS_PYTHON else OTHER_PYTHON
         return Readiness("ros1", works=False, missing=f"{python} lacks {', '.join(missing)}", mend=mend)
-    return Readiness("ros1", works=True, note=f"by {python}; needs a master, see ROS_MASTER_URI")
+    return Readiness("ros1", works=True, note=f"with {python}; needs a master, see ROS_MASTER_URI")
 
 
 def robot(options: Options) -> Ros1:
-    """The robot that a user means.
-
-    Raises:
-        UserError: the address is no URI of a master.
-    """
+    """The robot of these options."""
     return Ros1(options.address, python=options.ros_python, skills=options.skills, speed=options.speed)

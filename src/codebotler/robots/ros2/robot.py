@@ -1,7 +1,4 @@
-"""A robot on ROS 2: rclpy, in a worker of the robot's own Python.
-
-It was tested against a stand-in for rclpy only, never on a ROS 2 graph: none was at hand.
-"""
+"""A robot on ROS 2: rclpy, in a worker of the robot's own Python; tested against a stand-in only."""
 
 from __future__ import annotations
 
@@ -11,8 +8,8 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.robots.base import Options, Readiness
-from codebotler.robots.ros import OTHER_PYTHON, PYTHON, Ros, RosRobot, Waits
+from codebotler.robots.base import ROS_PYTHON, Options, Readiness
+from codebotler.robots.ros import OTHER_PYTHON, RosRobot, Waits
 from codebotler.robots.worker import lacks
 
 WORKER = Path(__file__).with_name("worker.py")
@@ -23,31 +20,25 @@ NOTE = "tested against a stand-in for rclpy only, never on a ROS 2 graph"
 
 
 class Ros2(RosRobot):
-    """A robot on ROS 2.
-
-    Args:
-        domain: its ROS_DOMAIN_ID; empty for that of the environment, or 0.
-        python: the interpreter that has its rclpy and robot_actions_pkg.
-        skills: what it can be asked to do.
-        speed: of its clock.
-        waits: for how long what is waited for.
-    """
+    """A robot on ROS 2; its domain is that of ROS_DOMAIN_ID, or 0, unless one is given."""
 
     def __init__(
         self,
         domain: str = "",
         *,
-        python: Path = PYTHON,
+        python: Path = ROS_PYTHON,
         skills: SkillTable = SKILLS,
         speed: float | None = 1.0,
         waits: Waits | None = None,
     ) -> None:
         address = domain or os.environ.get("ROS_DOMAIN_ID") or "0"
-        ros = Ros("ros2", WORKER, python, {"ROS_DOMAIN_ID": address}, address)
-        super().__init__(ros, skills, speed, waits)
+        environment = {"ROS_DOMAIN_ID": address}
+        super().__init__(
+            "ros2", address, WORKER, python, environment, skills=skills, speed=speed, waits=waits
+        )
 
 
-def readiness(python: Path = PYTHON) -> Readiness:
+def readiness(python: Path = ROS_PYTHON) -> Readiness:
     """Whether the interpreter has rclpy and the robot's actions."""
     missing = lacks(python, NEEDS)
     if missing is None:
@@ -59,12 +50,7 @@ def readiness(python: Path = PYTHON) -> Readiness:
 
 
 def mend_of(missing: Sequence[str], installed: Path = Path("/opt/ros")) -> str:
-    """The command that gives an interpreter the modules of ROS 2 that it lacks.
-
-    Args:
-        missing: their names.
-        installed: where the versions of ROS lie.
-    """
+    """The command that gives an interpreter its missing modules of ROS 2."""
     if set(missing) == {"robot_actions_pkg"}:
         return BUILD
     setups = sorted(path for path in installed.glob("*/setup.bash") if (path.parent / "share/rclpy").is_dir())
@@ -72,11 +58,7 @@ def mend_of(missing: Sequence[str], installed: Path = Path("/opt/ros")) -> str:
 
 
 def robot(options: Options) -> Ros2:
-    """The robot that a user means.
-
-    Raises:
-        UserError: the address is no domain.
-    """
+    """The robot of these options."""
     if options.address and not options.address.isdecimal():
-        raise UserError(f'"{options.address}" is no ROS_DOMAIN_ID; write a number such as 0')
+        raise UserError(f'"{options.address}" is not a ROS_DOMAIN_ID; write a number such as 0')
     return Ros2(options.address, python=options.ros_python, skills=options.skills, speed=options.speed)

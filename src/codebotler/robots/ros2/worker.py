@@ -1,7 +1,6 @@
-"""The worker for ROS 2, run by the robot's own Python (3.8 or later), which must have rclpy.
+"""The worker for ROS 2, run by a Python (3.8 or later) that has rclpy.
 
-It says and does the same as that for ROS 1. It was tested against a stand-in for rclpy only, never on a ROS 2
-graph: none was at hand.
+It was tested against a stand-in for rclpy only, never on a ROS 2 graph.
 """
 
 from __future__ import annotations
@@ -16,26 +15,16 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "ros1" / "worker"))
 
-from channel import Message, NotReadyError, main
-from goals import Goal, Ros1Worker
+from channel import Message, SetupError, serve
+from goals import Goal, SkillWorker
 from message_types import PACKAGE
 
 DISCOVERY = 1.0  # seconds after which a node knows most others
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6  # of action_msgs/msg/GoalStatus
-ENDS = {CANCELED: "cancelled", ABORTED: "aborted"}
 
 
-class Graph2:
-    """The ROS 2 graph, which has no master.
-
-    Args:
-        name: of our node; whoever has it drives the robot.
-
-    Raises:
-        NotReadyError: somebody else has it.
-    """
-
-    uri = "the domain of ROS_DOMAIN_ID"
+class Ros2Graph:
+    """The ROS 2 graph, which has no master; whoever has our node's name drives the robot."""
 
     def __init__(self, name: str) -> None:
         import rclpy
@@ -43,38 +32,32 @@ class Graph2:
 
         self._rclpy, self.node = rclpy, name
         rclpy.init(args=None, **_without_signals())
-        looks = rclpy.create_node(f"{name}_looks_{os.getpid()}")
+        probe = rclpy.create_node(f"{name}_looks_{os.getpid()}")
         time.sleep(DISCOVERY)
-        is_taken = name in looks.get_node_names()
-        looks.destroy_node()
+        is_taken = name in probe.get_node_names()
+        probe.destroy_node()
         if is_taken:
             rclpy.shutdown()
-            raise NotReadyError(
-                f"another codebotler has this robot: there is a node {name} on the graph; stop that one first"
-            )
+            raise SetupError(f"another codebotler is using this robot (the node {name}); stop it first")
         self.ours = rclpy.create_node(name)
         executor = rclpy.executors.SingleThreadedExecutor()
         executor.add_node(self.ours)
         threading.Thread(target=executor.spin, daemon=True).start()
 
     def leave(self) -> None:
-        """Be a node no more."""
+        """Shut our node down."""
         self._rclpy.shutdown()
 
     def is_left(self) -> bool:
-        """Whether this is a node no more."""
+        """Whether our node was shut down."""
         return not self._rclpy.ok()
 
-    def is_taken(self) -> bool:
-        """Another node of our name ends nothing here."""
-        return False
-
-    def is_forgotten(self) -> bool:
-        """There is nobody who could forget us."""
-        return False
+    def why_left(self) -> str:
+        """Error message for a node that was shut down."""
+        return f"the node {self.node} was shut down; connect again"
 
     def nodes_of(self, _server: str) -> list[str]:
-        """Any node may yet be discovered."""
+        """A stand-in for any node, since one may still be discovered."""
         return ["a node to be discovered"]
 
     def why_missing(self, server: str, type_name: str) -> str:
@@ -86,7 +69,7 @@ class Graph2:
 
 
 def _without_signals() -> dict[str, Any]:
-    """What keeps rclpy, where it is new enough, from ending at a signal before the robot was stopped."""
+    """Options that keep a recent rclpy from ending at a signal before the robot has stopped."""
     try:
         from rclpy.signals import SignalHandlerOptions
     except ImportError:
@@ -94,13 +77,8 @@ def _without_signals() -> dict[str, Any]:
     return {"signal_handler_options": SignalHandlerOptions.NO}
 
 
-class Server2:
-    """What the worker knows of the action server of one skill.
-
-    Args:
-        node: ours.
-        action: the skill's row.
-    """
+class Ros2Server:
+    """The action server of one skill, seen from a client."""
 
     def __init__(self, node: Any, action: Message) -> None:
         import rclpy.action
@@ -119,7 +97,7 @@ class Server2:
 
     @property
     def heard(self) -> float:
-        """When it was last there, on a clock that nobody sets."""
+        """When it was last there, by the monotonic clock."""
         if self.client.server_is_ready():
             self._heard = time.monotonic()
         return self._heard
@@ -129,37 +107,40 @@ class Server2:
         return bool(self.client.server_is_ready())
 
     def cancel(self) -> None:
-        """Cancel all goals of anybody."""
+        """Cancel all goals of all clients."""
         self._cancel_all.call_async(self._request())
 
 
-class Ros2Worker(Ros1Worker):
-    """Executes skills over ROS 2, one at a time."""
+class Ros2Worker(SkillWorker):
+    """Performs skills over ROS 2."""
 
-    def _entered(self, node: str) -> Any:
-        return Graph2(node), False
+    def connect(self, start: Message) -> bool:
+        """Start our node, and a client for each server; nobody tells whether an earlier worker died."""
+        self.graph = Ros2Graph(start["node"])
+        actions = start["actions"]
+        self.servers = {skill: Ros2Server(self.graph.ours, action) for skill, action in actions.items()}
+        return False
 
-    def _servers(self, actions: Message) -> dict[str, Any]:
-        return {skill: Server2(self.graph.ours, action) for skill, action in actions.items()}
-
-    def _send(self, goal: Goal, arguments: list[Any]) -> None:
-        server: Any = goal.server
-        message = server.spec.Goal()
-        for field, value in zip(server.fields, arguments):
+    def send(self, goal: Goal, arguments: list[Any]) -> None:
+        """Send a goal, unless it is cancelled."""
+        message = goal.server.spec.Goal()
+        for field, value in zip(goal.server.fields, arguments):
             setattr(message, field, value)
         with goal.lock:
             if goal.cancelled is not None:
-                self._end(goal, "cancelled")
+                self.end(goal, "cancelled")
                 return
             goal.sent = time.monotonic()
-            sending = server.client.send_goal_async(message, feedback_callback=lambda m: self._told(goal, m))
-        sending.add_done_callback(lambda done: self._taken(goal, done.result()))
+            sending = goal.server.client.send_goal_async(
+                message, feedback_callback=lambda m: self._feedback(goal, m.feedback)
+            )
+        sending.add_done_callback(lambda done: self._answered(goal, done.result()))
 
-    def _taken(self, goal: Goal, handle: Any) -> None:
-        """Hear whether the server takes the goal; one that was cancelled before is cancelled now."""
+    def _answered(self, goal: Goal, handle: Any) -> None:
+        """Note whether the server accepts the goal; one that was cancelled meanwhile is cancelled now."""
         goal.is_acknowledged = True
         if not handle.accepted:
-            self._end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
+            self.end(goal, "cancelled" if goal.cancelled else "error", state="rejected", text="")
             return
         with goal.lock:
             goal.handle = handle
@@ -169,23 +150,21 @@ class Ros2Worker(Ros1Worker):
         handle.get_result_async().add_done_callback(lambda done: self._done(goal, done.result()))
 
     def _done(self, goal: Goal, response: Any) -> None:
-        server: Any = goal.server
         if goal.cancelled is not None or response.status == CANCELED:
-            self._end(goal, "cancelled", state=ENDS.get(response.status, ""))
+            self.end(goal, "cancelled")
         elif response.status == SUCCEEDED:
-            values = [getattr(response.result, field) for field in server.returns]
-            self._end(goal, "result", value=values[0] if values else None)
+            values = [getattr(response.result, field) for field in goal.server.returns]
+            self.end(goal, "result", value=values[0] if values else None)
         elif response.status == ABORTED:
-            self._end(goal, "error", state="aborted", text="")
+            self.end(goal, "error", state="aborted", text="")
         else:
-            self._end(goal, "lost", text=f"{server.name} ended its goal with the status {response.status}")
+            self.end(
+                goal, "lost", text=f"{goal.server.name} ended its goal with the status {response.status}"
+            )
 
-    def _told(self, goal: Goal, message: Any) -> None:
-        fields = message.feedback.get_fields_and_field_types()
-        words = ", ".join(f"{name}: {getattr(message.feedback, name)}" for name in fields)
-        if words and not goal.is_over:
-            self.channel.tell("feedback", id=goal.number, text=words)
+    def _feedback(self, goal: Goal, feedback: Any) -> None:
+        self.pass_on(goal, {name: getattr(feedback, name) for name in feedback.get_fields_and_field_types()})
 
 
 if __name__ == "__main__":
-    main(Ros2Worker)
+    serve(Ros2Worker)

@@ -1,4 +1,4 @@
-"""Robots behind a rosbridge: start with `robot.py`.
+"""Robots behind a rosbridge. `robot.py` is the tool's side; `worker.py` speaks with the rosbridge.
 
-`protocol.py` has the messages; `watchdog.py` outlives a killed tool and cancels its goal.
+The worker outlives a killed tool and cancels its goal; it shares parts of `ros1/worker/`.
 """

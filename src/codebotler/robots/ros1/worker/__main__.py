@@ -1,9 +1,9 @@
-"""The worker for ROS 1, run by the robot's own Python (3.8 or later): `python3 FOLDER`."""
+"""The worker for ROS 1: `python3 FOLDER`, run by a Python that has rospy."""
 
 from __future__ import annotations
 
-from channel import main
-from goals import Ros1Worker
+from actions import Ros1Worker
+from channel import serve
 
 if __name__ == "__main__":
-    main(Ros1Worker)
+    serve(Ros1Worker)

@@ -1,4 +1,4 @@
-"""Lines of JSON between the worker and the tool."""
+"""Lines of JSON between a worker and the tool, and the worker's main loop."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from typing import IO, Any, Dict
 Message = Dict[str, Any]
 
 
-class NotReadyError(Exception):
-    """The robot cannot be driven; the text says why and how to mend it."""
+class SetupError(Exception):
+    """The robot cannot be used; the text says why and what to do."""
 
 
 class Channel:
-    """Lines of JSON in both directions; what rospy prints goes to standard error instead."""
+    """Standard input and output as lines of JSON; whatever else rospy prints goes to standard error."""
 
     def __init__(self) -> None:
         self._out = os.fdopen(os.dup(1), "w", encoding="utf-8")
@@ -27,8 +27,8 @@ class Channel:
         self._in: IO[str] = os.fdopen(os.dup(0), "r", encoding="utf-8")
         self._lock = threading.Lock()
 
-    def tell(self, what: str, **more: Any) -> None:
-        """Write one line; in vain where nobody reads any more."""
+    def send(self, what: str, **more: Any) -> None:
+        """Write one line; a tool that is gone is noticed at the end of the input."""
         with self._lock:
             try:
                 self._out.write(json.dumps({"is": what, **more}, default=str) + "\n")
@@ -37,17 +37,13 @@ class Channel:
                 return
 
     def lines(self) -> Iterator[Message]:
-        """What is said on the other side, until it goes away."""
+        """Incoming messages, until the tool closes its end or dies."""
         for line in iter(self._in.readline, ""):
             yield json.loads(line)
 
 
-def main(work: Callable[[Channel, Message], Any]) -> None:
-    """Serve until the input ends.
-
-    Args:
-        work: makes of a channel and the first line what obeys the others.
-    """
+def serve(make_worker: Callable[[Channel, Message], Any]) -> None:
+    """Make a worker from the first line and have it obey the others; however that ends, stop the robot."""
     channel = Channel()
     worker, status = None, 1
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
@@ -58,17 +54,17 @@ def main(work: Callable[[Channel, Message], Any]) -> None:
         if start is None:
             return
         try:
-            worker = work(channel, start)
-        except NotReadyError as error:
-            channel.tell("not-ready", text=str(error))
+            worker = make_worker(channel, start)
+        except SetupError as error:
+            channel.send("not-ready", text=str(error))
             return
         except ImportError as error:
-            channel.tell("not-ready", text=f"{sys.executable} has no ROS: {error}")
+            channel.send("not-ready", text=f"{sys.executable} has no ROS: {error}")
             return
         for line in lines:
             worker.obey(line)
         status = 0
-    except Exception:  # noqa: BLE001 - whatever it is, the robot is to be stopped
+    except Exception:  # noqa: BLE001 - whatever it is, the robot must be stopped
         traceback.print_exc()
     finally:
         if worker is not None:

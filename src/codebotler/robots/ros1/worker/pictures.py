@@ -1,4 +1,4 @@
-"""Pictures on a ROS 1 graph, for action servers in the robot's own Python (3.8 or later)."""
+"""Pictures on a ROS 1 graph: the last one of a camera, and a topic that shows what a server saw."""
 
 from __future__ import annotations
 
@@ -6,33 +6,28 @@ import base64
 import time
 from typing import Any
 
-from message_types import BUFFER, COMPRESSED, in_text, picture_types
+from message_types import BUFFER, COMPRESSED, in_base64, picture_types
 
-MOST = 64_000_000  # bytes of a picture that is passed on
+LARGEST = 64_000_000  # bytes of a picture that is passed on
 
 
 class Camera:
-    """The last picture of a topic, of whichever type; nothing is unpacked until somebody asks for it.
-
-    Args:
-        topic: with messages of sensor_msgs/Image or sensor_msgs/CompressedImage.
-    """
+    """The last message of a topic, raw or compressed; it is unpacked only when asked for."""
 
     def __init__(self, topic: str) -> None:
         import rospy
 
         self.topic, self._types = topic, picture_types()
         self._last: Any = None
-        rospy.Subscriber(topic, rospy.AnyMsg, self._see, queue_size=1, buff_size=BUFFER)
+        rospy.Subscriber(topic, rospy.AnyMsg, self._keep, queue_size=1, buff_size=BUFFER)
 
     def look(self, oldest: float) -> dict[str, Any]:
-        """The fields of the last picture, or `none`: why there is none.
+        """The last picture as fields of its message, or `none` with the reason why there is none.
 
-        Args:
-            oldest: how many seconds ago it may have come.
+        It must have come within the last `oldest` seconds.
         """
         if self._last is None:
-            return {"none": f"no picture has come on {self.topic} yet; does the camera's node run?"}
+            return {"none": f"no picture has come on {self.topic} yet; is the camera's node running?"}
         came, message = self._last
         kind, age = message._connection_header["type"], time.monotonic() - came
         if kind not in self._types:
@@ -40,25 +35,21 @@ class Camera:
         if age > oldest:
             late = f"the last picture on {self.topic} came {age:.0f} s ago"
             return {"none": f"{late}; has the camera's node stopped?"}
-        if len(message._buff) > MOST:
-            return {"none": f"the picture on {self.topic} is larger than {MOST:,} bytes"}
+        if len(message._buff) > LARGEST:
+            return {"none": f"the picture on {self.topic} is larger than {LARGEST:,} bytes"}
         try:
             picture = self._types[kind]().deserialize(message._buff)
-        except Exception as error:  # noqa: BLE001 - whatever is wrong with it, it is no picture
+        except Exception as error:  # noqa: BLE001 - genpy raises what it likes
             return {"none": f"the picture on {self.topic} cannot be unpacked: {error}"}
         names = [name for name in picture.__slots__ if name not in ("header", "data")]
-        return {**{name: getattr(picture, name) for name in names}, "data": in_text(picture.data)}
+        return {**{name: getattr(picture, name) for name in names}, "data": in_base64(picture.data)}
 
-    def _see(self, message: Any) -> None:
+    def _keep(self, message: Any) -> None:
         self._last = time.monotonic(), message
 
 
-class Show:
-    """A topic on which an action server shows what it sees.
-
-    Args:
-        server: the action server's name.
-    """
+class PictureTopic:
+    """The topic on which an action server shows what it sees: `SERVER/picture`."""
 
     def __init__(self, server: str) -> None:
         import rospy
@@ -67,7 +58,7 @@ class Show:
         self._publisher = rospy.Publisher(f"{rospy.remap_name(server)}/picture", self._type, queue_size=4)
 
     def show(self, picture: str) -> None:
-        """Publish a JPEG file, given in base64."""
+        """Publish a JPEG file in base64."""
         import rospy
 
         message = self._type(format="jpeg", data=base64.b64decode(picture))

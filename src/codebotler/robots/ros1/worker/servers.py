@@ -1,65 +1,62 @@
-"""The worker of a robot that offers skills: real action servers on a ROS 1 graph, by a Python that has rospy.
+"""Action servers of a virtual robot or a camera: `python3 servers.py`, run by a Python that has rospy.
 
-What a skill does is decided on the other side of the channel: each goal and each cancel is told there, and
-how a goal ends is heard from there. Where no master answers, it starts one that ends with this process.
+Goals and cancels are passed to the tool, which decides how each goal ends.
 """
 
 from __future__ import annotations
 
 import socket
 import threading
+from collections.abc import Callable
 from typing import Any
 
-from channel import Channel, Message, NotReadyError, main
-from graph import Graph, no_master
+from channel import Channel, Message, SetupError, serve
+from graph import Ros1Graph, no_master
 from message_types import message_types
-from pictures import Camera, Show
+from pictures import Camera, PictureTopic
 
 
-class Servers:
-    """The action servers.
+class ActionServers:
+    """One action server for each skill, and a master if none answers.
 
-    Args:
-        channel: to the robot.
-        start: the first line: the `node`, the `actions` by skill, and the `port` on which a master may be
-            started, or null; perhaps the topic of a `camera`, whose last picture can then be asked for, and
-            whether the servers `show` what they see.
+    The first line has the `node`, the `actions` by skill, and the `port` on which a master may be started, or
+    null. It may have the topic of a `camera` whose last picture can be asked for, and `show`: whether the
+    servers have topics for what they see.
     """
 
     def __init__(self, channel: Channel, start: Message) -> None:
         import actionlib
 
         self.channel = channel
-        self.graph = Graph(start["node"])
+        self.graph = Ros1Graph(start["node"])
         self.master = None if self.graph.is_online() else started_master(start["port"], self.graph.uri)
         self.graph.enter()
         self.handles: dict[str, Any] = {}
-        self.shows: dict[str, Show] = {}
+        self.topics: dict[str, PictureTopic] = {}
         self.camera = Camera(start["camera"]) if start.get("camera") else None
         self.lock = threading.Lock()
         specs = message_types(list(start["actions"].values()))
         self.servers: list[Any] = []
         for skill, action in start["actions"].items():
-            spec = specs[action["type"]]
             server = actionlib.ActionServer(
-                action["server"], spec, self._starter(skill), self._cancel, auto_start=False
+                action["server"], specs[action["type"]], self._starter(skill), self._cancel, auto_start=False
             )
             server.start()
             self.servers.append(server)
             if start.get("show"):
-                self.shows[skill] = Show(action["server"])
-        channel.tell("ready", address=self.graph.uri, has_master=self.master is not None)
+                self.topics[skill] = PictureTopic(action["server"])
+        channel.send("ready", has_master=self.master is not None)
 
     def obey(self, line: Message) -> None:
-        """End a goal as the line says, or look."""
+        """End a goal, or look at the camera."""
         if line["do"] == "look":
             assert self.camera is not None, "there is no camera"
-            self.channel.tell("image", **self.camera.look(line["oldest"]))
+            self.channel.send("image", **self.camera.look(line["oldest"]))
             return
         with self.lock:
             handle = self.handles.pop(line["id"])
         if "picture" in line:
-            self.shows[line["skill"]].show(line["picture"])
+            self.topics[line["skill"]].show(line["picture"])
         result = handle.get_default_result()
         if line["do"] == "succeed":
             if result.__slots__:
@@ -71,36 +68,30 @@ class Servers:
             handle.set_canceled(result, "cancelled")
 
     def leave(self) -> None:
-        """Leave the graph, and take the master along."""
-        import rospy
-
-        rospy.signal_shutdown("the end")
+        """Leave the graph, and stop the master if it is ours."""
+        self.graph.leave()
         if self.master is not None:
             self.master.stop()
 
-    def _starter(self, skill: str) -> Any:
+    def _starter(self, skill: str) -> Callable[[Any], None]:
         def start(handle: Any) -> None:
             goal, number = handle.get_goal(), handle.get_goal_id().id
             with self.lock:
                 self.handles[number] = handle
             handle.set_accepted()
             arguments = [getattr(goal, field) for field in goal.__slots__]
-            self.channel.tell("goal", id=number, skill=skill, arguments=arguments)
+            self.channel.send("goal", id=number, skill=skill, arguments=arguments)
 
         return start
 
     def _cancel(self, handle: Any) -> None:
-        self.channel.tell("cancel", id=handle.get_goal_id().id)
+        self.channel.send("cancel", id=handle.get_goal_id().id)
 
 
-def started_master(port: Any, uri: str) -> Any:
-    """A master in this process.
-
-    Raises:
-        NotReadyError: it may not be started, or the port is taken.
-    """
+def started_master(port: int | None, uri: str) -> Any:
+    """A master in this process, reached at a port of this machine."""
     if port is None:
-        raise NotReadyError(no_master(uri))
+        raise SetupError(no_master(uri))
     import rosmaster.master
 
     with socket.socket() as probe:
@@ -108,8 +99,9 @@ def started_master(port: Any, uri: str) -> Any:
         try:
             probe.bind(("127.0.0.1", port))
         except OSError as error:
-            raise NotReadyError(
-                f"port {port} is taken by what is no ROS master ({error}); name another one with --port"
+            raise SetupError(
+                f"port {port} is in use by something that is no ROS master ({error}); "
+                "choose another with --port"
             ) from None
     master = rosmaster.master.Master(port)
     master.start()
@@ -117,4 +109,4 @@ def started_master(port: Any, uri: str) -> Any:
 
 
 if __name__ == "__main__":
-    main(Servers)
+    serve(ActionServers)

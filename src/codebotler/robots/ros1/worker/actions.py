@@ -1,0 +1,166 @@
+"""Skills performed as goals of actionlib, on ROS 1."""
+
+from __future__ import annotations
+
+import io
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from channel import Message
+from goals import Goal, SkillWorker
+from graph import Ros1Graph
+from message_types import BUFFER, COMPRESSED, in_base64, message_types, picture_types
+
+SETTLES = 0.2  # seconds until a server sends results to a new client: ROS tells neither side
+LAST_PICTURE = 0.5  # seconds for a picture to come after the result, over a connection of its own
+LARGEST_PICTURE = 2_000_000  # bytes
+
+
+class Ros1Server:
+    """The action server of one skill, seen from a client."""
+
+    def __init__(self, action: Message, spec: Any, see: Callable[[Any, Any], None]) -> None:
+        import actionlib
+        import actionlib_msgs.msg
+        import rospy
+
+        self.name: str = action["server"]
+        self.type: str = action["type"]
+        self.client = actionlib.ActionClient(self.name, spec)
+        self.goal = type(spec().action_goal.goal)
+        self.heard = 0.0  # when its last status came, by the monotonic clock
+        self._node: str | None = None
+        self._results: Any = None  # the connection that brings them
+        self._since = 0.0
+        topic = rospy.remap_name(self.name)
+        self._status = rospy.Subscriber(f"{topic}/status", actionlib_msgs.msg.GoalStatusArray, self._hear)
+        self._pictures = rospy.Subscriber(
+            f"{topic}/picture",
+            picture_types()[COMPRESSED],
+            lambda message: see(self, message.data),
+            buff_size=BUFFER,
+        )
+
+    def shows_pictures(self) -> bool:
+        """Whether anything publishes what it sees."""
+        return bool(self._pictures.get_num_connections())
+
+    def is_connected(self, silence: float) -> bool:
+        """Whether goals reach it and its results reach us."""
+        client, node = self.client, self._node
+        if node is None or time.monotonic() - self.heard > silence:
+            return False
+        results, feedback = (
+            next((c for c in subscriber.impl.connections if c.callerid_pub == node), None)
+            for subscriber in (client.result_sub, client.feedback_sub)
+        )
+        if results is not self._results:
+            self._results, self._since = results, time.monotonic()
+        reached = all(p.impl.has_connection(node) for p in (client.pub_goal, client.pub_cancel))
+        return reached and None not in (results, feedback) and time.monotonic() - self._since > SETTLES
+
+    def cancel(self, goal_id: str = "") -> None:
+        """Cancel one goal, or all goals of all clients.
+
+        A handle's own `cancel` takes a goal for lost that the server has not heard of yet.
+        """
+        import actionlib_msgs.msg
+
+        self.client.pub_cancel.publish(actionlib_msgs.msg.GoalID(id=goal_id))
+
+    def _hear(self, status: Any) -> None:
+        self.heard = time.monotonic()
+        self._node = status._connection_header["callerid"]
+
+
+class Ros1Worker(SkillWorker):
+    """Performs skills over ROS 1."""
+
+    def connect(self, start: Message) -> bool:
+        """Register our node, and subscribe to all servers."""
+        import rospy
+
+        graph, actions = Ros1Graph(start["node"]), start["actions"]
+        self.graph, left_behind = graph, graph.enter()
+        rospy.on_shutdown(self.stop)
+        specs = message_types(list(actions.values()))
+        self.servers = {
+            skill: Ros1Server(action, specs[action["type"]], self._see) for skill, action in actions.items()
+        }
+        return left_behind
+
+    def send(self, goal: Goal, arguments: list[Any]) -> None:
+        """Send a goal, unless it is cancelled or no message can hold it."""
+        import genpy
+
+        try:  # an error within rospy would leave half a message on the line and spoil the next one
+            message = goal.server.goal(*arguments)
+            message.serialize(io.BytesIO())
+        except (genpy.SerializationError, TypeError, ValueError) as error:
+            self.end(goal, "unsent", text=f"the goal of {goal.server.name} cannot be sent: {error}")
+            return
+        with goal.lock:
+            if goal.cancelled is not None:
+                self.end(goal, "cancelled")
+                return
+            goal.sent = time.monotonic()
+            goal.handle = goal.server.client.send_goal(
+                message,
+                lambda handle: self._changed(goal, handle),
+                lambda _, feedback: self.pass_on(goal, _fields(feedback)),
+            )
+            goal_id = goal.handle.comm_state_machine.action_goal.goal_id.id
+            goal.stop = lambda: goal.server.cancel(goal_id)
+
+    def _changed(self, goal: Goal, handle: Any) -> None:
+        """Follow the state of a goal, in one of rospy's threads."""
+        from actionlib import CommState, TerminalState
+
+        state = handle.get_comm_state()
+        goal.is_acknowledged = True
+        if state == CommState.WAITING_FOR_RESULT and goal.status_ended is None:
+            goal.status_ended = time.monotonic()
+        if state != CommState.DONE:
+            return
+        terminal = handle.get_terminal_state()
+        if terminal == TerminalState.LOST:
+            self.end(goal, "lost", text=f"{goal.server.name} no longer knows its goal; was it restarted?")
+        elif goal.cancelled is not None:
+            self.end(goal, "cancelled")
+        elif terminal == TerminalState.SUCCEEDED:
+            self._succeed(goal, next(iter(_fields(handle.get_result()).values()), None))
+        elif terminal in (TerminalState.ABORTED, TerminalState.REJECTED):
+            state_name = "rejected" if terminal == TerminalState.REJECTED else "aborted"
+            self.end(goal, "error", state=state_name, text=handle.get_goal_status_text())
+        else:
+            self.end(goal, "cancelled")
+
+    def _see(self, server: Ros1Server, data: Any) -> None:
+        """Pass on a picture that a server shows while its goal goes on."""
+        goal = self.goal
+        if goal is None or goal.server is not server or goal.sent is None or goal.is_over:
+            return
+        if len(data) > LARGEST_PICTURE:
+            text = f"a picture of {len(data):,} bytes was left out; the limit is {LARGEST_PICTURE:,} bytes"
+            self.channel.send("feedback", id=goal.number, text=text)
+        else:
+            self.channel.send("picture", id=goal.number, data=in_base64(data))
+        goal.seen.set()
+
+    def _succeed(self, goal: Goal, value: Any) -> None:
+        """End a goal, with its picture, which may come a moment after the result."""
+        if goal.seen.is_set() or not goal.server.shows_pictures():
+            self.end(goal, "result", value=value)
+            return
+
+        def wait() -> None:
+            goal.seen.wait(LAST_PICTURE)
+            self.end(goal, "result", value=value)
+
+        threading.Thread(target=wait, daemon=True).start()
+
+
+def _fields(message: Any) -> dict[str, Any]:
+    return {name: getattr(message, name) for name in message.__slots__}

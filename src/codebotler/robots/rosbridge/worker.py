@@ -1,0 +1,145 @@
+"""The worker for a robot behind a rosbridge, run by the tool's own Python."""
+
+from __future__ import annotations
+
+import sys
+import time
+import uuid
+from pathlib import Path
+from typing import Any
+
+from codebotler.robots.rosbridge.connection import FAULTS, INSISTS, SETTLES, Connection
+from codebotler.robots.rosbridge.protocol import GoalUpdate, Message
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "ros1" / "worker"))
+
+from channel import SetupError, serve
+from goals import Goal, SkillWorker
+
+AGAIN = 0.5  # seconds after which a message without any effect is sent again
+
+
+class RosbridgeServer:
+    """The action server of one skill, seen through a rosbridge."""
+
+    def __init__(self, connection: Connection, action: Message) -> None:
+        self.name: str = action["server"]
+        self.type: str = action["type"]
+        self.fields = [line.split()[1] for line in action["definition"].partition("---")[0].splitlines()]
+        self._connection = connection
+
+    @property
+    def heard(self) -> float:
+        """When its last status came, by the monotonic clock; now, if there are none."""
+        if self._connection.protocol.has_status:
+            return self._connection.heard.get(self.name, 0.0)
+        return time.monotonic()
+
+    def is_connected(self, _silence: float) -> bool:
+        """Whether no result of a goal would be lost."""
+        if self._connection.is_lost:
+            return False
+        return not self._connection.protocol.has_status or self.name in self._connection.settled
+
+    def cancel(self, goal: str = "") -> None:
+        """Cancel one goal, or all goals of all clients."""
+        self._connection.send(self._connection.protocol.cancel(self.name, goal))
+
+
+class RosbridgeWorker(SkillWorker):
+    """Performs skills over a rosbridge."""
+
+    graph: Connection
+    settles = SETTLES
+
+    def connect(self, start: Message) -> bool:
+        """Open the connection; nobody tells whether an earlier worker died."""
+        actions = start["actions"]
+        try:
+            self.graph = Connection(start["address"], actions.values(), self._hear, self._lost)
+        except FAULTS as error:
+            raise SetupError(
+                f"no rosbridge answers at {start['address']} ({error}); start it, "
+                "or name another with --address"
+            ) from None
+        self.servers = {skill: RosbridgeServer(self.graph, action) for skill, action in actions.items()}
+        self._message: Message = {}
+        self._again = 0.0
+        return False
+
+    def missing(self) -> dict[str, str]:
+        """Nothing: servers are seen only when their skills are performed."""
+        return {}
+
+    def cancel_all(self) -> bool:
+        """Cancel all goals, again and again for a while; on ROS 2 only single goals can be cancelled."""
+        if not self.graph.protocol.has_status:
+            return False
+        until = time.monotonic() + INSISTS
+        while time.monotonic() < until:
+            super().cancel_all()
+        return not self.graph.is_lost
+
+    def send(self, goal: Goal, arguments: list[Any]) -> None:
+        """Send a goal, unless it is cancelled."""
+        server, protocol = goal.server, self.graph.protocol
+        name = goal.handle = str(uuid.uuid4())
+        fields = dict(zip(server.fields, arguments, strict=True))
+        with goal.lock:
+            if goal.cancelled is not None:
+                self.end(goal, "cancelled")
+                return
+            self._message = protocol.goal(server.name, server.type, name, fields)
+            goal.is_acknowledged = not protocol.has_status
+            goal.sent = time.monotonic()
+            self._again = goal.sent + AGAIN
+            self.graph.send(self._message)
+            goal.stop = lambda: server.cancel(name)
+
+    def look_after(self, goal: Goal, sent: float, now: float) -> None:
+        """Send again what has no effect."""
+        if self.graph.is_lost:
+            return
+        super().look_after(goal, sent, now)
+        with goal.lock:
+            if not self.graph.protocol.has_status or goal.is_over or now < self._again:
+                return
+            self._again = now + AGAIN
+            if goal.cancelled is not None:
+                goal.cancel()
+            elif not goal.is_acknowledged:
+                self.graph.send(self._message)
+
+    def _hear(self, update: GoalUpdate) -> None:
+        goal = self.goal
+        if goal is None or goal.is_over or goal.handle != update.goal:
+            return
+        goal.is_acknowledged = True
+        if update.what == "feedback":
+            self.pass_on(goal, update.values)
+        elif update.what == "status":
+            if update.state and goal.status_ended is None:
+                goal.status_ended = time.monotonic()
+        elif update.state == "lost":
+            why = update.text or "it does not say why"
+            self.end(goal, "lost", text=f"rosbridge could not perform a goal of {goal.server.name}: {why}")
+        elif update.state == "cancelled" or goal.cancelled is not None:
+            self.end(goal, "cancelled")
+        elif update.state == "succeeded":
+            self.end(goal, "result", value=next(iter(update.values.values()), None))
+        else:
+            self.end(goal, "error", state=update.state, text=update.text)
+
+    def _lost(self) -> None:
+        """Cancel the goal that goes on over another connection."""
+        goal = self.goal
+        if goal is not None and goal.sent is not None and not goal.is_over:
+            if self.graph.insist(self.graph.protocol.cancel(goal.server.name, goal.handle)):
+                outcome = "; its goal was cancelled over another one"
+            else:
+                outcome = ", and its goal goes on: STOP THE ROBOT BY HAND"
+            self.end(goal, "lost", text=f"{self.graph.why_left()}{outcome}")
+
+
+if __name__ == "__main__":
+    serve(RosbridgeWorker)
