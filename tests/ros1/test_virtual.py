@@ -97,7 +97,7 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
     worker = Worker()
     try:
         for (name, _, world), program, expected in zip(tasks, programs, simulated, strict=True):
-            virtual.enter(world)
+            virtual._body = virtual._at_start(world)
             robot.connect()
             live = LiveRobot(robot, lambda *_, **__: None, clock_starts=ROBOT_RULES.clock_starts)
             outcome = worker.run_live(program, live)

@@ -1,4 +1,4 @@
-"""What robots on ROS 1 and ROS 2 have in common: a worker that sends goals to one action server per skill."""
+"""What robots on ROS have in common: a worker that sends goals to one action server per skill."""
 
 from __future__ import annotations
 

@@ -82,10 +82,6 @@ class VirtualRobot:
             thread.start()
         return bool(worker.about["has_master"])
 
-    def enter(self, world: World) -> None:
-        """Move to the start of another world, between two goals."""
-        self._body = self._at_start(world)
-
     def wait(self) -> None:
         """Serve for ever.
 

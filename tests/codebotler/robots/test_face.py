@@ -168,7 +168,7 @@ def test_the_first_answer_counts_and_the_others_are_told_so() -> None:
         with pytest.raises(AnswerError, match="closed"):
             face.answer(number + 1, 0)
         face.answer(number, 1)
-        with pytest.raises(AnswerError, match='already .*"No"'):
+        with pytest.raises(AnswerError, match=r'already .*"No"'):
             face.answer(number, 0)
     assert ended == ["No"]
 

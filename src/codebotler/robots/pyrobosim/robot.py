@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import logging
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -31,8 +30,7 @@ from codebotler.simulator.robot import SimulatedRobot, Thing, resolve_room
 if TYPE_CHECKING:
     from codebotler.robots.pyrobosim.world import DrivableWorld
 
-MEND = 'pip install "codebotler[pyrobosim]"'
-OLDEST = 5  # major version
+MISSING, MEND = "pyrobosim is not installed", 'pip install "codebotler[pyrobosim]"'
 
 
 class Pyrobosim:
@@ -51,9 +49,8 @@ class Pyrobosim:
 
     def connect(self) -> None:
         """Build the world in pyrobosim as it is at the start, if that is installed."""
-        missing = _missing()
-        if missing:
-            raise NotReadyError(f"{missing}; install it with: {MEND}")
+        if importlib.util.find_spec("pyrobosim") is None:
+            raise NotReadyError(f"{MISSING}; install it with: {MEND}")
         logger = logging.getLogger("pyrobosim")
         if not logger.handlers:  # or it logs to the terminal
             logger.addHandler(logging.NullHandler())
@@ -125,9 +122,8 @@ class Pyrobosim:
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
     """Whether pyrobosim is installed."""
-    missing = _missing()
-    if missing:
-        return Readiness("pyrobosim", works=False, missing=missing, mend=MEND)
+    if importlib.util.find_spec("pyrobosim") is None:
+        return Readiness("pyrobosim", works=False, missing=MISSING, mend=MEND)
     return Readiness("pyrobosim", works=True, note="plans and drives through --world FILE, without a window")
 
 
@@ -136,12 +132,3 @@ def robot(options: Options) -> Pyrobosim:
     if options.world is None:
         raise UserError("the robot in pyrobosim needs a world to be in; name one with --world FILE")
     return Pyrobosim(options.world, speed=options.speed, skills=options.skills)
-
-
-def _missing() -> str:
-    if importlib.util.find_spec("pyrobosim") is None:
-        return "pyrobosim is not installed"
-    version = metadata.version("pyrobosim")
-    if int(version.partition(".")[0]) < OLDEST:
-        return f"pyrobosim {version} is too old; version {OLDEST} or later is needed"
-    return ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 Message: TypeAlias = dict[str, Any]
 
@@ -32,29 +32,10 @@ class GoalUpdate:
     server: str = ""  # of a status
 
 
-class ActionProtocol(Protocol):
-    """How goals are sent, cancelled and heard of."""
-
-    has_status: bool
-    """Whether servers are heard while nothing goes on, so that silence means something."""
-
-    def opening(self, server: str, action: str) -> Iterator[Message]:
-        """The messages before the first goal of an action."""
-
-    def goal(self, server: str, action: str, goal: str, fields: Message) -> Message:
-        """Send a goal; sent again, it is the same goal."""
-
-    def cancel(self, server: str, goal: str) -> Message:
-        """Cancel a goal."""
-
-    def updates(self, message: Message) -> Iterator[GoalUpdate]:
-        """The news in a message."""
-
-
 class Ros1Protocol:
     """Actions of ROS 1, whose goals and results are topics."""
 
-    has_status = True
+    has_status = True  # servers are heard while nothing goes on, so that silence means something
 
     def opening(self, server: str, action: str) -> Iterator[Message]:
         """Advertise what we publish, and subscribe to the rest."""
@@ -71,7 +52,7 @@ class Ros1Protocol:
             yield {"op": "subscribe", "topic": f"{server}/{name}", "type": of}
 
     def goal(self, server: str, _action: str, goal: str, fields: Message) -> Message:
-        """Publish a goal; the server accepts each id only once."""
+        """Publish a goal; sent again, it is the same goal, since a server accepts each id only once."""
         msg = {"goal_id": {"id": goal, "stamp": AT_ONCE}, "goal": fields}
         return {"op": "publish", "topic": f"{server}/goal", "msg": msg}
 
@@ -131,3 +112,6 @@ class Ros2Protocol:
                 yield GoalUpdate(goal, "ended", ENDS_ROS2.get(status, "lost"), values=values)
             case {"op": "action_result", "id": str(goal), "values": why}:  # it could not even be sent
                 yield GoalUpdate(goal, "ended", "lost", text=str(why))
+
+
+ActionProtocol: TypeAlias = Ros1Protocol | Ros2Protocol
