@@ -44,7 +44,7 @@ from codebotler.models.server_errors import (
     told_before,
     unreachable,
 )
-from codebotler.prompts import Message, Prompt, Shown
+from codebotler.prompts import Message, PictureMessage, Prompt
 
 OWN_SERVER = "openai-chat"  # what servers of one's own speak
 VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")
@@ -175,7 +175,7 @@ def messages_of(messages: tuple[Message, ...]) -> list[ModelMessage]:
 
 
 def _content(message: Message) -> str | list[UserContent]:
-    if isinstance(message, Shown):
+    if isinstance(message, PictureMessage):
         return [message.text, BinaryContent(message.jpeg, media_type="image/jpeg")]
     return message.text
 

@@ -14,7 +14,7 @@ from codebotler.models.rate_limit import RateLimited
 from codebotler.models.server_errors import brief
 from codebotler.perception.base import Box, PerceptionError, Sighting, named
 from codebotler.perception.image import jpeg_of
-from codebotler.prompts import Message, Prompt, Shown
+from codebotler.prompts import Message, PictureMessage, Prompt
 
 SYSTEM = """\
 You are the eyes of a robot. You get a picture from its camera and a JSON text that names an object or a
@@ -65,7 +65,7 @@ class ChatDetector:
             UserError: the label is no name.
             PerceptionError: no reply came, or none that can be used.
         """
-        shown = Shown("user", json.dumps(named(label)), jpeg_of(image))
+        shown = PictureMessage("user", json.dumps(named(label)), jpeg_of(image))
         messages: tuple[Message, ...] = (Message("system", SYSTEM), shown)
         fault = said = ""
         for number in range(TRIES):

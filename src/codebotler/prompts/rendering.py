@@ -1,57 +1,46 @@
-"""From an instruction to what a model is asked: chat messages, and one text that base models go on from."""
+"""Prompts: an instruction as chat messages, and as one text for base models to go on from."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from itertools import islice
 from pathlib import Path
 from string import Template
-from typing import Literal, TypeAlias
+from typing import Literal
 
 from codebotler.core.errors import expect_list
-from codebotler.core.program import TASK, parse
-from codebotler.core.skills import SKILLS, Skill, SkillTable
-
-Role: TypeAlias = Literal["system", "user", "assistant"]
+from codebotler.core.program import TASK
+from codebotler.core.skills import SKILLS, SkillTable
 
 FOLDER = Path(__file__).parent
 OPENING = f"def {TASK}():\n"
 MAX_LENGTH, MAX_TRIES = 100_000, 20  # of a reply, within which the end of its function is looked for
-STOP = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # four are as many as OpenAI's endpoint takes
+STOP = ("\ndef ", "\nclass ", "\n# Instruction", "\n```")  # OpenAI's endpoint takes no more than four
 
 
 @dataclass(frozen=True)
 class Message:
-    """One turn of a conversation with a chat model.
+    """One turn of a conversation with a chat model."""
 
-    Args:
-        role: who says it.
-        text: what is said.
-    """
-
-    role: Role
+    role: Literal["system", "user", "assistant"]
     text: str
 
 
 @dataclass(frozen=True)
-class Shown(Message):
-    """A turn that shows a chat model a picture, too.
-
-    Args:
-        jpeg: the picture, as a JPEG file.
-    """
+class PictureMessage(Message):
+    """A turn with a picture, as the bytes of a JPEG file."""
 
     jpeg: bytes
 
 
 @dataclass(frozen=True)
 class Example:
-    """An instruction and a program that does it, which show a model what is wanted."""
+    """An instruction and a right program for it, shown to the model in every prompt."""
 
     instruction: str
     program: str
@@ -59,29 +48,16 @@ class Example:
 
 @dataclass(frozen=True)
 class Prompt:
-    """What a model is asked for, in the two ways of asking.
-
-    Args:
-        instruction: what the robot is to do.
-        messages: for chat models.
-        text: for base models, which go on from where it ends, with `opening`.
-        stop: what base models stop in front of.
-        opening: the beginning of the program that base models go on with.
-    """
+    """A request for a program, in the form for chat models and in the form for base models."""
 
     instruction: str
-    messages: tuple[Message, ...] = field(repr=False)
-    text: str = field(repr=False)
-    stop: tuple[str, ...]
-    opening: str
+    messages: tuple[Message, ...] = field(repr=False)  # for chat models
+    text: str = field(repr=False)  # for base models; ends with `opening`
+    stop: tuple[str, ...]  # texts before which base models stop
+    opening: str  # the beginning of the program that base models go on with
 
     def after(self, program: str, problems: Sequence[str]) -> Prompt:
-        """The request to write a program again, without its problems.
-
-        Args:
-            program: what the model wrote before.
-            problems: what is wrong with it, each in a sentence.
-        """
+        """The request to write a program again without its problems, each of which is a sentence."""
         listed = "\n".join(f"- {problem}" for problem in problems)
         answer = Message("assistant", _fenced(program))
         repair = Message("user", _filled("repair", problems=listed))
@@ -95,38 +71,32 @@ class Prompt:
         )
 
     def program_from(self, reply: str) -> str:
-        """The program that a base model has written by going on from `text`, without what comes after it."""
+        """The program in a base model's continuation of `text`, without whatever follows it."""
         if re.match(rf"\s*(```|(async )?def {TASK}\b)", reply):
-            return reply  # it has begun anew
+            return reply  # it began anew
         return self.opening + reply[: task_end(self.opening, reply, self.stop)]
 
 
 def task_end(opening: str, reply: str, stop: Sequence[str] = STOP) -> int:
-    """Where the function that a reply goes on with ends.
+    """The index at which the function that `opening` begins ends in a reply.
 
-    It ends in front of a line that is not indented, unless that line belongs to a bracket or a text that is
-    still open; where nothing but what comes later can tell, it does not.
-
-    Args:
-        opening: what the reply goes on from.
-        reply: the text.
-        stop: what ends it anyhow.
+    It ends before a line without indentation, unless that line belongs to an open bracket or string.
     """
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
     for found in islice(re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_LENGTH)]), MAX_TRIES):
-        if _parses(opening + reply[: found.start()]):
+        if not isinstance(parsed(opening + reply[: found.start()]), Problem):
             return found.start()
     return end
 
 
 def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTable = SKILLS) -> Prompt:
-    """What to ask a model for an instruction.
+    """The request for a program that carries out an instruction.
 
     Args:
         instruction: what the robot is to do, in plain words.
         rooms: the names of all rooms, if they are known.
-        skills: what a program may call.
+        skills: the skills that a program may call.
 
     Raises:
         UserError: the rooms are a single text.
@@ -134,13 +104,13 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
     expect_list(rooms, "the rooms")
     about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
     wish = "\n\n".join(filter(None, (instruction.strip(), about_rooms)))
-    stubs = [_stub(skill) for skill in skills.values()]
+    stubs = [f'def {skill.signature}:\n    """{skill.doc}"""' for skill in skills.values()]
     shown = examples()
     messages = [Message("system", _filled("system", skills="\n\n".join(stubs)))]
     for example in shown:
-        messages.append(Message("user", _filled("instruction", instruction=example.instruction)))
+        messages.append(Message("user", example.instruction))
         messages.append(Message("assistant", _fenced(example.program)))
-    messages.append(Message("user", _filled("instruction", instruction=wish)))
+    messages.append(Message("user", wish))
     text = _filled(
         "completion",
         skills="\n\n\n".join(stubs),
@@ -157,27 +127,19 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
 
 @cache
 def examples() -> tuple[Example, ...]:
-    """The programs that every prompt shows, in the order of their files."""
-    return tuple(_examples())
+    """The examples in the order of their files."""
+    files = (path.read_text(encoding="utf-8") for path in sorted((FOLDER / "examples").glob("*.txt")))
+    parts = (text.partition("\n\n") for text in files)
+    return tuple(Example(instruction, program) for instruction, _, program in parts)
 
 
 @cache
 def template_hash(skills: SkillTable = SKILLS) -> str:
-    """The SHA-256, in hexadecimal, of all that shapes a prompt but the instruction.
-
-    Args:
-        skills: what a program may call.
-    """
+    """The SHA-256, in hexadecimal, of all that shapes a prompt except the instruction."""
     plain = prompt_for("INSTRUCTION", skills=skills)
     with_rooms = prompt_for("INSTRUCTION", rooms=("ROOM", "OTHER ROOM"), skills=skills)
     shapes = [plain, with_rooms, plain.after("PROGRAM", ["PROBLEM", "OTHER PROBLEM"])]
     return hashlib.sha256(json.dumps([asdict(shape) for shape in shapes]).encode()).hexdigest()
-
-
-def _examples() -> Iterator[Example]:
-    for path in sorted((FOLDER / "examples").glob("*.txt")):
-        instruction, _, program = path.read_text(encoding="utf-8").partition("\n\n")
-        yield Example(instruction, program)
 
 
 @cache
@@ -189,10 +151,6 @@ def _filled(name: str, **values: str) -> str:
     return _template(name).substitute(values).rstrip("\n")
 
 
-def _stub(skill: Skill) -> str:
-    return f'def {skill.signature}:\n    """{skill.doc}"""'
-
-
 def _fenced(program: str) -> str:
     longest = max((len(run) for run in re.findall("`{3,}", program)), default=2)
     fence = "`" * (longest + 1)
@@ -201,11 +159,3 @@ def _fenced(program: str) -> str:
 
 def _comment(text: str) -> str:
     return "\n".join(f"# {line}".rstrip() for line in text.splitlines())
-
-
-def _parses(source: str) -> bool:
-    try:
-        parse(source)
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return False
-    return True
