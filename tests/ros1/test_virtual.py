@@ -86,7 +86,7 @@ def test_all_reference_programs_do_on_a_ros_graph_what_they_do_in_the_simulator(
 ) -> None:
     model = recorded_model("recorded:careful")
     tasks = [(task.name, task.prompts[0], task.scenarios[0].world) for task in paper.tasks.values()]
-    programs = [model.reply(instruction, 0).program for _, instruction, _ in tasks]
+    programs = [model.solution(instruction, 0).program for _, instruction, _ in tasks]
     worlds = [world for _, _, world in tasks]
     simulated = list(run(zip(programs, worlds, strict=True), workers=1, rules=ROBOT_RULES))
     assert len(tasks) == 16

@@ -103,7 +103,7 @@ def verdicts(paper: Suite) -> dict[str, list[tuple[Completion, Solution, dict[st
         replies = recorded_model(f"recorded:{model}")
         for completion, row in zip(completions, evaluate(completions, paper, workers=2), strict=True):
             assert completion.instruction is not None
-            yield completion, replies.reply(completion.instruction, completion.index), {**row}
+            yield completion, replies.solution(completion.instruction, completion.index), {**row}
 
     return {model: list(judged(model)) for model in MODELS}
 

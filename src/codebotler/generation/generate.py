@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import counted
 from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unheard
 from codebotler.models.open import open_model
-from codebotler.models.rate_limit import RateLimited
+from codebotler.models.recorded import RecordedModel
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
@@ -109,7 +109,7 @@ async def write_program(
         BudgetSpentError: no further request may be made.
     """
     attempts: list[Attempt] = []
-    limited, request = RateLimited(model, concurrency=1), prompt
+    limited, request = _retrying(model), prompt
     try:
         for number in range(retries + 1):
             reply = await limited.reply(request, number=number, heard=heard)
@@ -125,6 +125,15 @@ async def write_program(
     finally:
         await model.close()
     return Generation(tuple(attempts))
+
+
+def _retrying(model: Model) -> Model:
+    """The model, asked again after errors of its server; a recorded one has none, and needs no extra."""
+    if isinstance(model, RecordedModel):
+        return model
+    from codebotler.models.rate_limit import RateLimited
+
+    return RateLimited(model, concurrency=1)
 
 
 def write_checked_program(

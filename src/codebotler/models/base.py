@@ -1,8 +1,7 @@
-"""What all ways of talking to a model have in common."""
+"""The `Model` protocol, and what every model takes, returns and raises."""
 
 from __future__ import annotations
 
-import asyncio
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -12,31 +11,25 @@ from urllib.parse import urlsplit
 
 from codebotler.core.errors import UserError
 from codebotler.prompts import Prompt
-from codebotler.prompts.extract import program_of
 
 Heard: TypeAlias = Callable[[str], None]
-
-HUGE = 20_000  # characters
-A_URL = "write one like http://localhost:8000/v1"
-NOT_IN_URL = "keys belong into the environment, not into a URL, which is recorded with a run"
+HOTTEST = 100  # a higher temperature is a typo
 
 
 @dataclass(frozen=True)
 class SamplingSettings:
-    """How a model is to be asked.
+    """How a model is asked.
 
     Args:
         temperature: from 0 (always the likeliest token) up to about 2; None leaves it to the model.
-        top_p: the share of likely tokens that are drawn from, above 0 and up to 1; None leaves it to the
-            model.
-        max_tokens: how long a reply may be, in tokens, at least 1.
-        seed: what fixes the random numbers, where a model takes a seed; reply number n is asked for with
-            `seed + n`.
-        timeout: how many seconds one request may take altogether.
+        top_p: the share of likely tokens to draw from, above 0 and up to 1; None leaves it to the model.
+        max_tokens: the limit for a reply, in tokens, at least 1.
+        seed: fixes the random numbers, where a model takes a seed; reply number n gets `seed + n`.
+        timeout: the limit for one whole request, in seconds.
         base_url: where the model is served, such as `http://localhost:8000/v1`; None for the provider's own.
 
     Raises:
-        UserError: one of them is out of its range.
+        UserError: a value is out of its range.
     """
 
     temperature: float | None = 0.2
@@ -47,8 +40,8 @@ class SamplingSettings:
     base_url: str | None = None
 
     def __post_init__(self) -> None:
-        if self.temperature is not None and not 0 <= self.temperature <= 100:  # noqa: PLR2004 - a typo beyond it
-            raise UserError(f"the temperature is {self.temperature:g}, but it must be between 0 and 100")
+        if self.temperature is not None and not 0 <= self.temperature <= HOTTEST:
+            raise UserError(f"the temperature is {self.temperature:g}, but it must be from 0 to {HOTTEST}")
         if self.top_p is not None and not 0 < self.top_p <= 1:
             raise UserError(f"top-p is {self.top_p:g}, but it must be above 0 and at most 1")
         if self.max_tokens < 1:
@@ -64,40 +57,46 @@ class SamplingSettings:
 
 
 def _check_url(url: str) -> None:
-    # Nothing of it is quoted: where it is mistyped, nobody knows which part of it is a password.
+    # Nothing of the URL is quoted: where it is mistyped, any part of it may be a password.
     if any(mark in url for mark in "@?#"):
-        raise UserError(f"the base URL has a user name, a password, a query or a fragment; {NOT_IN_URL}")
+        raise UserError(
+            "the base URL has a user name, a password, a query or a fragment; leave them out, for the URL is "
+            "recorded with a run, and put the key into the environment"
+        )
     try:
         parts = urlsplit(url)
-        _ = parts.port
-    except ValueError:
-        raise UserError(f"the base URL has no valid host and port; {A_URL}") from None
-    if parts.scheme not in {"http", "https"} or not parts.hostname:
-        raise UserError(f"the base URL does not begin with http:// or https:// and a host; {A_URL}")
+        is_valid = parts.scheme in {"http", "https"} and parts.hostname and parts.port != 0
+    except ValueError:  # a bracket or a port that is none
+        is_valid = False
+    if not is_valid:
+        raise UserError(
+            "the base URL is not http:// or https:// with a host and port; "
+            "write one like http://localhost:8000/v1"
+        )
 
 
 @dataclass(frozen=True)
 class Usage:
-    """How many tokens a request took; None where the model does not say."""
+    """The tokens that a request took; None where the model does not count them."""
 
     input_tokens: int | None = None
     output_tokens: int | None = None
 
     @property
     def total(self) -> int:
-        """All tokens that are known of."""
+        """All known tokens."""
         return (self.input_tokens or 0) + (self.output_tokens or 0)
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What a model answered.
+    """A model's reply.
 
     Args:
-        text: all it said.
-        program: the program it means; any text, which need not even parse.
-        usage: how many tokens it took.
-        latency_s: how many seconds passed from the request to the end of the reply.
+        text: the whole reply.
+        program: the program in it; any text, which need not even parse.
+        usage: the tokens that it took.
+        latency_s: the seconds from the request to the end of the reply.
         finish_reason: why it ended, such as `stop` or `length`; None where the model does not say.
     """
 
@@ -108,54 +107,46 @@ class Reply:
     finish_reason: str | None
 
 
-async def program_in(text: str) -> str:
-    """The program that a text means; a huge text takes seconds, in which other replies go on coming in."""
-    if len(text) < HUGE:
-        return program_of(text).source
-    return (await asyncio.to_thread(program_of, text)).source
-
-
 def unheard(_piece: str) -> None:
-    """Listen to nothing."""
+    """Ignore a piece of a reply."""
 
 
 class Model(Protocol):
-    """Anything that writes programs when it is asked to.
+    """Anything that writes programs on request.
 
-    It may be asked for several replies at the same time, all from one event loop; a request that is cancelled
-    is given up.
+    It takes several requests at a time, all from one event loop; a cancelled request is given up.
     """
 
     @property
     def name(self) -> str:
-        """What it is called on a command line and in a run."""
+        """The name on a command line and in a run, such as `openai-chat:gpt-5.1`."""
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
-        """Ask for one reply.
+        """Request one reply.
 
         Args:
-            prompt: what is asked.
+            prompt: the request.
             number: which sample of this prompt it is, counted from 0.
-            heard: told each piece of the text when it comes in. Where a reply is asked for again after an
-                error, the pieces come again as well.
+            heard: called with each piece of the text as it arrives, and from the beginning again when the
+                request is repeated after an error.
 
         Raises:
-            ModelError: no whole reply came.
+            ModelError: no whole reply arrived.
         """
 
     async def close(self) -> None:
-        """Give back what it holds; no request may be under way."""
+        """Release its connections and memory; no request may be under way."""
 
 
 class ModelError(Exception):
     """A model did not reply.
 
-    A reply without a program in it is none of these: that is the model's fault, and counts against it.
+    A reply without a program is none of these: it counts as a completion.
 
     Args:
-        sentence: what went wrong, and where it helps, the mend; it quotes no keys.
+        sentence: what went wrong and, where it helps, the mend; it holds no keys.
         may_pass: whether the same request may succeed later.
-        retry_after: how many seconds the other side wants to be left in peace; None where it does not say.
+        retry_after: the seconds to wait that the server asks for, if it does.
     """
 
     def __init__(self, sentence: str, *, may_pass: bool, retry_after: float | None = None) -> None:
@@ -168,11 +159,11 @@ class ModelError(Exception):
 
 
 class BudgetSpentError(Exception):
-    """No further request may be made, because as many tokens are used as were allowed.
+    """The token budget is spent, so no further request is made.
 
     Args:
-        budget: how many were allowed.
-        used: how many are used.
+        budget: the allowed tokens.
+        used: the used tokens.
     """
 
     def __init__(self, budget: int, used: int) -> None:

@@ -8,62 +8,43 @@ import re
 import time
 from collections.abc import Callable
 
-from pydantic_ai import exceptions
+from pydantic_ai import exceptions, messages
 from pydantic_ai.direct import model_request_stream
-from pydantic_ai.messages import (
-    BinaryContent,
-    ModelMessage,
-    ModelRequest,
-    ModelResponse,
-    PartDeltaEvent,
-    PartStartEvent,
-    SystemPromptPart,
-    TextPart,
-    TextPartDelta,
-    UserContent,
-    UserPromptPart,
-)
-from pydantic_ai.models import Model as Spoken
-from pydantic_ai.models import infer_model, known_model_names
+from pydantic_ai.models import Model, infer_model, known_model_names
 from pydantic_ai.models.openai import OpenAIChatModel
 from pydantic_ai.providers import Provider, gateway, infer_provider, infer_provider_class
 from pydantic_ai.settings import ModelSettings
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, program_in, unheard
-from codebotler.models.keys import blank_is_unset, key_in
-from codebotler.models.redaction import guard_logs, without_keys
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.keys import blank_is_unset, guard_logs, key_in, without_keys
 from codebotler.models.reply_limit import bound, limit_of
 from codebotler.models.server_errors import (
     brief,
     broken_off,
-    fault,
-    late,
+    failure,
+    model_error_in,
     refused,
-    retry_after,
-    told_before,
+    timed_out,
     unreachable,
 )
 from codebotler.prompts import Message, PictureMessage, Prompt
+from codebotler.prompts.extract import program_of
 
-OWN_SERVER = "openai-chat"  # what servers of one's own speak
+OWN_SERVER = "openai-chat"  # the protocol of vLLM, llama.cpp and the like
 VARIABLE = re.compile(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`")
 KEY_VARIABLE = re.compile(r"\b[A-Z][A-Z0-9]*_[A-Z0-9_]*(?:KEY|TOKEN)[A-Z0-9_]*")
 INSTALL = re.compile(r'pip install "?[\w\[\],.-]+"?')
 TRANSPORTS = ("httpx", "httpx2", "httpcore", "httpcore2", "anyio", "ssl")
 
 
-class Chat:
-    """A model that one talks to.
+class ChatModel:
+    """A chat model, named `provider:model` as in pydantic-ai.
 
-    Args:
-        name: `provider:model` as pydantic-ai spells it. With a base URL `openai:` is `openai-chat:`, since
-            servers of one's own speak chat completions, and hardly any the Responses API.
-        settings: how it is to be asked.
+    With a base URL `openai:` means `openai-chat:`, for hardly any other server has the Responses API.
 
     Raises:
-        UserError: there is no such provider, its key is not in the environment or cannot be sent, or its
-            library is missing.
+        UserError: there is no such provider, its key is missing or cannot be sent, or its library is missing.
     """
 
     def __init__(self, name: str, settings: SamplingSettings) -> None:
@@ -71,7 +52,7 @@ class Chat:
         if provider == "openai" and settings.base_url is not None:
             name = f"{OWN_SERVER}:{model}"
         self.name, self.settings = name, settings
-        self.spoken = _spoken(name, settings)
+        self._model = _model(name, settings)
         asked = ModelSettings(
             max_tokens=settings.max_tokens,
             timeout=settings.timeout,
@@ -82,123 +63,111 @@ class Chat:
             asked["temperature"] = settings.temperature
         if settings.top_p is not None:
             asked["top_p"] = settings.top_p
-        self._unsupported = self.spoken.unsupported_settings
-        for guarantee in ("timeout", "max_retries"):  # it warns of what it cannot keep
-            if guarantee in self._unsupported:
+        for guarantee in ("timeout", "max_retries"):  # pydantic-ai warns of what it cannot keep
+            if guarantee in self._model.unsupported_settings:
                 del asked[guarantee]
         self._asked = asked
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
-        """Ask for one reply.
-
-        Raises:
-            ModelError: no whole reply came.
-        """
+        """Request one reply."""
         start = time.monotonic()
         asked = self._asked
         if (seed := self.settings.seed_of(number)) is not None:
             asked = ModelSettings(**asked, seed=seed)
         try:
-            response = await self._ask(messages_of(prompt.messages), asked, heard)
+            response = await self._response(messages_of(prompt.messages), asked, heard)
         except ModelError:
             raise
-        except Exception as error:  # noqa: BLE001 - libraries of many providers, each with errors of its own
-            raise (told_before(error) or self._told(error)) from None
+        except Exception as error:  # noqa: BLE001 - each provider's library has errors of its own
+            raise (model_error_in(error) or self._error(error)) from None
         text = without_keys(response.text or "")
-        program = await program_in(text)
-        return Reply(text, program, _usage(response), time.monotonic() - start, response.finish_reason)
+        latency = time.monotonic() - start
+        return Reply(text, program_of(text).source, _usage(response), latency, response.finish_reason)
 
     async def close(self) -> None:
         """Close the connections."""
-        async with self.spoken:  # what it holds is closed by whoever leaves last
+        async with self._model:  # leaving it closes them
             pass
 
-    async def _ask(self, messages: list[ModelMessage], asked: ModelSettings, heard: Heard) -> ModelResponse:
-        async with model_request_stream(self.spoken, messages, model_settings=asked) as stream:
+    async def _response(
+        self, asked: list[messages.ModelMessage], settings: ModelSettings, heard: Heard
+    ) -> messages.ModelResponse:
+        async with model_request_stream(self._model, asked, model_settings=settings) as stream:
             async for event in stream:
                 match event:
-                    case PartStartEvent(part=TextPart(content=piece)) if piece:
+                    case messages.PartStartEvent(part=messages.TextPart(content=piece)) if piece:
                         heard(piece)
-                    case PartDeltaEvent(delta=TextPartDelta(content_delta=piece)) if piece:
+                    case messages.PartDeltaEvent(delta=messages.TextPartDelta(content_delta=piece)) if piece:
                         heard(piece)
             response = stream.get()
-        # A stream that ends early, but in good order, is told from a whole one only by what it lacks; for
+        # A stream that ends too early, but in good order, differs from a whole one only by what it lacks; for
         # chat completions pydantic-ai makes up a reason for the end.
-        made_up = isinstance(self.spoken, OpenAIChatModel) and "finish_reason" not in (
-            response.provider_details or {}
-        )
-        if made_up or response.finish_reason is None or response.state != "complete":
+        details = response.provider_details or {}
+        is_made_up = isinstance(self._model, OpenAIChatModel) and "finish_reason" not in details
+        if is_made_up or response.finish_reason is None or response.state != "complete":
             raise broken_off(self.name, begun=bool(response.parts))
         return response
 
-    def _told(self, error: Exception) -> ModelError:
-        if isinstance(error, exceptions.ModelTimeoutError | exceptions.ModelRequestTimeout):
-            return late(self.name, self.settings.timeout)
-        if isinstance(error, exceptions.ModelHTTPError):
-            peace = retry_after(error.headers or {})
-            return refused(
-                self.name,
-                error.status_code,
-                error.body,
-                retry_after=error.retry_after if peace is None else peace,
-                hopeless=isinstance(error, exceptions.ModelQuotaExceededError),
-            )
-        if isinstance(error, exceptions.ModelAPIError):
-            hopeless = isinstance(
-                error, exceptions.ModelRequestRejectedError | exceptions.ModelQuotaExceededError
-            )
-            nobody = unreachable(self.name, error, self.settings.base_url)
-            return nobody or fault(self.name, error, may_pass=not hopeless)
-        if isinstance(error, exceptions.ContentFilterError | exceptions.UserError):
-            return fault(self.name, error, may_pass=False)
-        if isinstance(error, exceptions.UnexpectedModelBehavior):
-            return broken_off(self.name, begun=False)
+    def _error(self, error: Exception) -> ModelError:
+        is_hopeless = isinstance(
+            error, exceptions.ModelRequestRejectedError | exceptions.ModelQuotaExceededError
+        )
+        match error:
+            case exceptions.ModelTimeoutError() | exceptions.ModelRequestTimeout():
+                return timed_out(self.name, self.settings.timeout)
+            case exceptions.ModelHTTPError(status_code=status, body=body, retry_after=wait):
+                return refused(self.name, status, body, retry_after=wait, hopeless=is_hopeless)
+            case exceptions.ModelAPIError():
+                nobody = unreachable(self.name, error, self.settings.base_url)
+                return nobody or failure(self.name, error, may_pass=not is_hopeless)
+            case exceptions.ContentFilterError() | exceptions.UserError():
+                return failure(self.name, error, may_pass=False)
+            case exceptions.UnexpectedModelBehavior():
+                return broken_off(self.name, begun=False)
         is_transport = isinstance(error, OSError) or type(error).__module__.split(".")[0] in TRANSPORTS
-        return fault(self.name, f"{type(error).__name__}: {brief(error)}", may_pass=is_transport)
+        return failure(self.name, f"{type(error).__name__}: {brief(error)}", may_pass=is_transport)
 
 
-def messages_of(messages: tuple[Message, ...]) -> list[ModelMessage]:
-    """A conversation as pydantic-ai has it."""
-    spoken: list[ModelMessage] = []
-    for message in messages:
+def messages_of(conversation: tuple[Message, ...]) -> list[messages.ModelMessage]:
+    """A conversation in the types of pydantic-ai."""
+    made: list[messages.ModelMessage] = []
+    for message in conversation:
         if message.role == "assistant":
-            spoken.append(ModelResponse(parts=[TextPart(message.text)]))
+            made.append(messages.ModelResponse(parts=[messages.TextPart(message.text)]))
             continue
         is_system = message.role == "system"
-        part = SystemPromptPart(message.text) if is_system else UserPromptPart(_content(message))
-        if spoken and isinstance(spoken[-1], ModelRequest):
-            spoken[-1] = ModelRequest(parts=[*spoken[-1].parts, part])
+        part = messages.SystemPromptPart(message.text) if is_system else _user_part(message)
+        if made and isinstance(made[-1], messages.ModelRequest):
+            made[-1] = messages.ModelRequest(parts=[*made[-1].parts, part])
         else:
-            spoken.append(ModelRequest(parts=[part]))
-    return spoken
+            made.append(messages.ModelRequest(parts=[part]))
+    return made
 
 
-def _content(message: Message) -> str | list[UserContent]:
-    if isinstance(message, PictureMessage):
-        return [message.text, BinaryContent(message.jpeg, media_type="image/jpeg")]
-    return message.text
+def _user_part(message: Message) -> messages.UserPromptPart:
+    if not isinstance(message, PictureMessage):
+        return messages.UserPromptPart(message.text)
+    picture = messages.BinaryContent(message.jpeg, media_type="image/jpeg")
+    return messages.UserPromptPart([message.text, picture])
 
 
-def _usage(response: ModelResponse) -> Usage:
-    told = response.usage
-    if told.unmeasured_requests or not (told.input_tokens or told.output_tokens):
+def _usage(response: messages.ModelResponse) -> Usage:
+    usage = response.usage
+    if usage.unmeasured_requests or not (usage.input_tokens or usage.output_tokens):
         return Usage()
-    return Usage(told.input_tokens, told.output_tokens)
+    return Usage(usage.input_tokens, usage.output_tokens)
 
 
-def _spoken(name: str, settings: SamplingSettings) -> Spoken:
+# --- opening
+
+
+def _model(name: str, settings: SamplingSettings) -> Model:
     provider = name.partition(":")[0]
     try:
-        made = infer_provider_class(provider)
-    except ValueError:
-        raise UserError(_unknown(provider)) from None
-    except ImportError as error:
-        raise UserError(_not_installed(name, error)) from None
-    variables = _key_variables(provider, made)
-    for variable in variables:
-        key_in(variable)
-    try:
+        variables = _key_variables(provider)
+        for variable in variables:
+            key_in(variable)
         with blank_is_unset(variables):
             return infer_model(
                 name, lambda wanted: _bounded(_provider(wanted, settings.base_url), name, settings)
@@ -206,15 +175,31 @@ def _spoken(name: str, settings: SamplingSettings) -> Spoken:
     except UserError:
         raise
     except ImportError as error:
-        raise UserError(_not_installed(name, error)) from None
-    except Exception as error:  # noqa: BLE001 - libraries of many providers, each with errors of its own
-        raise UserError(_not_set(name, error)) from None
+        command = INSTALL.search(str(error))
+        mend = f"install it with: {command[0]}" if command else brief(error)
+        raise UserError(f"{name} needs a library that is not installed; {mend}") from None
+    except Exception as error:  # noqa: BLE001 - each provider's library has errors of its own
+        missing = VARIABLE.search(str(error))
+        if missing is None:
+            raise UserError(f"{name} cannot be used: {brief(error)}") from None
+        raise UserError(f"{name} needs the key in {missing[1]}; set it in the environment") from None
 
 
-def _key_variables(provider: str, made: type[Provider[object]]) -> list[str]:
-    """The variables that a provider takes its key from; nothing but its source tells them all."""
+def _key_variables(provider: str) -> list[str]:
+    """The variables that a provider takes its key from, which only its source names."""
+    try:
+        made = infer_provider_class(provider)
+    except ValueError:
+        raise UserError(_unknown(provider)) from None
     source = inspect.getsource(gateway if provider.startswith("gateway/") else made)
     return sorted(set(KEY_VARIABLE.findall(source)))
+
+
+def _unknown(provider: str) -> str:
+    known = sorted({known.partition(":")[0] for known in known_model_names() if ":" in known})
+    close = difflib.get_close_matches(provider, known, n=1)
+    mend = f'did you mean "{close[0]}"?' if close else "use one such as openai-chat, anthropic or google"
+    return f'there is no provider "{provider}"; {mend}'
 
 
 def _provider(name: str, base_url: str | None) -> Provider[object]:
@@ -223,38 +208,17 @@ def _provider(name: str, base_url: str | None) -> Provider[object]:
     made: Callable[..., Provider[object]] = infer_provider_class(name)
     if name.startswith("gateway/") or "base_url" not in inspect.signature(made).parameters:
         raise UserError(
-            f'the provider "{name}" takes no base URL; for a server of your own name {OWN_SERVER}:MODEL'
+            f'the provider "{name}" takes no base URL; for a server of your own use {OWN_SERVER}:MODEL'
         )
     return made(base_url=base_url)
 
 
 def _bounded(provider: Provider[object], name: str, settings: SamplingSettings) -> Provider[object]:
-    """A provider whose own client takes no endless reply, and neither does one that takes its place."""
-    first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - nothing else tells
-    if first is None or make is None:  # what talks to it is no client of HTTP, or one that a library keeps
+    """The provider, with a limit on the replies that its client takes, and any client that replaces it."""
+    first, make = provider._own_http_client, provider._http_client_factory  # noqa: SLF001 - no public way
+    if first is None or make is None:  # it uses no client of HTTP, or a library keeps that to itself
         return provider
-
     limit = limit_of(settings.max_tokens)
     bound(first, name, limit)
     provider._http_client_factory = lambda: bound(make(), name, limit)  # noqa: SLF001
     return provider
-
-
-def _unknown(provider: str) -> str:
-    known = sorted({known.partition(":")[0] for known in known_model_names() if ":" in known})
-    close = difflib.get_close_matches(provider, known, n=1)
-    known_ones = "name one that pydantic-ai knows, such as openai-chat, anthropic or google"
-    return f'there is no provider "{provider}"; ' + (f'is "{close[0]}" meant?' if close else known_ones)
-
-
-def _not_installed(name: str, error: ImportError) -> str:
-    command = INSTALL.search(str(error))
-    mend = f"install it with: {command[0]}" if command else brief(error)
-    return f"{name} needs a library that is not installed; {mend}"
-
-
-def _not_set(name: str, error: Exception) -> str:
-    variable = VARIABLE.search(str(error))
-    if variable is None:
-        return f"{name} cannot be asked: {brief(error)}"
-    return f"{name} needs {variable[1]} in the environment"

@@ -1,4 +1,4 @@
-"""Base models behind an endpoint of text completions, which vLLM, TGI and llama.cpp speak as well."""
+"""Base models behind a text-completion endpoint, as served by vLLM, TGI and llama.cpp."""
 
 from __future__ import annotations
 
@@ -7,46 +7,40 @@ import json
 import time
 
 import openai
-from openai.types import Completion
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, program_in, unheard
-from codebotler.models.keys import key_in
-from codebotler.models.redaction import guard_logs, without_keys
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.keys import guard_logs, key_in, without_keys
 from codebotler.models.reply_limit import bound, limit_of
 from codebotler.models.server_errors import (
     broken_off,
-    fault,
-    late,
+    failure,
+    model_error_in,
     refused,
     retry_after,
-    told_before,
+    timed_out,
     unreachable,
 )
 from codebotler.prompts import Prompt
+from codebotler.prompts.extract import program_of
 
 KEY = "OPENAI_API_KEY"
-NO_KEY = "none"  # servers of one's own ask for no key, but the client wants one
+NO_KEY = "none"  # for servers that want none, since the client does
 NO_MONEY = "insufficient_quota"  # a 429 that no waiting mends
 
 
-class Completions:
-    """A model that goes on from a text.
-
-    Args:
-        model: what the server calls it.
-        settings: how it is to be asked.
+class CompletionsModel:
+    """A base model on a server, which continues a text.
 
     Raises:
-        UserError: neither a URL nor a key is given, or the key cannot be sent.
+        UserError: there is neither a base URL nor a key, or the key cannot be sent.
     """
 
     def __init__(self, model: str, settings: SamplingSettings) -> None:
+        self.name = f"completions:{model}"
         key = key_in(KEY)
         if settings.base_url is None and not key:
-            raise UserError(
-                f"completions:{model} needs --base-url, or {KEY} in the environment for OpenAI's own"
-            )
+            raise UserError(f"{self.name} needs --base-url, or {KEY} in the environment for OpenAI's own")
         self.model, self.settings = model, settings
         self.client = openai.AsyncOpenAI(
             api_key=key or NO_KEY,
@@ -57,38 +51,29 @@ class Completions:
         )
         guard_logs()
 
-    @property
-    def name(self) -> str:
-        """Such as `completions:codellama/CodeLlama-34b-Python-hf`."""
-        return f"completions:{self.model}"
-
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
-        """Ask for one reply.
-
-        Raises:
-            ModelError: no whole reply came.
-        """
+        """Request one reply."""
         start = time.monotonic()
         try:
             async with asyncio.timeout(self.settings.timeout):
-                text, finish_reason, usage = await self._ask(prompt, number, heard)
+                text, finish_reason, usage = await self._continuation(prompt, number, heard)
         except TimeoutError:
-            raise late(self.name, self.settings.timeout) from None
+            raise timed_out(self.name, self.settings.timeout) from None
         except openai.OpenAIError as error:
-            raise (told_before(error) or self._told(error)) from None
+            raise (model_error_in(error) or self._error(error)) from None
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise fault(self.name, f"the server sent no valid JSON ({error})", may_pass=True) from None
+            raise failure(self.name, f"the server sent no valid JSON ({error})", may_pass=True) from None
         if finish_reason is None:
             raise broken_off(self.name, begun=bool(text))
         text = without_keys(text)
-        program = await program_in(prompt.program_from(text))
+        program = program_of(prompt.program_from(text)).source
         return Reply(text, program, usage, time.monotonic() - start, finish_reason)
 
     async def close(self) -> None:
         """Close the connections."""
         await self.client.close()
 
-    async def _ask(self, prompt: Prompt, number: int, heard: Heard) -> tuple[str, str | None, Usage]:
+    async def _continuation(self, prompt: Prompt, number: int, heard: Heard) -> tuple[str, str | None, Usage]:
         settings = self.settings
         seed = settings.seed_of(number)
         pieces: list[str] = []
@@ -107,7 +92,8 @@ class Completions:
         )
         async with stream:
             async for chunk in stream:
-                usage = _usage(chunk) or usage
+                if chunk.usage:
+                    usage = Usage(chunk.usage.prompt_tokens, chunk.usage.completion_tokens)
                 for choice in chunk.choices:
                     if choice.finish_reason:  # null until the last piece
                         finish_reason = choice.finish_reason
@@ -116,9 +102,9 @@ class Completions:
                         heard(choice.text)
         return "".join(pieces), finish_reason, usage
 
-    def _told(self, error: openai.OpenAIError) -> ModelError:
+    def _error(self, error: openai.OpenAIError) -> ModelError:
         if isinstance(error, openai.APITimeoutError):
-            return late(self.name, self.settings.timeout)
+            return timed_out(self.name, self.settings.timeout)
         if isinstance(error, openai.APIStatusError):
             return refused(
                 self.name,
@@ -128,9 +114,4 @@ class Completions:
                 hopeless=error.code == NO_MONEY,
             )
         nobody = unreachable(self.name, error, self.settings.base_url)
-        return nobody or fault(self.name, error, may_pass=True)  # what is told within a stream has no status
-
-
-def _usage(chunk: Completion) -> Usage | None:
-    told = chunk.usage
-    return None if told is None else Usage(told.prompt_tokens, told.completion_tokens)
+        return nobody or failure(self.name, error, may_pass=True)  # an error within a stream has no status

@@ -6,74 +6,70 @@ import asyncio
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import jinja2
 import torch
 import transformers
 
 from codebotler.core.errors import UserError
-from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, program_in, unheard
-from codebotler.models.redaction import guard_logs
-from codebotler.models.server_errors import brief, fault
+from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
+from codebotler.models.keys import guard_logs
+from codebotler.models.server_errors import brief, failure
 from codebotler.prompts import Message, Prompt
+from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import task_end
 
-BATCH = 32  # requests in one go, if so many wait
+BLOCK = 10  # replies to a prompt that share a seed; runs usually have a multiple of ten for each prompt
+BATCH = 32  # replies without a seed that are written together
 GATHER = 0.01  # seconds in which requests that are made together come in
-HALF = "\ufffd"  # stands for a character of which only some bytes have come
+
+Ending: TypeAlias = tuple[str, Usage, str] | ModelError  # text, tokens and finish reason
 
 
 @dataclass(eq=False)
 class _Job:
-    """A request that waits for its reply, or gets it.
+    """A reply to be written, for a request or as the rest of a block."""
 
-    Args:
-        text: what the model goes on from.
-        prompt: what it was made of.
-        seed: what fixes its random numbers.
-        heard: told each piece of the reply.
-        reply: text, usage and the reason why it ended, once it has; done as well when it is given up.
-    """
-
-    text: str
     prompt: Prompt
-    seed: int | None
-    heard: Heard
-    reply: asyncio.Future[tuple[str, Usage, str]]
-    told: int = field(default=0, init=False)
+    text: str  # what the model continues
+    number: int
+    ending: asyncio.Future[Ending]
+    heard: Heard | None = None  # None while nobody has requested this reply
+    told: int = 0  # characters that were passed to `heard`
+
+    @property
+    def is_wanted(self) -> bool:
+        return self.heard is not None and not self.ending.done()
 
     def tell(self, text: str) -> None:
-        """Pass on what is new of a text, from the thread that makes it."""
-        piece, self.told = text[self.told :], max(self.told, len(text))
-        if piece and not self.reply.done():
-            self.reply.get_loop().call_soon_threadsafe(self.heard, piece)
-
-    def end(self, result: tuple[str, Usage, str] | ModelError) -> None:
-        """Pass on the reply, or why there is none, from the thread that makes it."""
-        self.reply.get_loop().call_soon_threadsafe(self._end, result)
-
-    def _end(self, result: tuple[str, Usage, str] | ModelError) -> None:
-        if self.reply.done():
-            return
-        if isinstance(result, ModelError):
-            self.reply.set_exception(result)
-        else:
-            self.reply.set_result(result)
+        """Pass on the new part of a text, from the thread of the model."""
+        if self.heard is not None and self.is_wanted and len(text) > self.told:
+            self.ending.get_loop().call_soon_threadsafe(self.heard, text[self.told :])
+            self.told = len(text)
 
 
-class Local:
+class _CancelledError(Exception):
+    pass
+
+
+def _expect_wanted(batch: Sequence[_Job]) -> None:
+    if not any(job.is_wanted for job in batch):
+        raise _CancelledError
+
+
+class LocalModel:
     """A causal language model in this process, on a GPU where there is one.
 
-    Requests that wait at the same time are one batch. With a seed the same number gets the same reply,
-    whichever requests it shares a batch with, up to rounding. A tokenizer with a chat template is given
-    messages, any other the text for base models, whose reply ends where the function ends.
+    It is a chat model if its tokenizer has a chat template, otherwise a base model. With a seed, replies are
+    written in blocks whose bounds depend on nothing but the numbers of the replies, so that each number gets
+    the same reply whether or not a run was interrupted. Without one, requests that wait together are a batch.
 
     Args:
         path: a folder, or a name on the Hugging Face hub.
-        settings: how it is to be asked; a timeout has no meaning here.
+        settings: how it is asked; the timeout is ignored.
 
     Raises:
         UserError: it cannot be loaded, or a base URL is given.
@@ -83,236 +79,199 @@ class Local:
         self.name, self.settings = f"hf:{path}", settings
         if settings.base_url is not None:
             raise UserError(f"{self.name} runs on this machine and takes no --base-url")
-        if path.startswith((".", "/", "~")) and not Path(path).expanduser().is_dir():
-            raise UserError("there is no such folder of a model", file=path)
-        self.device, dtype = _place()
+        source = source_of(path)
+        self.device, dtype = _device()
         transformers.utils.logging.disable_progress_bar()
-        where = str(Path(path).expanduser())
         try:
-            self.tokenizer = transformers.AutoTokenizer.from_pretrained(where, padding_side="left")
-            model = transformers.AutoModelForCausalLM.from_pretrained(where, dtype=dtype)
+            self.tokenizer = transformers.AutoTokenizer.from_pretrained(source, padding_side="left")
+            model = transformers.AutoModelForCausalLM.from_pretrained(source, dtype=dtype)
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
             raise UserError(f"{self.name} cannot be loaded: {brief(error)}") from None
         self.model = model.to(self.device).eval()
         if self.tokenizer.pad_token_id is None:
             self.tokenizer.pad_token = self.tokenizer.eos_token or self.tokenizer.convert_ids_to_tokens(0)
         self.is_chat = bool(self.tokenizer.chat_template)
-        self.ends = _ends(model.generation_config.eos_token_id, self.tokenizer.eos_token_id)
+        ends = model.generation_config.eos_token_id
+        ends = ends if isinstance(ends, list) else [ends]
+        self.ends = {*ends, self.tokenizer.eos_token_id} - {None}
         self.longest = getattr(model.config, "max_position_embeddings", None) or sys.maxsize
+        self.is_seeded = settings.seed is not None and settings.temperature != 0
         self._waiting: list[_Job] = []
+        self._unclaimed: dict[tuple[str, int], _Job] = {}  # the rest of blocks
         self._worker: asyncio.Task[None] | None = None
         guard_logs()
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
-        """Ask for one reply.
-
-        Raises:
-            ModelError: the prompt is too long for the model, or the memory too small.
-        """
+        """Request one reply."""
         start = time.monotonic()
-        loop = asyncio.get_running_loop()
-        text = self._text(prompt)
-        length = len(self._tokens(text)["input_ids"])
-        if length >= self.longest:
-            sentence = f"the prompt has {length:,} tokens, but the model takes only {self.longest:,}"
-            raise fault(self.name, sentence, may_pass=False)
-        job = _Job(text, prompt, self.settings.seed_of(number), heard, loop.create_future())
-        self._waiting.append(job)
+        job = self._job(prompt, number)
+        job.heard = heard
         if self._worker is None or self._worker.done():
-            self._worker = loop.create_task(self._work())
-        text, usage, finish_reason = await job.reply
-        program = await program_in(text if self.is_chat else prompt.program_from(text))
+            self._worker = asyncio.create_task(self._work())
+        ending = await job.ending
+        if isinstance(ending, ModelError):
+            raise ending
+        text, usage, finish_reason = ending
+        if rest := text[job.told :]:
+            heard(rest)
+        program = program_of(text if self.is_chat else prompt.program_from(text)).source
         return Reply(text, program, usage, time.monotonic() - start, finish_reason)
 
     async def close(self) -> None:
-        """Give the model back."""
+        """Release the memory of the model."""
         if self._worker is not None:
             await self._worker
         del self.model
 
+    # --- from requests to batches
+
+    def _job(self, prompt: Prompt, number: int) -> _Job:
+        text = self._text(prompt)
+        if (text, number) in self._unclaimed:
+            return self._unclaimed.pop((text, number))
+        length = len(self._tokens(text)["input_ids"])
+        if length >= self.longest:
+            sentence = f"the prompt has {length:,} tokens, but the model takes only {self.longest:,}"
+            raise failure(self.name, sentence, may_pass=False)
+        first = number - number % BLOCK
+        numbers = range(first, first + BLOCK) if self.is_seeded else [number]
+        loop = asyncio.get_running_loop()
+        jobs = {n: _Job(prompt, text, n, loop.create_future()) for n in numbers}
+        self._waiting.extend(jobs.values())
+        self._unclaimed |= {(text, n): job for n, job in jobs.items() if n != number}
+        return jobs[number]
+
     async def _work(self) -> None:
         await asyncio.sleep(GATHER)
+        size = BLOCK if self.is_seeded else BATCH
         while self._waiting:
-            batch = [job for job in self._waiting[:BATCH] if not job.reply.done()]
-            del self._waiting[:BATCH]
-            if batch:
-                await asyncio.to_thread(self._run, batch)
+            batch = self._waiting[:size]
+            del self._waiting[:size]
+            if not self.is_seeded:
+                batch = [job for job in batch if job.is_wanted]
+            seed = self.settings.seed_of(batch[0].number) if batch and self.is_seeded else None
+            try:
+                endings = await asyncio.to_thread(self._endings, batch, seed)
+            except Exception as error:  # noqa: BLE001 - to be raised by each request instead
+                endings = [failure(self.name, error, may_pass=False)] * len(batch)
+            for job, ending in zip(batch, endings, strict=True):
+                if isinstance(ending, ModelError):
+                    self._unclaimed.pop((job.text, job.number), None)  # a later request tries again
+                if not job.ending.done():
+                    job.ending.set_result(ending)
 
     def _text(self, prompt: Prompt) -> str:
         if not self.is_chat:
             return prompt.text
         try:
             return self._templated(prompt.messages)
-        except jinja2.TemplateError:  # some know no system's turn
-            return self._templated(_without_system(prompt.messages))
+        except jinja2.TemplateError:  # some templates know no system message
+            system, user, *others = prompt.messages
+            return self._templated([Message("user", f"{system.text}\n\n{user.text}"), *others])
 
     def _templated(self, messages: Sequence[Message]) -> str:
         turns = [{"role": message.role, "content": message.text} for message in messages]
         return str(self.tokenizer.apply_chat_template(turns, tokenize=False, add_generation_prompt=True))
 
-    def _run(self, batch: Sequence[_Job]) -> None:
-        """Reply to requests, fewer at a time if the memory is too small for all."""
-        try:
-            self._generate(batch)
-        except torch.cuda.OutOfMemoryError:
-            if len(batch) == 1:
-                batch[0].end(fault(self.name, "the memory is too small for this prompt", may_pass=False))
-                return
-            torch.cuda.empty_cache()
-            self._run(batch[: len(batch) // 2])
-            self._run(batch[len(batch) // 2 :])
-        except Exception as error:  # noqa: BLE001 - nobody else would tell who waits
-            for job in batch:
-                job.end(fault(self.name, error, may_pass=False))
-
-    def _generate(self, batch: Sequence[_Job]) -> None:
-        tokens = self._tokens([job.text for job in batch], return_tensors="pt", padding=True).to(self.device)
-        start = tokens["input_ids"].shape[1]
-        most = min(self.settings.max_tokens, self.longest - start)
-        watch = _Watch(self, batch, start)
-        with torch.inference_mode():
-            sequences = self.model.generate(
-                **tokens,
-                generation_config=transformers.GenerationConfig(
-                    max_new_tokens=most,
-                    do_sample=False,  # _Draw draws, for each request on its own
-                    num_beams=1,
-                    pad_token_id=self.tokenizer.pad_token_id,
-                    eos_token_id=sorted(self.ends) or None,
-                ),
-                logits_processor=transformers.LogitsProcessorList([self._draw(batch)]),
-                stopping_criteria=transformers.StoppingCriteriaList([watch]),
-            )
-        for row, job in enumerate(batch):
-            written = self.up_to_end(sequences[row, start:].tolist())
-            text, is_whole = self.text_of(job, written)
-            count = watch.counts.get(row, len(written))
-            job.tell(text)
-            usage = Usage(int(tokens["attention_mask"][row].sum()), count)
-            job.end((text, usage, "stop" if is_whole or count < most else "length"))
-
     def _tokens(self, text: str | list[str], **options: Any) -> Any:  # noqa: ANN401 - transformers is untyped here
-        # A chat template writes special tokens itself.
+        # A chat template has written the special tokens itself.
         special = not self.is_chat
         return self.tokenizer(text, add_special_tokens=special, return_token_type_ids=False, **options)
 
-    def up_to_end(self, tokens: list[int]) -> list[int]:
-        """The tokens in front of the one that ends a reply."""
-        ends = (at for at, token in enumerate(tokens) if token in self.ends)
-        return tokens[: next(ends, len(tokens))]
+    # --- in the thread of the model
 
-    def text_of(self, job: _Job, tokens: list[int]) -> tuple[str, bool]:
-        """The text of tokens, up to the end of the function, and whether that end has come."""
-        text = self.tokenizer.decode(tokens, skip_special_tokens=True, clean_up_tokenization_spaces=False)
-        if self.is_chat:
-            return text, False
-        end = task_end(job.prompt.opening, text, job.prompt.stop)
-        return text[:end], end < len(text)
+    def _endings(self, batch: Sequence[_Job], seed: int | None) -> list[Ending]:
+        """Write replies, fewer at a time where the memory is too small for all."""
+        try:
+            return self._generated(batch, seed)
+        except _CancelledError:
+            return [failure(self.name, "the request was cancelled", may_pass=True)] * len(batch)
+        except torch.cuda.OutOfMemoryError:
+            if len(batch) == 1:
+                return [failure(self.name, "the memory is too small for this prompt", may_pass=False)]
+        torch.cuda.empty_cache()
+        half = len(batch) // 2
+        later = None if seed is None else seed + half
+        return [*self._endings(batch[:half], seed), *self._endings(batch[half:], later)]
 
-    def _draw(self, batch: Sequence[_Job]) -> _Draw:
-        given, own = self.settings, self.model.generation_config
-        temperature, top_p = given.temperature, given.top_p
-        if temperature is None:
-            temperature = (own.temperature or 1.0) if own.do_sample else 0.0
-        if top_p is None:
-            top_p = own.top_p or 1.0
-        return _Draw(temperature, top_p, [_generator(job.seed, self.device) for job in batch])
+    def _generated(self, batch: Sequence[_Job], seed: int | None) -> list[Ending]:
+        _expect_wanted(batch)
+        tokens = self._tokens([job.text for job in batch], return_tensors="pt", padding=True).to(self.device)
+        start = tokens["input_ids"].shape[1]
+        counts: dict[int, int] = {}  # the tokens of each reply that `watch` has ended
 
+        def watch(sequences: torch.Tensor, _scores: object, **_: object) -> torch.Tensor:
+            for row, job in enumerate(batch):
+                if row not in counts and self._is_over(job, sequences[row, start:].tolist()):
+                    counts[row] = sequences.shape[1] - start
+            _expect_wanted(batch)
+            return torch.tensor([row in counts for row in range(len(batch))], device=sequences.device)
 
-@dataclass(eq=False)
-class _Watch:
-    """Ends each reply of a batch where its function ends, or where nobody waits for it any more.
+        if seed is None:
+            torch.seed()
+        else:
+            torch.manual_seed(seed)
+        with torch.inference_mode():
+            sequences = self.model.generate(
+                **tokens,
+                **self._sampling(),
+                max_new_tokens=min(self.settings.max_tokens, self.longest - start),
+                num_beams=1,
+                pad_token_id=self.tokenizer.pad_token_id,
+                eos_token_id=sorted(self.ends) or None,
+                stopping_criteria=transformers.StoppingCriteriaList([watch]),
+            )
+        endings: list[Ending] = []
+        for row, job in enumerate(batch):
+            written = sequences[row, start:].tolist()[: counts.get(row)]
+            kept = self._before_end(written)
+            reason = "stop" if row in counts or len(kept) < len(written) else "length"
+            usage = Usage(int(tokens["attention_mask"][row].sum()), len(kept))
+            text = self._decoded(kept)
+            endings.append((text[: self._end(job, text)], usage, reason))
+        return endings
 
-    Args:
-        local: the model.
-        batch: the requests.
-        start: where their replies begin.
-    """
-
-    local: Local
-    batch: Sequence[_Job]
-    start: int
-    counts: dict[int, int] = field(default_factory=dict, init=False)
-    """How many tokens those have that were ended here."""
-
-    def __call__(self, tokens: torch.Tensor, _scores: object, **_more: object) -> torch.Tensor:
-        for row, job in enumerate(self.batch):
-            if row not in self.counts and self._is_over(job, tokens[row, self.start :].tolist()):
-                self.counts[row] = tokens.shape[1] - self.start
-        over = [row in self.counts for row in range(len(self.batch))]
-        return torch.tensor(over, dtype=torch.bool, device=tokens.device)
+    def _sampling(self) -> dict[str, Any]:
+        if self.settings.temperature == 0:
+            return {"do_sample": False, "temperature": None, "top_p": None, "top_k": None}
+        given = {"temperature": self.settings.temperature, "top_p": self.settings.top_p, "top_k": 0}
+        return {"do_sample": True, **{name: value for name, value in given.items() if value is not None}}
 
     def _is_over(self, job: _Job, tokens: list[int]) -> bool:
-        text, is_over = self.local.text_of(job, self.local.up_to_end(tokens))
-        if not text.endswith(HALF):
-            job.tell(text if is_over else _certain(text))
-        return is_over or job.reply.done()
+        """Whether a base model has written the whole function; the whole lines of it are passed on."""
+        text = self._decoded(self._before_end(tokens))
+        end = self._end(job, text)
+        # The last line, and the break in front of it, may come after the end.
+        job.tell(text[: max(0, text.rfind("\n", 0, end))])
+        return end < len(text)
+
+    def _before_end(self, tokens: list[int]) -> list[int]:
+        return tokens[: next((at for at, token in enumerate(tokens) if token in self.ends), len(tokens))]
+
+    def _decoded(self, tokens: list[int]) -> str:
+        return str(
+            self.tokenizer.decode(tokens, skip_special_tokens=True, clean_up_tokenization_spaces=False)
+        )
+
+    def _end(self, job: _Job, text: str) -> int:
+        return len(text) if self.is_chat else task_end(job.prompt.opening, text, job.prompt.stop)
 
 
-@dataclass(eq=False)
-class _Draw:
-    """Draws the next token of each request of a batch with dice of its own, and leaves no other possible.
+def source_of(path: str) -> str:
+    """A folder of a model, or the name of one on the hub, as transformers takes it.
 
-    Args:
-        temperature: 0 for the likeliest token.
-        top_p: the share of likely tokens that are drawn from.
-        dice: one for each request.
+    Raises:
+        UserError: it is a path, but no folder.
     """
-
-    temperature: float
-    top_p: float
-    dice: Sequence[torch.Generator]
-
-    def __call__(self, _tokens: torch.Tensor, scores: torch.Tensor) -> torch.Tensor:
-        values = scores.float()
-        if self.temperature > 0:
-            values = self._likely(values / self.temperature)
-            # The largest of values to which such noise is added is a draw from what they stand for.
-            noise = [torch.empty_like(values[0]).exponential_(generator=die).log() for die in self.dice]
-            values = values - torch.stack(noise)
-        drawn = values.argmax(dim=-1, keepdim=True)
-        return torch.full_like(scores, -torch.inf).scatter(-1, drawn, 0.0)
-
-    def _likely(self, values: torch.Tensor) -> torch.Tensor:
-        """The values without those outside of the share of likely ones; the likeliest always stays."""
-        if self.top_p >= 1:
-            return values
-        falling, order = values.sort(dim=-1, descending=True)
-        shares = falling.softmax(dim=-1)
-        falling = falling.masked_fill(shares.cumsum(dim=-1) - shares >= self.top_p, -torch.inf)
-        return torch.empty_like(values).scatter(-1, order, falling)
+    folder = Path(path).expanduser()
+    if path.startswith((".", "/", "~")) and not folder.is_dir():
+        raise UserError("there is no such folder of a model", file=path)
+    return str(folder)
 
 
-def _place() -> tuple[str, torch.dtype]:
-    """Where models run here, and in which kind of numbers."""
+def _device() -> tuple[str, torch.dtype]:
     if torch.cuda.is_available():
         return "cuda", torch.bfloat16 if torch.cuda.is_bf16_supported() else torch.float16
     if torch.backends.mps.is_available():
         return "mps", torch.float16
     return "cpu", torch.float32
-
-
-def _generator(seed: int | None, device: str) -> torch.Generator:
-    generator = torch.Generator(device)
-    if seed is None:
-        generator.seed()
-    else:
-        generator.manual_seed(seed)
-    return generator
-
-
-def _ends(*told: int | list[int] | None) -> frozenset[int]:
-    """The tokens that end a reply, which are told in several places, one or more at a time."""
-    listed = [[] if one is None else [one] if isinstance(one, int) else one for one in told]
-    return frozenset(token for some in listed for token in some)
-
-
-def _certain(text: str) -> str:
-    """A text without its last line and the break in front of it, which may stand behind the end."""
-    return text[: text.rfind("\n")] if "\n" in text else ""
-
-
-def _without_system(messages: Sequence[Message]) -> list[Message]:
-    """The same conversation with the system's turn as the beginning of the user's."""
-    system, user, *others = messages
-    return [Message("user", f"{system.text}\n\n{user.text}"), *others]

@@ -1,4 +1,4 @@
-"""A model that is asked no faster than allowed, no further than paid for, and again where that may help."""
+"""Limits on the rate, the concurrency and the tokens of requests to a model, and retries after errors."""
 
 from __future__ import annotations
 
@@ -20,31 +20,30 @@ from codebotler.models.base import BudgetSpentError, Heard, Model, ModelError, R
 from codebotler.prompts import Prompt
 
 LOG = logging.getLogger("codebotler.models")
-LONGEST_WAIT = 30.0  # seconds between two tries, where the other side asks for nothing else
-LONGEST_PEACE = 600.0  # seconds that the other side may ask for; a request that waits longer has failed
-CHARACTERS = 3  # of a text, for a token of it, where nobody says how many it has; a high estimate
+LONGEST_WAIT = 30.0  # seconds between two tries, where the server asks for nothing else
+LONGEST_RETRY_AFTER = 600.0  # seconds; a request that a server defers for longer has failed
+CHARACTERS = 3  # for each token of a text, where the model counts none; a high estimate
 
 
 @dataclass
 class RateLimited:
-    """Another model, with limits.
+    """A model with limits.
 
-    What may pass is tried again: 429, 5xx, timeouts, connections that fail or break off, and answers that
-    make no sense. A whole reply is never asked for again, be it empty or without a program.
+    Errors that may pass are retried: statuses such as 429 and 500, timeouts, failed and broken connections,
+    and answers that are no reply. A whole reply is never requested again, even without a program in it.
 
     Args:
-        model: who is asked.
-        concurrency: how many requests may be under way at a time, at least 1.
-        requests_per_minute: how many may begin in a minute, evenly spread; None for any number. A further try
-            counts as a request.
-        retries: how many further tries a request gets.
-        token_budget: once this many tokens are used, no request begins; those under way then come to their
-            end, so that a little more is used. Where the model does not count tokens, one is taken for every
-            three characters. None for any number.
-        first_wait: about how many seconds pass before the second try; before each further one, twice as many.
+        model: the model that it asks.
+        concurrency: the requests that may be under way at a time, at least 1.
+        requests_per_minute: the requests, further tries included, that may begin in a minute, evenly spread;
+            None for any number.
+        retries: the further tries of each request, at least 0.
+        token_budget: no request begins once so many tokens are used; those under way are completed. Where
+            the model counts no tokens, one is assumed for every three characters. None for any number.
+        first_wait: about the seconds before the second try; they double before each further one.
 
     Raises:
-        UserError: one of them is out of its range.
+        UserError: a limit is out of its range.
     """
 
     model: Model
@@ -54,46 +53,48 @@ class RateLimited:
     token_budget: int | None = None
     first_wait: float = 0.5
     requests: int = field(default=0, init=False)
-    """How many requests were begun."""
+    """The requests so far, further tries included."""
     retried: int = field(default=0, init=False)
-    """How many of them were further tries."""
+    """The further tries so far."""
     usage: Usage = field(default_factory=Usage, init=False)
-    """The tokens of all replies, as far as the model counts them."""
+    """The tokens of all replies, as counted by the model."""
     spent: int = field(default=0, init=False)
-    """The tokens that count against the budget, with estimates where the model does not count them."""
-    _has_heard: bool = field(default=False, init=False, repr=False)
+    """The tokens that count against the budget, with estimates where the model counts none."""
+    _has_replied: bool = field(default=False, init=False, repr=False)
     _free: asyncio.Semaphore = field(init=False, repr=False)
     _gate: asyncio.Lock = field(default_factory=asyncio.Lock, init=False, repr=False)
     _next_start: float = field(default=-math.inf, init=False, repr=False)
-    _peace_until: float = field(default=-math.inf, init=False, repr=False)
+    _deferred_until: float = field(default=-math.inf, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        if self.concurrency < 1:
-            raise UserError(f"the concurrency is {self.concurrency}, but it must be at least 1")
+        for name, value, least in (
+            ("concurrency", self.concurrency, 1),
+            ("number of retries", self.retries, 0),
+            ("token budget", self.token_budget, 1),
+        ):
+            if value is not None and value < least:
+                raise UserError(f"the {name} is {value}, but it must be at least {least}")
         if self.requests_per_minute is not None and not self.requests_per_minute > 0:
-            raise UserError(f"the requests a minute are {self.requests_per_minute:g}, but must be above 0")
-        if self.retries < 0:
-            raise UserError(f"the retries are {self.retries}, but must be at least 0")
-        if self.token_budget is not None and self.token_budget < 1:
-            raise UserError(f"the token budget is {self.token_budget}, but it must be at least 1")
+            rate = f"{self.requests_per_minute:g}"
+            raise UserError(f"the number of requests per minute is {rate}, but it must be above 0")
         self._free = asyncio.Semaphore(self.concurrency)
 
     @property
     def name(self) -> str:
-        """What the model is called."""
+        """The name of the model."""
         return self.model.name
 
     async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
-        """Ask for one reply, as often as needed.
+        """Request one reply, with further tries.
 
         Args:
-            prompt: what is asked.
+            prompt: the request.
             number: which sample of this prompt it is, counted from 0.
-            heard: told each piece of the text when it comes in, again in each try.
+            heard: called with each piece of the text as it arrives, from the beginning again in each try.
 
         Raises:
-            ModelError: no whole reply came, in the last try either.
-            BudgetSpentError: the budget is spent, so that no request was made.
+            ModelError: the last try brought no whole reply either.
+            BudgetSpentError: the budget is spent, and no request was made.
         """
         tries = AsyncRetrying(
             sleep=asyncio.sleep,
@@ -120,7 +121,7 @@ class RateLimited:
     async def _try(self, prompt: Prompt, number: int, heard: Heard) -> Reply:
         self._check_budget()
         await self._turn()
-        self._check_budget()  # others have spent it meanwhile
+        self._check_budget()  # other requests may have spent it meanwhile
         self.requests += 1
         length = 0
 
@@ -131,11 +132,11 @@ class RateLimited:
 
         try:
             reply = await self.model.reply(prompt, number=number, heard=hear)
-        except BaseException:  # what has come is paid for, whyever no more came
+        except BaseException:  # the pieces that came are paid for
             if length:
                 self.spent += _estimate(prompt, length)
             raise
-        self._has_heard = True
+        self._has_replied = True
         self.usage = Usage(
             _sum(self.usage.input_tokens, reply.usage.input_tokens),
             _sum(self.usage.output_tokens, reply.usage.output_tokens),
@@ -151,30 +152,33 @@ class RateLimited:
         """Wait until the next request may begin."""
         now = asyncio.get_running_loop().time
         async with self._gate:
-            while (wait := max(self._next_start, self._peace_until) - now()) > 0:  # noqa: ASYNC110 - the end may move
+            while (wait := max(self._next_start, self._deferred_until) - now()) > 0:  # noqa: ASYNC110 - both may move
                 await asyncio.sleep(wait)
             if self.requests_per_minute is not None:
                 self._next_start = now() + 60 / self.requests_per_minute
 
     def _wait(self, state: RetryCallState) -> float:
         wait = wait_exponential_jitter(self.first_wait, LONGEST_WAIT, jitter=self.first_wait / 2)(state)
-        return max(wait, _peace(state))
+        return max(wait, _retry_after(state))
 
     def _before_sleep(self, state: RetryCallState) -> None:
         self.retried += 1
-        if not self._has_heard and self.retried == 1 and state.outcome is not None:
+        if not self._has_replied and self.retried == 1 and state.outcome is not None:
             LOG.warning("trying again, up to %d times: %s", self.retries, state.outcome.exception())
-        # Whoever asks for peace means all requests, not only the one that was refused.
-        self._peace_until = max(self._peace_until, asyncio.get_running_loop().time() + _peace(state))
+        # A server that asks to wait means all requests, not only the one that it refused.
+        now = asyncio.get_running_loop().time()
+        self._deferred_until = max(self._deferred_until, now + _retry_after(state))
 
 
-def _peace(state: RetryCallState) -> float:
+def _retry_after(state: RetryCallState) -> float:
     error = None if state.outcome is None else state.outcome.exception()
     return (error.retry_after or 0.0) if isinstance(error, ModelError) else 0.0
 
 
 def _may_pass(error: BaseException) -> bool:
-    return isinstance(error, ModelError) and error.may_pass and (error.retry_after or 0) <= LONGEST_PEACE
+    return (
+        isinstance(error, ModelError) and error.may_pass and (error.retry_after or 0) <= LONGEST_RETRY_AFTER
+    )
 
 
 def _sum(one: int | None, other: int | None) -> int | None:

@@ -1,11 +1,11 @@
-"""Recorded models: programs that people wrote for known instructions; they need no key and no network."""
+"""Recorded models: hand-written programs for known instructions, without a key or a network."""
 
 from __future__ import annotations
 
 import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from functools import cache
 from importlib.util import find_spec
@@ -14,40 +14,31 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
 from codebotler.core.yaml_files import YamlFile
-from codebotler.models import base
-from codebotler.models.base import Heard, ModelError, Usage, unheard
+from codebotler.models.base import Heard, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
 
 FOLDER = Path(__file__).with_name("recorded")
 NAMES = ("careful", "hasty")
 CLOSEST, SHOWN = 3, 100  # how many instructions are suggested, and how much of each, in characters
 LONG = re.compile(r"[^\W\d_]{4,}")  # shorter words are in every instruction
-REAL_MODEL = "name a real model to have a program written for it, such as --model openai-chat:gpt-5.1"
+REAL_MODEL = "use a real model to have a program written for it, such as --model openai-chat:gpt-5.1"
 
 
 class Solution(BaseModel):
-    """A program that a person wrote for an instruction, right or wrong on purpose.
-
-    Args:
-        about: what is special about it, or what is wrong with it, in a few words.
-        program: its source.
-        fails: the kind of its failure; None if it passes.
-        right: whether it does what was asked although it fails: the checks are too strict for it.
-    """
+    """A hand-written program for an instruction, right or wrong on purpose."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    about: str
+    about: str  # what is special about it, or wrong with it, in a few words
     program: str
-    fails: str | None = None
-    right: bool = False
+    fails: str | None = None  # the kind of its failure; None if it passes
+    right: bool = False  # whether it does what was asked although it fails: the checks are too strict for it
 
 
-class Recording(BaseModel):
-    """What the recorded models reply to an instruction."""
+class InstructionSolutions(BaseModel):
+    """The replies of the recorded models to one instruction."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -61,72 +52,38 @@ class Recording(BaseModel):
 
 
 class RecordedFile(BaseModel):
-    """What a file of solutions holds for the recorded models; the rest of it is for the benchmark."""
+    """The part of a file of solutions that the recorded models need; the benchmark reads the rest."""
 
-    recorded: tuple[Recording, ...]
-
-
-@dataclass(frozen=True)
-class RecordedReplies:
-    """Replies by instruction.
-
-    Args:
-        name: `careful` or `hasty`.
-        replies: for each instruction at least one.
-    """
-
-    name: str
-    replies: Mapping[str, tuple[Solution, ...]]
-
-    def reply(self, instruction: str, index: int) -> Solution:
-        """The reply that stands for completion number `index`, counted from 0; they come round again.
-
-        Raises:
-            KeyError: nobody recorded this instruction.
-        """
-        replies = self.replies[instruction]
-        return replies[index % len(replies)]
+    recorded: tuple[InstructionSolutions, ...]
 
 
 @dataclass(frozen=True)
 class RecordedModel:
-    """A recorded model that is asked like any other.
+    """A model that knows a few instructions by heart."""
 
-    Args:
-        recorded: what it recites.
-    """
+    name: str  # such as `recorded:careful`
+    replies: Mapping[str, tuple[Solution, ...]] = field(repr=False)  # by instruction, at least one each
 
-    recorded: RecordedReplies
+    def solution(self, instruction: str, index: int) -> Solution:
+        """The reply for completion number `index`, counted from 0; they come round again."""
+        replies = self.replies[instruction]
+        return replies[index % len(replies)]
 
-    @property
-    def name(self) -> str:
-        """Such as `recorded:careful`."""
-        return f"recorded:{self.recorded.name}"
-
-    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> base.Reply:
-        """The recorded reply that stands for completion number `number`; it takes no time and no tokens.
-
-        Raises:
-            ModelError: nobody recorded the instruction; the sentence names the closest that were.
-        """
-        instruction = self._known.get(_words(prompt.instruction))
+    async def reply(self, prompt: Prompt, *, number: int, heard: Heard = unheard) -> Reply:
+        """The recorded reply; it takes no time and no tokens."""
+        known = {_words(instruction): instruction for instruction in self.replies}
+        instruction = known.get(_words(prompt.instruction))
         if instruction is None:
             raise ModelError(self._unknown(prompt.instruction), may_pass=False)
-        program = self.recorded.reply(instruction, number).program
+        program = self.solution(instruction, number).program
         heard(program)
-        return base.Reply(program, program, Usage(), 0.0, "stop")
+        return Reply(program, program, Usage(), 0.0, "stop")
 
     async def close(self) -> None:
-        """Nothing is held."""
-
-    @cached_property
-    def _known(self) -> Mapping[tuple[str, ...], str]:
-        return {_words(instruction): instruction for instruction in self.recorded.replies}
+        """Nothing to close."""
 
     def _unknown(self, instruction: str) -> str:
-        closest = " or ".join(
-            f'"{_short(known)}"' for known in closest_to(instruction, self.recorded.replies)
-        )
+        closest = " or ".join(f'"{_short(known)}"' for known in closest_to(instruction, self.replies))
         return (
             f'{self.name} has no program for "{_short(instruction)}"; '
             f"the closest instructions it knows are {closest}; {REAL_MODEL}"
@@ -134,7 +91,7 @@ class RecordedModel:
 
 
 def closest_to(instruction: str, known: Iterable[str]) -> list[str]:
-    """The known instructions that share most long words, in the same order, with one that is not known."""
+    """The known instructions that share most long words, in the same order, with an unknown one."""
     matcher = SequenceMatcher(a=(), b=LONG.findall(instruction.lower()), autojunk=False)
 
     def likeness(other: str) -> tuple[int, float]:
@@ -152,11 +109,8 @@ def _short(text: str) -> str:
     return textwrap.shorten(text, SHOWN, placeholder=" ...")
 
 
-def recorded_model(name: str) -> RecordedReplies:
-    """A recorded model by its name.
-
-    Args:
-        name: `recorded` (the careful one), `recorded:careful` or `recorded:hasty`.
+def recorded_model(name: str) -> RecordedModel:
+    """A recorded model by its name; `recorded` means `recorded:careful`.
 
     Raises:
         UserError: there is no such model.
@@ -165,21 +119,19 @@ def recorded_model(name: str) -> RecordedReplies:
     if short not in NAMES:
         known = ", ".join(f"recorded:{known}" for known in NAMES)
         raise UserError(f'there is no recorded model "{name}"; there are {known}')
-    return RecordedReplies(short, {one.instruction: one.by(short) for one in _recordings()})
+    return RecordedModel(f"recorded:{short}", {one.instruction: one.by(short) for one in _recorded()})
 
 
 @cache
-def _recordings() -> tuple[Recording, ...]:
-    files = sorted(
-        (file for folder in _folders() for file in folder.glob("*.yaml")), key=lambda file: file.name
-    )
+def _recorded() -> tuple[InstructionSolutions, ...]:
+    files = sorted((f for folder in _folders() for f in folder.glob("*.yaml")), key=lambda file: file.name)
     forms = (YamlFile.read(file).validate(RecordedFile) for file in files)
-    return tuple(recording for form in forms for recording in form.recorded)
+    return tuple(one for form in forms for one in form.recorded)
 
 
 def _folders() -> Iterator[Path]:
-    """Where solutions lie: here, and among the benchmark's tasks, none of whose code is imported."""
     yield FOLDER
+    # The benchmark's solutions are data of roboeval, whose code codebotler must not import.
     benchmark = find_spec("roboeval")
     for place in (benchmark and benchmark.submodule_search_locations) or ():
         yield Path(place, "suites", "paper", "solutions")

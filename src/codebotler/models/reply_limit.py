@@ -1,4 +1,4 @@
-"""A limit on what a server may send for one request, counted after it is unpacked, while it comes in."""
+"""A limit on the bytes a server may send for one request, counted as they arrive, after decompression."""
 
 from __future__ import annotations
 
@@ -8,35 +8,24 @@ from typing import Any, TypeVar
 
 from codebotler.models.base import ModelError
 
-Client = TypeVar("Client", bound=Any)
-"""Of httpx or httpx2, which share no type."""
+Client = TypeVar("Client", bound=Any)  # of httpx or httpx2, which share no type
 
-FLOOR = 8_000_000
-PER_TOKEN = 4_000
-"""Bytes of a reply for each token that it may have: a piece of a stream tells much more than its token."""
-
-PIECE = 65_536
+FLOOR = 8_000_000  # bytes
+PER_TOKEN = 4_000  # bytes; a piece of a stream holds much more than its token
+PIECE = 65_536  # bytes
 GZIP = ("gzip", "x-gzip")
-PACKED = (*GZIP, "deflate", "br", "zstd")
-"""What the libraries would unpack by themselves, however much comes out of it."""
-
-AS_GZIP = zlib.MAX_WBITS | 16
+PACKED = (*GZIP, "deflate", "br", "zstd")  # what the libraries would unpack, however much comes out
 
 
 def limit_of(max_tokens: int) -> int:
-    """How many bytes a reply of so many tokens may have, generously."""
+    """The bytes that a reply of so many tokens may have, generously."""
     return max(FLOOR, PER_TOKEN * max_tokens)
 
 
 def bound(client: Client, name: str, limit: int) -> Client:
-    """Let a client of HTTP take no more than a limit for any request, and return it.
+    """Limit the bytes that a client of HTTP takes for any request of a model, and return the client.
 
-    Where more comes, whoever reads it gets a ModelError that does not pass.
-
-    Args:
-        client: an `AsyncClient` of httpx, in whichever version a library has it.
-        name: of the model.
-        limit: in bytes, of an answer whether it is a reply or an error.
+    Whoever reads more gets a ModelError that does not pass.
     """
 
     async def bounded(response: Any) -> None:  # noqa: ANN401 - see Client
@@ -56,7 +45,7 @@ def bound(client: Client, name: str, limit: int) -> Client:
 
 
 def _stream(stream: Any, name: str, limit: int, *, is_packed: bool) -> Any:  # noqa: ANN401 - see Client
-    """A stream of the same library, since each takes only its own."""
+    # Each library takes only streams of its own class.
     theirs = next(base for base in type(stream).__mro__ if base.__name__ == "AsyncByteStream")
 
     class Bounded(theirs):  # type: ignore[misc,valid-type]  # one of two classes
@@ -77,14 +66,14 @@ def _stream(stream: Any, name: str, limit: int, *, is_packed: bool) -> Any:  # n
 
 
 async def _unpacked(stream: Any, name: str) -> AsyncIterator[bytes]:  # noqa: ANN401 - see Client
-    """What comes out of gzip, in small pieces; nothing is unpacked before somebody takes it."""
-    unpacker = zlib.decompressobj(AS_GZIP)
+    """The content of a gzip stream in small pieces, each unpacked only when it is taken."""
+    unpacker = zlib.decompressobj(zlib.MAX_WBITS | 16)  # 16: with the header of gzip
     async for packed in stream:
         rest, piece = packed, b""
         while (rest or len(piece) == PIECE) and not unpacker.eof:
             try:
                 piece = unpacker.decompress(rest, PIECE)
             except zlib.error:
-                raise ModelError(f"{name}: the server sent what is no gzip", may_pass=True) from None
+                raise ModelError(f"{name}: the server sent invalid gzip", may_pass=True) from None
             yield piece
             rest = unpacker.unconsumed_tail

@@ -1,4 +1,4 @@
-"""Looking for something in a picture: an image and a label become found or not, where, and how surely."""
+"""Looking for an object or a person in a picture."""
 
 from codebotler.perception.base import Detector, PerceptionError, Sighting
 from codebotler.perception.image import boxed, image_from_ros, image_of, jpeg_of, read_image

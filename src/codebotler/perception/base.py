@@ -1,4 +1,4 @@
-"""What all ways of looking for something in a picture have in common."""
+"""The `Detector` protocol, and what every detector takes, returns and raises."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from codebotler.core.terminal import visible
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, top, right and bottom as shares of a picture's width and height, from its upper left corner."""
 
-LONGEST_LABEL = 200  # characters; a name needs fewer
+LONGEST_LABEL = 200  # characters
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """What came of looking for something in a picture.
+    """The result of looking for something in a picture.
 
     Args:
-        found: whether it is there.
-        box: where, for the clearest one; None if it was not found.
-        score: how sure it is that it is there, from 0 to 1; what a score means differs from model to model.
+        found: whether it is in the picture.
+        box: the place of the clearest one; None if it was not found.
+        score: how certain that is, from 0 to 1; what a score means differs from model to model.
 
     Raises:
         ValueError: the score or the box is out of its range.
@@ -39,11 +39,10 @@ class Sighting:
         if self.box is None:
             return
         left, top, right, bottom = self.box
-        if not all(0 <= share <= 1 for share in self.box):
-            raise ValueError(f"the box is {list(self.box)}, but its numbers must be between 0 and 1")
-        if not (left < right and top < bottom):
+        if not (0 <= left < right <= 1 and 0 <= top < bottom <= 1):
             raise ValueError(
-                f"the box is {list(self.box)}, but left must be less than right, and top less than bottom"
+                f"the box is {list(self.box)}, but left must be less than right, top less than bottom, "
+                "and each between 0 and 1"
             )
 
 
@@ -52,50 +51,43 @@ class Detector(Protocol):
 
     @property
     def name(self) -> str:
-        """What it is called, such as `openai-chat:gpt-5.1` or `hf:PATH`."""
+        """The name of its model, such as `openai-chat:gpt-5.1` or `hf:PATH`."""
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Look for something.
+        """Look for something in a picture.
 
         Args:
-            image: the picture, as `codebotler.perception.image` gives it.
+            image: the picture, as `codebotler.perception` reads it.
             label: what to look for, in a few plain words such as `red mug`.
 
         Raises:
             UserError: the label is no name.
-            PerceptionError: it could not be told whether it is there.
+            PerceptionError: there is no answer.
         """
 
     def close(self) -> None:
-        """Give back what it holds."""
+        """Release its connections and memory."""
 
 
 class PerceptionError(Exception):
-    """It could not be told whether something is in a picture.
-
-    Args:
-        sentence: why; it quotes no keys.
-    """
+    """A detector has no answer; the sentence says why, and holds no keys."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
         self.sentence = sentence
 
 
-def named(label: str) -> str:
-    """A label as it is looked for, on one line.
+def checked_label(label: str) -> str:
+    """The label on one line.
 
     Raises:
-        UserError: it is empty, too long, or has characters that no name has.
+        UserError: it is empty, too long, or has characters that cannot be printed.
     """
     words = " ".join(label.split())
     if not words:
-        raise UserError("nothing is named that could be looked for; name an object")
+        raise UserError("the label is empty; name an object to look for")
     if len(words) > LONGEST_LABEL:
-        raise UserError(
-            f"the name of what is to be looked for has {len(words):,} characters; "
-            f"name it in at most {LONGEST_LABEL}"
-        )
+        raise UserError(f"the label has {len(words):,} characters; use at most {LONGEST_LABEL}")
     if not words.isprintable():
-        raise UserError(f'"{visible(words)}" has characters that no name has; leave them out')
+        raise UserError(f'the label "{visible(words)}" has characters that cannot be printed; leave them out')
     return words

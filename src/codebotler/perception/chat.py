@@ -1,18 +1,18 @@
-"""Chat models that see: the picture is shown, and one small JSON object is asked for."""
+"""Chat models as detectors: they get the picture and answer with a small JSON object."""
 
 from __future__ import annotations
 
 import asyncio
 import json
 import re
-from collections.abc import Mapping
 
 from PIL.Image import Image
+from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
 
 from codebotler.models.base import Model, ModelError
 from codebotler.models.rate_limit import RateLimited
 from codebotler.models.server_errors import brief
-from codebotler.perception.base import Box, PerceptionError, Sighting, named
+from codebotler.perception.base import PerceptionError, Sighting, checked_label
 from codebotler.perception.image import jpeg_of
 from codebotler.prompts import Message, PictureMessage, Prompt
 
@@ -33,21 +33,14 @@ Answer with one JSON object and nothing else:
   width and height, counted from its upper left corner; null if it was not found.
 """
 AGAIN = "That cannot be used: {fault}. Answer again, with the JSON object alone."
-TRIES = 3  # replies that are asked for until one can be used
+TRIES = 3  # replies that are requested until one can be used
 RETRIES = 2  # of each request that finds no server, or a busy one
 LONGEST_REPLY = 20_000  # characters
 FENCED = re.compile(r"```(?:json)?\s*\n(.*)\n\s*```", re.DOTALL)
-CORNERS = 4
 
 
 class ChatDetector:
-    """Looks for things by a chat model.
-
-    It may be used from several threads, though by one at a time.
-
-    Args:
-        model: that sees pictures.
-    """
+    """A detector that asks a chat model; threads may share it, one at a time."""
 
     def __init__(self, model: Model) -> None:
         self._runner = asyncio.Runner()
@@ -55,22 +48,18 @@ class ChatDetector:
 
     @property
     def name(self) -> str:
-        """Of the model."""
+        """The name of the model."""
         return self._model.name
 
     def look(self, image: Image, label: str) -> Sighting:
-        """Show the picture, and ask again where a reply cannot be used.
-
-        Raises:
-            UserError: the label is no name.
-            PerceptionError: no reply came, or none that can be used.
-        """
-        shown = PictureMessage("user", json.dumps(named(label)), jpeg_of(image))
-        messages: tuple[Message, ...] = (Message("system", SYSTEM), shown)
+        """Show the picture to the model, and ask again where a reply cannot be used."""
+        question = PictureMessage("user", json.dumps(checked_label(label)), jpeg_of(image))
+        messages: tuple[Message, ...] = (Message("system", SYSTEM), question)
         fault = said = ""
         for number in range(TRIES):
+            prompt = Prompt(label, messages, text="", stop=(), opening="")
             try:
-                reply = self._runner.run(self._model.reply(_prompt(label, messages), number=number))
+                reply = self._runner.run(self._model.reply(prompt, number=number))
             except ModelError as error:
                 raise PerceptionError(error.sentence) from None
             try:
@@ -79,8 +68,8 @@ class ChatDetector:
                 fault, said = str(error), reply.text.strip()[:LONGEST_REPLY]
             answer = [Message("assistant", said)] if said else []
             messages = (*messages[:2], *answer, Message("user", AGAIN.format(fault=fault)))
-        told = f", but said: {brief(said)}" if said else ""
-        raise PerceptionError(f"{self.name} was asked {TRIES} times and gave no usable answer: {fault}{told}")
+        last = f"; it replied: {brief(said)}" if said else ""
+        raise PerceptionError(f"{self.name} gave no usable answer in {TRIES} tries: {fault}{last}")
 
     def close(self) -> None:
         """Close the connections."""
@@ -88,42 +77,31 @@ class ChatDetector:
         self._runner.close()
 
 
-def _prompt(label: str, messages: tuple[Message, ...]) -> Prompt:
-    return Prompt(label, messages, text="", stop=(), opening="")
+class _Answer(BaseModel):
+    model_config = ConfigDict(strict=True)
+
+    found: bool
+    score: FiniteFloat
+    box: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
 
 
 def sighting_in(text: str) -> Sighting:
-    """What a model's reply tells.
-
-    Args:
-        text: the reply: one JSON object, which may stand in a code fence, and nothing beside it.
+    """The sighting in a reply, which is one JSON object, perhaps in a code fence.
 
     Raises:
-        ValueError: it is no such object, or says what cannot be; the text is a sentence without its end.
+        ValueError: it is none; the text is a sentence without its full stop.
     """
     if len(text) > LONGEST_REPLY:
         raise ValueError(f"it has {len(text):,} characters")
     fenced = FENCED.fullmatch(text.strip())
     try:
-        told = json.loads(fenced[1] if fenced else text)
-    except (ValueError, RecursionError):
-        raise ValueError("it is no JSON") from None
-    if not isinstance(told, Mapping):
-        raise ValueError("it is no JSON object")  # noqa: TRY004 - all that is wrong with a reply is one error
-    found, score = told.get("found"), told.get("score")
-    if not isinstance(found, bool):
-        raise ValueError('"found" is neither true nor false')  # noqa: TRY004 - see above
-    if score is None or not _is_number(score):
-        raise ValueError('"score" is no number')
-    return Sighting(found, _box(told.get("box")) if found else None, float(score))
-
-
-def _box(told: object) -> Box:
-    if not (isinstance(told, list) and len(told) == CORNERS and all(map(_is_number, told))):
-        raise ValueError('"box" is no list of four numbers')
-    left, top, right, bottom = map(float, told)
-    return left, top, right, bottom
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e9  # noqa: PLR2004 - far off
+        answer = _Answer.model_validate_json(fenced[1] if fenced else text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        fault = f'"{first["loc"][0]}": {first["msg"]}' if first["loc"] else "it is no JSON object"
+        raise ValueError(fault) from None
+    if not answer.found:
+        return Sighting(found=False, box=None, score=answer.score)
+    if answer.box is None:
+        raise ValueError('"box" is missing')
+    return Sighting(found=True, box=answer.box, score=answer.score)

@@ -1,4 +1,4 @@
-"""Pictures from files and cameras, good and bad: read with limits, upright, in colour, without metadata."""
+"""Pictures from files and cameras, read with limits, turned upright and made RGB."""
 
 from __future__ import annotations
 
@@ -29,28 +29,28 @@ ENCODINGS: Mapping[str, tuple[str, str, int]] = {
     "mono8": ("L", "L", 1),
     "mono16": ("I;16", "I;16", 2),
 }
-"""Of each encoding of sensor_msgs/Image: the mode, the order of the bytes, and how many a pixel has."""
+"""For each encoding of sensor_msgs/Image the mode, the order of the bytes, and how many a pixel has."""
 
 
 def image_of(data: bytes, name: str = "the picture") -> Image.Image:
-    """The picture that a JPEG, PNG or WebP file holds, upright and in colour.
+    """The picture in the bytes of a JPEG, PNG or WebP file, upright and in colour.
 
     Args:
-        data: the file's bytes.
-        name: what error sentences call it.
+        data: the bytes.
+        name: what error messages call it.
 
     Raises:
-        UserError: it is none, is broken or cut off, or is too large.
+        UserError: it is no such file, is broken or cut off, or is too large.
     """
     if not data:
         raise UserError(f"{name} is empty")
     if len(data) > MAX_BYTES:
-        raise UserError(f"{name} is larger than {MAX_BYTES:,} bytes; take a smaller one")
+        raise UserError(f"{name} is larger than {MAX_BYTES:,} bytes; use a smaller one")
     try:
         # A picture that says it is huge is refused here before anything of it is unpacked.
         with warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning):
             opened = Image.open(io.BytesIO(data), formats=FORMATS)
-        _check_size(*opened.size, name)
+        _check_size(*opened.size, name)  # before anything of a huge picture is unpacked
         opened.load()
         return _plain(ImageOps.exif_transpose(opened))
     except UserError:
@@ -58,9 +58,9 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
     except UnidentifiedImageError:
         raise UserError(f"{name} is no JPEG, PNG or WebP file") from None
     except Image.DecompressionBombError:
-        raise UserError(f"{name} has more than {MAX_PIXELS:,} pixels; take a smaller one") from None
-    except Exception as error:  # noqa: BLE001 - decoders fail in many ways at what is no picture
-        raise UserError(f"{name} cannot be read, it is broken or cut off ({brief(error)})") from None
+        raise UserError(f"{name} has more than {MAX_PIXELS:,} pixels; use a smaller one") from None
+    except Exception as error:  # noqa: BLE001 - decoders fail in many ways
+        raise UserError(f"{name} cannot be read; it is broken or cut off ({brief(error)})") from None
 
 
 def read_image(path: Path) -> Image.Image:
@@ -72,10 +72,8 @@ def read_image(path: Path) -> Image.Image:
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
-    except FileNotFoundError:
-        raise UserError("there is no such file", file=path) from None
     except OSError as error:
-        raise UserError(f"cannot be read ({error.strerror})", file=path) from None
+        raise UserError(f"the file cannot be read: {error.strerror}", file=path) from None
     return image_of(data, str(path))
 
 
@@ -84,7 +82,7 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
 
     Args:
         message: its fields, with `data` in base64.
-        name: what error sentences call it.
+        name: what error messages call it.
 
     Raises:
         UserError: it holds none, or is too large.
@@ -123,11 +121,11 @@ def _raw(
 
 
 def jpeg_of(image: Image.Image, longest: int = LONGEST_SIDE) -> bytes:
-    """A picture as a JPEG file without any metadata.
+    """The bytes of a JPEG file without metadata.
 
     Args:
         image: the picture.
-        longest: how many pixels its longer side may have; a larger picture is scaled down.
+        longest: the limit for its longer side, in pixels; a larger picture is scaled down.
     """
     smaller = _plain(image)
     smaller.thumbnail((longest, longest))
@@ -137,7 +135,7 @@ def jpeg_of(image: Image.Image, longest: int = LONGEST_SIDE) -> bytes:
 
 
 def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
-    """A copy of a picture with a frame around what was found, if it was."""
+    """A copy of a picture with a frame around what was found, if anything was."""
     drawn = image.copy()
     if sighting.box is None:
         return drawn
@@ -154,7 +152,7 @@ def boxed(image: Image.Image, sighting: Sighting) -> Image.Image:
 def _check_size(width: int, height: int, name: str) -> None:
     if width * height > MAX_PIXELS:
         raise UserError(
-            f"{name} has {width:,} x {height:,} pixels, more than {MAX_PIXELS:,} in all; take a smaller one"
+            f"{name} has {width:,} x {height:,} pixels, more than {MAX_PIXELS:,} in all; use a smaller one"
         )
     if min(width, height) < MIN_SIDE:
         raise UserError(
@@ -164,9 +162,9 @@ def _check_size(width: int, height: int, name: str) -> None:
 
 
 def _plain(image: Image.Image) -> Image.Image:
-    """In colour, without what shines through, which becomes white."""
+    """The picture as RGB; what is transparent becomes white."""
     if image.mode.startswith("I"):
-        # Cameras rarely use all 16 bits, so that the brightest grey there is counts as white.
+        # Cameras rarely use all 16 bits, so the brightest grey in the picture counts as white.
         image = image.convert("I")
         brightest = max(1, int(image.getextrema()[1]))  # type: ignore[arg-type]  # one band, so two numbers
         return image.point(lambda grey: grey * (255 / brightest) + 0.5).convert("L").convert("RGB")

@@ -14,7 +14,7 @@ from string import Template
 from typing import Literal
 
 from codebotler.core.errors import expect_list
-from codebotler.core.program import TASK
+from codebotler.core.program import TASK, Flaw, parsed
 from codebotler.core.skills import SKILLS, SkillTable
 
 FOLDER = Path(__file__).parent
@@ -85,7 +85,7 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP) -> int:
     stops = [at for at in (reply.find(text) for text in stop) if at >= 0]
     end = min(stops, default=len(reply))
     for found in islice(re.finditer(r"\n(?=[^\s#)\]}])", reply[: min(end, MAX_LENGTH)]), MAX_TRIES):
-        if not isinstance(parsed(opening + reply[: found.start()]), Problem):
+        if not isinstance(parsed(opening + reply[: found.start()]), Flaw):
             return found.start()
     return end
 

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from codebotler.core.world import Name, Text
 from codebotler.core.yaml_files import YamlFile
-from codebotler.models.recorded import NAMES, Recording, Solution
+from codebotler.models.recorded import NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task
 
 LENDER = Path(__file__).with_name("paper")  # the suite whose instructions others take
@@ -30,7 +30,7 @@ class SolutionsFile(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    recorded: tuple[Recording, ...] = ()  # replies of the recorded models
+    recorded: tuple[InstructionSolutions, ...] = ()  # replies of the recorded models
     programs: tuple[Solution, ...] = ()
     equivalent_mutants: tuple[EquivalentMutantFile, ...] = ()
 

@@ -153,7 +153,7 @@ def test_instruction_becomes_a_program_and_is_run(folder: Path, paper: Suite) ->
     assert status == 0
     assert "accepted: " in out
     program = "".join(line.removeprefix("    ") for line in out.splitlines(keepends=True)[:40])
-    assert recorded_model("recorded:careful").reply(instruction, 0).program in program
+    assert recorded_model("recorded:careful").solution(instruction, 0).program in program
     status, out, _ = ended(folder, "missions", "last", "--json")
     mission = json.loads(out)
     assert (mission["instruction"], mission["model"]) == (instruction, "recorded:careful")

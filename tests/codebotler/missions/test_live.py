@@ -56,7 +56,7 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
     as_written = replace(PAPER, literals="as-written")
     model = recorded_model("recorded:careful")
     pairs = [
-        (model.reply(task.prompts[0], 0).program, task.scenarios[0].world) for task in paper.tasks.values()
+        (model.solution(task.prompts[0], 0).program, task.scenarios[0].world) for task in paper.tasks.values()
     ]
     assert len(pairs) == 16
     expected = list(run(pairs, workers=1, rules=as_written))

@@ -3,6 +3,7 @@
 import asyncio
 import math
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -18,6 +19,7 @@ REASON = "torch and transformers are not installed; `make test-transformers` has
 torch = pytest.importorskip("torch", reason=REASON)
 transformers = pytest.importorskip("transformers", reason=REASON)
 tokenizers = pytest.importorskip("tokenizers", reason=REASON)
+BLOCK = pytest.importorskip("codebotler.models.local").BLOCK
 
 T = TypeVar("T")
 PROMPT = prompt_for("Go to the lab.")
@@ -161,16 +163,32 @@ def test_pieces_are_heard_in_order_and_are_the_reply(by_heart: Callable[..., str
         assert len(heard) > 1
 
 
-def test_with_a_seed_each_number_has_its_own_reply_whatever_it_is_asked_with(babbler: str) -> None:
-    settings = SamplingSettings(temperature=1.0, top_p=1.0, max_tokens=12, seed=5)
-    together = replies(babbler, settings, 0, 1, 2, 3)
-    assert len({reply.text for reply in together}) == 4
-    assert [replies(babbler, settings, number)[0].text for number in (3, 1)] == [
-        together[3].text,
-        together[1].text,
-    ]
-    (later,) = replies(babbler, SamplingSettings(temperature=1.0, top_p=1.0, max_tokens=12, seed=7), 1)
-    assert later.text == together[3].text
+SEEDED = SamplingSettings(temperature=1.0, top_p=1.0, max_tokens=12, seed=5)
+
+
+def test_with_a_seed_each_number_has_its_own_reply_wherever_a_run_was_resumed(babbler: str) -> None:
+    numbers = range(BLOCK + 3)
+    texts = [reply.text for reply in replies(babbler, SEEDED, *numbers)]
+    assert len({*texts}) == len(numbers)
+    for resumed in (numbers[4:], numbers[-1:], (3, 1)):
+        assert [reply.text for reply in replies(babbler, SEEDED, *resumed)] == [texts[n] for n in resumed]
+
+
+def test_replies_of_a_block_are_written_once(babbler: str) -> None:
+    async def ask() -> list[int]:
+        model: Any = open_model(babbler, SEEDED)
+        generate, sizes = model.model.generate, []
+
+        def watched(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
+            sizes.append(len(options["input_ids"]))
+            return generate(**options)
+
+        model.model.generate = watched
+        for number in range(BLOCK + 1):
+            await model.reply(PROMPT, number=number)
+        return sizes
+
+    assert run(ask()) == [BLOCK, BLOCK]
 
 
 def test_without_a_seed_no_two_replies_are_alike_and_without_temperature_all_are(babbler: str) -> None:
@@ -180,30 +198,38 @@ def test_without_a_seed_no_two_replies_are_alike_and_without_temperature_all_are
     assert len({reply.text for reply in likeliest}) == 1
 
 
-def test_draws_follow_the_temperature_and_the_share() -> None:
-    from codebotler.models.local import _Draw, _generator  # noqa: PLC0415 - it imports torch
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        (SamplingSettings(), {"do_sample": True, "temperature": 0.2, "top_p": 0.95, "top_k": 0}),
+        (SamplingSettings(temperature=None, top_p=None), {"do_sample": True, "top_k": 0}),
+        (SamplingSettings(temperature=0.0), {"do_sample": False}),
+    ],
+)
+def test_model_is_given_the_settings(
+    babbler: str, settings: SamplingSettings, expected: dict[str, object]
+) -> None:
+    async def ask() -> dict[str, Any]:
+        model: Any = open_model(babbler, settings)
+        generate, given = model.model.generate, {}
 
-    scores = torch.tensor([[0.5, 0.3, 0.15, 0.05]]).log().repeat(4000, 1)
-    dice = [_generator(number, "cpu") for number in range(4000)]
-    cases: list[tuple[float, float, list[float]]] = [
-        (1.0, 1.0, [0.5, 0.3, 0.15, 0.05]),
-        (1.0, 0.7, [0.625, 0.375, 0, 0]),
-        (1.0, 0.4, [1, 0, 0, 0]),
-        (0.5, 1.0, [0.25 / 0.365, 0.09 / 0.365, 0.0225 / 0.365, 0.0025 / 0.365]),
-        (0.0, 1.0, [1, 0, 0, 0]),
-    ]
-    for temperature, top_p, expected in cases:
-        drawn: Any = _Draw(temperature, top_p, dice)(None, scores.clone())
-        assert bool(((drawn == 0).sum(dim=-1) == 1).all())
-        assert bool((drawn.isinf().sum(dim=-1) == 3).all())
-        shares = (drawn == 0).float().mean(dim=0).tolist()
-        assert shares == pytest.approx(expected, abs=0.035)
-        assert [share == 0 for share in shares] == [share == 0 for share in expected]
+        def watched(**options: Any) -> object:  # noqa: ANN401 - transformers is untyped here
+            given.update(options)
+            return generate(**{**options, "max_new_tokens": 1})
+
+        model.model.generate = watched
+        await model.reply(PROMPT, number=0)
+        return given
+
+    given = run(ask())
+    names = ("do_sample", "temperature", "top_p", "top_k")
+    assert {name: given[name] for name in names if given.get(name) is not None} == expected
+    assert given["max_new_tokens"] == settings.max_tokens
 
 
 def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_small(babbler: str) -> None:
     async def ask(most: int) -> tuple[list[int], list[Reply]]:
-        model: Any = open_model(babbler, SamplingSettings(max_tokens=3, seed=1))
+        model: Any = open_model(babbler, SamplingSettings(max_tokens=3, temperature=0.0))
         generate = model.model.generate
         sizes: list[int] = []
 
@@ -237,18 +263,29 @@ def test_error_of_the_model_reaches_who_waits(babbler: str) -> None:
         run(ask())
 
 
-def test_given_up_requests_end_at_once(babbler: str) -> None:
-    async def ask() -> None:
-        model = open_model(babbler, SamplingSettings(max_tokens=100_000, temperature=1.0))
-        begun = asyncio.Event()
-        task = asyncio.create_task(model.reply(PROMPT, number=0, heard=lambda _piece: begun.set()))
-        await begun.wait()
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        await asyncio.wait_for(model.close(), 5)
+async def begin_and_cancel(model: Any) -> None:  # noqa: ANN401 - a private part of it is needed
+    begun = asyncio.Event()
+    task = asyncio.create_task(model.reply(PROMPT, number=0, heard=lambda _piece: begun.set()))
+    await begun.wait()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    await asyncio.wait_for(model._worker, 5)
 
-    run(ask())
+
+def test_given_up_requests_end_at_once(by_heart: Callable[..., str]) -> None:
+    run(begin_and_cancel(open_model(by_heart(OPENING, GO), SamplingSettings(max_tokens=100_000))))
+
+
+def test_given_up_block_leaves_no_half_replies(babbler: str) -> None:
+    settings = replace(SEEDED, max_tokens=300)
+
+    async def ask() -> str:
+        model = open_model(babbler, settings)
+        await begin_and_cancel(model)
+        return (await model.reply(PROMPT, number=1)).text
+
+    assert run(ask()) == replies(babbler, settings, 1)[0].text
 
 
 def test_prompt_that_is_too_long_is_told(babbler: str) -> None:

@@ -385,7 +385,7 @@ def test_every_reply_comes_once_through_many_faults(name: str, server: Server) -
     ("limits", "named"),
     [
         ({"concurrency": 0}, ["concurrency", " 0,", " 1"]),
-        ({"requests_per_minute": 0.0}, ["requests a minute", "above 0"]),
+        ({"requests_per_minute": 0.0}, ["requests per minute", "above 0"]),
         ({"retries": -1}, ["retries", " -1,", " 0"]),
         ({"token_budget": 0}, ["token budget", " 0,", " 1"]),
     ],

@@ -24,7 +24,7 @@ def write(path: Path, text: str) -> Path:
 
 @pytest.mark.parametrize("name", ["recorded", "recorded:", "recorded:careful", "careful"])
 def test_careful_model_is_the_one_that_is_meant_by_recorded(name: str) -> None:
-    assert recorded_model(name).name == "careful"
+    assert recorded_model(name).name == "recorded:careful"
 
 
 def test_unknown_recorded_model_is_told_in_a_sentence() -> None:
@@ -35,12 +35,12 @@ def test_unknown_recorded_model_is_told_in_a_sentence() -> None:
 def test_replies_come_round_again() -> None:
     model = recorded_model("recorded:hasty")
     for instruction, replies in model.replies.items():
-        assert [model.reply(instruction, i) for i in range(2 * len(replies))] == [*replies, *replies]
+        assert [model.solution(instruction, i) for i in range(2 * len(replies))] == [*replies, *replies]
 
 
 def test_nobody_recorded_an_instruction_of_ones_own() -> None:
     with pytest.raises(KeyError):
-        recorded_model("recorded").reply("Fetch me a coffee", 0)
+        recorded_model("recorded").solution("Fetch me a coffee", 0)
 
 
 def test_both_models_know_the_same_instructions() -> None:
@@ -151,15 +151,15 @@ def test_unknown_instruction_is_told_with_the_closest_that_are_known_and_how_to_
 
 @pytest.mark.parametrize("name", ["", "gpt-5.1", ":a", "hf:", "completions: ", "openai-chat:"])
 def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
-    with pytest.raises(UserError, match=r"no model.* recorded"):
+    with pytest.raises(UserError, match=r"no name of a model.* recorded"):
         open_model(name, SamplingSettings())
 
 
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"temperature": -0.1}, ["temperature", " -0.1,", "0 and 100"]),
-        ({"temperature": float("nan")}, ["temperature", " nan,", "0 and 100"]),
+        ({"temperature": -0.1}, ["temperature", " -0.1,", "0 to 100"]),
+        ({"temperature": float("nan")}, ["temperature", " nan,", "0 to 100"]),
         ({"top_p": 0.0}, ["top-p", " 0,", " 1"]),
         ({"top_p": 1.5}, ["top-p", " 1.5,", " 1"]),
         ({"max_tokens": 0}, ["tokens", " 0,", " 1"]),

@@ -84,8 +84,8 @@ def test_name_that_is_an_order_arrives_as_a_text(server: Server, detector: Detec
 @pytest.mark.parametrize(
     ("label", "named"),
     [
-        ("", ["nothing"]),
-        (" \n\t", ["nothing"]),
+        ("", ["empty"]),
+        (" \n\t", ["empty"]),
         ("mug " * 2_500, ["9,999 characters", "200"]),
         ("mug\x1b[2J", [r'"mug\x1b[2J"', "characters"]),
     ],
@@ -173,7 +173,7 @@ def test_model_that_never_answers_as_asked_is_an_error_in_a_sentence(
     with pytest.raises(PerceptionError) as error:
         detector.look(PICTURE, "mug")
     assert len(server.requests) == TRIES
-    assert re.match("openai-chat:eyes .* 3 times", error.value.sentence)
+    assert re.match("openai-chat:eyes .* 3 tries", error.value.sentence)
     assert "[bold]I can't" in error.value.sentence
     assert KEY not in error.value.sentence
     server.answer = lambda _: FOUND
@@ -212,7 +212,7 @@ def test_server_that_is_busy_is_asked_again(server: Server, detector: Detector) 
     [
         ("recorded", "recorded sees no pictures"),
         ("completions:m", "completions:m sees no pictures"),
-        ("", "no model"),
+        ("", "no name of a model"),
         ("nobody:m", '"nobody"'),
     ],
 )

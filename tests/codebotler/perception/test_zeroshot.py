@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +88,7 @@ def test_label_of_too_many_words_is_refused(detector: Detector) -> None:
     detector.look(PICTURE, "x" * (TOKENS - 2))
     with pytest.raises(UserError, match=rf"{TOKENS + 1} tokens, .*hf:.* {TOKENS}\b"):
         detector.look(PICTURE, "x" * (TOKENS - 1))
-    with pytest.raises(UserError, match="nothing"):
+    with pytest.raises(UserError, match="empty"):
         detector.look(PICTURE, " ")
 
 
@@ -100,15 +99,6 @@ def test_model_that_fails_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch)
         detector.look(PICTURE, "mug")
     assert error.value.sentence.startswith(f"hf:{folder}: ")
     detector.close()
-
-
-def test_broken_weights_are_refused(tmp_path: Path, folder: Path) -> None:
-    broken = shutil.copytree(folder, tmp_path / "broken")
-    model = transformers.OwlViTForObjectDetection.from_pretrained(folder)
-    model.class_head.dense0.weight.data[0, 0] = math.nan
-    model.save_pretrained(broken)
-    with pytest.raises(UserError, match="weights"):
-        open_detector(f"hf:{broken}")
 
 
 def test_what_is_no_detector_is_refused(tmp_path: Path, folder: Path) -> None:

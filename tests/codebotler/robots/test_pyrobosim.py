@@ -93,7 +93,7 @@ def worker() -> Iterator[Worker]:
 def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Worker) -> None:
     model = recorded_model("recorded:careful")
     tasks = [
-        (task.name, model.reply(task.prompts[0], 0).program, scenario.world)
+        (task.name, model.solution(task.prompts[0], 0).program, scenario.world)
         for task in paper.tasks.values()
         for scenario in task.scenarios
         if not scenario.world.may_wait_forever

@@ -198,7 +198,7 @@ def recorded_completions(name: str, suite: Suite) -> Iterator[Completion]:
                     prompt=prompt,
                     index=index,
                     instruction=instruction,
-                    model=f"recorded:{model.name}",
+                    model=model.name,
                     program=reply.program,
                 )
     if not found:

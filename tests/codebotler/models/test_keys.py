@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 import pytest
 
-from codebotler.models.redaction import HIDDEN, SHORTEST_TOLD, guard_logs, redacted, without_keys
+from codebotler.models.keys import HIDDEN, SHORTEST_IN_ERRORS, guard_logs, redacted, without_keys
 from server import Fault, Server
 
 KEY = "sk-Fake0123456789abcdefGHIJ"
@@ -116,7 +116,7 @@ def test_key_is_removed_however_it_is_spelt(monkeypatch: pytest.MonkeyPatch, spe
 
 
 def test_what_is_shorter_than_any_key_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("KEYBOARD", "decide"[: SHORTEST_TOLD - 1])
+    monkeypatch.setenv("KEYBOARD", "decide"[: SHORTEST_IN_ERRORS - 1])
     monkeypatch.setenv("EMPTY_KEY", "")
     assert redacted("decide") == "decide"
 
