@@ -131,7 +131,7 @@ def _retrying(model: Model) -> Model:
     """The model, asked again after errors of its server; a recorded one has none, and needs no extra."""
     if isinstance(model, RecordedModel):
         return model
-    from codebotler.models.rate_limit import RateLimited
+    from codebotler.models.rate_limit import RateLimited  # noqa: PLC0415 - of an extra
 
     return RateLimited(model, concurrency=1)
 

@@ -45,7 +45,16 @@ def open_with_face(name: str, options: Options, face: Face) -> Robot:
 
 def all_readiness(ros_python: Path = ROS_PYTHON) -> list[Readiness]:
     """Whether each kind of robot can be used here, and what is missing if not."""
-    return [_kind(name).readiness(ros_python) for name in KINDS]
+    return [_readiness(name, ros_python) for name in KINDS]
+
+
+def _readiness(name: str, ros_python: Path) -> Readiness:
+    try:
+        readiness: Readiness = _kind(name).readiness(ros_python)
+    except ModuleNotFoundError as error:
+        missing = f"{(error.name or '').split('.')[0]} is not installed"
+        return Readiness(name, works=False, missing=missing, mend="pip install 'codebotler[robots]'")
+    return readiness
 
 
 def _kind(name: str) -> ModuleType:
