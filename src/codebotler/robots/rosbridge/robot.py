@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 from codebotler.core.skills import SKILLS, SkillTable
@@ -39,10 +40,18 @@ class Rosbridge(RosRobot):
 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
-    """It needs nothing on this machine."""
+    """It needs nothing of ROS on this machine."""
+    _check_websockets()
     return Readiness("rosbridge", works=True, note=f"at --address, {ADDRESS} by default; {NOTE}")
 
 
 def robot(options: Options) -> Rosbridge:
     """The robot of these options."""
+    _check_websockets()
     return Rosbridge(options.address, skills=options.skills, speed=options.speed)
+
+
+def _check_websockets() -> None:
+    """Raise here what would else break the worker, whose process imports it."""
+    if find_spec("websockets") is None:
+        raise ModuleNotFoundError("websockets is not installed", name="websockets")
