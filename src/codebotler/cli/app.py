@@ -296,12 +296,12 @@ def serve(
     options = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
     body = open_robot(robot, options) if shown is None else open_with_face(robot, options, shown)
-    desk = Console(body, home(), opened, models=models, world=known, face=shown)
+    console = Console(body, home(), opened, models=models, world=known, face=shown)
 
     from codebotler.web.frame import installed
     from codebotler.web.server import serve as serve_page
 
-    serve_page(desk, place, access, installed(), runs, alone_for=stop_when_alone)
+    serve_page(console, place, access, installed(), runs, alone_for=stop_when_alone)
 
 
 @app.command("virtual-robot")

@@ -16,7 +16,8 @@ from codebotler.cli.views import Watcher, ending, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
 from codebotler.missions.mission import GRACE, MissionError, State
-from codebotler.missions.session import MissionSession, Order, SessionView
+from codebotler.missions.session import MissionSession
+from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 

@@ -6,12 +6,11 @@ The command line and the page drive a session, and observe it; it prints nothing
 from __future__ import annotations
 
 import asyncio
-import hashlib
 import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 from codebotler.checking.problems import Check
@@ -21,7 +20,7 @@ from codebotler.generation.generate import write_program
 from codebotler.missions.log import Line
 from codebotler.missions.mission import STEPS, Mission, MissionError, State
 from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
-from codebotler.missions.progress import Progress
+from codebotler.missions.view import Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
@@ -31,71 +30,6 @@ from codebotler.simulator.worker import EngineError
 
 LOG = logging.getLogger("codebotler.missions")
 EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
-
-
-@dataclass(frozen=True)
-class Order:
-    """What a person asks for: an instruction and the model that writes the program, or a program."""
-
-    instruction: str = ""
-    model: str = ""  # its name; empty where the program comes with the order
-    program: str = ""
-
-
-@dataclass(frozen=True)
-class SessionView:
-    """A session at one moment, the same for all who observe it."""
-
-    number: int = 0  # of the session, from 1; 0 before the first
-    id: str = ""  # of the mission; empty until it exists
-    state: State | None = None  # of the mission
-    reason: str = ""  # why it came to that state
-    busy: str = ""  # what goes on before the robot moves, such as `checking`
-    trouble: str = ""  # why it could not go on, in a sentence
-    order: Order = field(default_factory=Order)
-    program: str = ""  # while a model writes, as much as has arrived
-    author: str = ""  # the model that wrote it; empty if a person did
-    is_written: bool = False  # whether a model is writing now
-    check: Check | None = None  # of this very program
-    missing_skills: tuple[str, ...] = ()  # that the program calls and the robot lacks, in sentences
-    unknown_rooms: tuple[str, ...] = ()  # that the program names and the robot does not know, in sentences
-    room_map: RoomMap | None = None  # of the robot, as far as it says
-    progress: Progress = field(default_factory=Progress)
-    is_over: bool = True
-
-    @property
-    def problems(self) -> tuple[str, ...]:
-        """What speaks against running the program, in sentences."""
-        found = () if self.check is None else self.check.problems
-        return (*(problem.sentence for problem in found), *self.missing_skills)
-
-    @property
-    def digest(self) -> str:
-        """Names this program and no other, for those who approve it."""
-        return digest(self.program)
-
-    @property
-    def is_running(self) -> bool:
-        """Whether the robot works, or ends what it did."""
-        return self.state in {State.RUNNING, State.STOPPING} and not self.is_over
-
-    @property
-    def may_be_approved(self) -> bool:
-        """Whether the program can be approved as it stands."""
-        return self.state is State.CHECKED and not self.is_over and not self.busy
-
-    @property
-    def may_be_edited(self) -> bool:
-        """Whether another program can replace this one."""
-        if self.is_over or self.is_written:
-            return self.is_over
-        waits = self.state is None and bool(self.order.program)  # for the robot; nothing typed is lost
-        return waits or self.state in {State.DRAFTING, State.CHECKED}
-
-
-def digest(program: str) -> str:
-    """A short name of a program, by its content."""
-    return hashlib.sha256(program.encode(errors="surrogatepass")).hexdigest()[:16]
 
 
 def ignore(_line: Line) -> None:

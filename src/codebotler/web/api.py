@@ -20,8 +20,9 @@ from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS, Line, Summary, events_of
 from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import MissionError
-from codebotler.missions.session import MissionSession, Order, SessionView
+from codebotler.missions.session import MissionSession
 from codebotler.missions.store import find, missions, summary_of
+from codebotler.missions.view import Order, SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
 
 HERE = "current"

@@ -15,8 +15,9 @@ from codebotler.core.files import make_folder
 from codebotler.core.world import World
 from codebotler.missions.log import Line, Summary
 from codebotler.missions.mission import GRACE, MissionError
-from codebotler.missions.session import MissionSession, Order, SessionView
+from codebotler.missions.session import MissionSession
 from codebotler.missions.store import recover
+from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
 from codebotler.robots.face import Face

@@ -6,7 +6,7 @@ import asyncio
 
 from nicegui import background_tasks, ui
 
-from codebotler.missions.session import SessionView
+from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
 from codebotler.web.elements import PlainText
 from codebotler.web.frame import PATIENCE, Frame

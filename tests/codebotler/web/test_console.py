@@ -13,8 +13,8 @@ import pytest
 from codebotler.checking.problems import Check
 from codebotler.core.world import Room, World
 from codebotler.missions.mission import Mission, MissionError, State
-from codebotler.missions.session import Order, SessionView, digest
 from codebotler.missions.store import missions, summary_of
+from codebotler.missions.view import Order, SessionView, digest
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
 from codebotler.robots.base import Result, Robot

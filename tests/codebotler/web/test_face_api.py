@@ -18,8 +18,8 @@ from websockets.sync.client import ClientConnection, connect
 from codebotler.core.world import Room, World
 from codebotler.missions.log import events_of
 from codebotler.missions.mission import UNCONFIRMED, State
-from codebotler.missions.session import SessionView
 from codebotler.missions.store import missions
+from codebotler.missions.view import SessionView
 from codebotler.robots.face import Face, Question
 from codebotler.robots.simulated import Simulated
 from codebotler.web.access import SHORTEST_TOKEN

@@ -13,8 +13,8 @@ from codebotler.core.terminal import shortened, visible, visible_lines
 from codebotler.missions.log import Summary
 from codebotler.missions.mission import MissionError
 from codebotler.missions.preflight import unknown_rooms
-from codebotler.missions.session import Order, SessionView
 from codebotler.missions.store import missions
+from codebotler.missions.view import Order, SessionView
 from codebotler.models.recorded import recorded_model
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console

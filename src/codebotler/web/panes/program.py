@@ -16,7 +16,7 @@ from codebotler.checking.problems import Check
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError, State
-from codebotler.missions.session import SessionView
+from codebotler.missions.view import SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.elements import Button, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_strips

@@ -7,7 +7,7 @@ from nicegui import ui
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.mission import State
 from codebotler.missions.progress import Moment
-from codebotler.missions.session import SessionView
+from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
 from codebotler.web.elements import Button, PlainText
 from codebotler.web.floorplan import floorplan
