@@ -97,7 +97,10 @@ def test_the_server_in_twenty_lines_does_what_it_must(
     server.process.terminate()
 
 
-VARIES = r"\.\.\.|/\w+|ros1|robot_actions_pkg|signal 9|'rospy'|No module named|was lost|GoToAction|Unable to import|\(|\d+"
+VARIES = (
+    r"\.\.\.|/\w+|ros1|robot_actions_pkg|signal 9|'rospy'|No module named|was lost"
+    r"|GoToAction|Unable to import|\(|\d+"
+)
 
 
 def test_every_error_on_the_page_is_one_that_is_raised() -> None:
