@@ -14,7 +14,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import codebotler
@@ -234,34 +233,23 @@ for wrong in ({"retries": -1}, {"model": "nobody"}, {"temperature": -1}):
 """
 
 
-@pytest.mark.parametrize(
-    ("rooms", "named"),
-    [
-        ("kitchen", "rooms .* list"),
-        ([1, 2], "rooms is 1, .* text"),
-        ({"hall"}, "rooms are {'hall'}, .* list"),
-        (5, "rooms are 5, .* list"),
-    ],
-)
-def test_rooms_that_are_no_names_are_refused(rooms: object, named: str) -> None:
-    wrong: Any = rooms
-    with pytest.raises(codebotler.UserError, match=named):
-        codebotler.check("def task_program():\n    go_to('kitchen')\n", rooms=wrong)
-    with pytest.raises(codebotler.UserError, match=named):
-        codebotler.generate("Go to the kitchen.", rooms=wrong)
+def test_a_single_text_is_no_list_of_rooms() -> None:
+    for call in (
+        lambda: codebotler.check("def task_program():\n    go_to('kitchen')\n", rooms="kitchen"),
+        lambda: codebotler.generate("Go to the kitchen.", rooms="kitchen"),
+        lambda: codebotler.prompt_for("Go to the kitchen.", rooms="kitchen"),
+    ):
+        with pytest.raises(codebotler.UserError, match=r"rooms .* list"):
+            call()
 
 
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"samples": 0}, "samples is 0, .* 1$"),
-        ({"samples": 10**9}, "samples is 1000000000, .* 10,000$"),
-        ({"samples": "5"}, "samples is '5', .*whole number"),
-        ({"seed": None}, "seed is None, .*whole number"),
+        ({"samples": 0}, "samples is 0; .* 1 to"),
+        ({"samples": 10**9}, "samples is 1000000000; .* 10,000$"),
         ({"workers": -1}, "workers is -1, .* 1$"),
         ({"workers": 0}, "workers is 0, .* 1$"),
-        ({"workers": 1.5}, r"workers is 1\.5, .*whole number"),
-        ({"start": 3}, "start is 3, .*text"),
         ({"behaviours": {"fly": print}}, 'behaviour .*"get_current_location"'),
     ],
 )
@@ -274,10 +262,10 @@ def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], nam
     ("wrong", "named"),
     [
         ({"retries": -1}, "retries is -1, .* 0$"),
-        ({"temperature": 1_000}, "temperature is 1000, .* 100$"),
-        ({"top_p": 2}, "top-p is 2, .* 1$"),
-        ({"timeout": 0}, "timeout is 0 seconds, .* 0$"),
         ({"max_tokens": 0}, "tokens is 0, .* 1$"),
+        ({"temperature": -1}, "temperature is -1, .* 0 "),
+        ({"top_p": 2}, "top-p is 2, .* 1$"),
+        ({"timeout": 0}, "timeout is 0 "),
     ],
 )
 def test_settings_out_of_range_are_refused(wrong: dict[str, Any], named: str) -> None:
@@ -285,18 +273,12 @@ def test_settings_out_of_range_are_refused(wrong: dict[str, Any], named: str) ->
         codebotler.generate("Say hello.", **wrong)
 
 
-def test_skills_are_a_table() -> None:
-    wrong: Any = None
-    with pytest.raises(codebotler.UserError, match=r"skills are None, .*SkillTable"):
-        codebotler.check("paper", skills=wrong)
-
-
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
         ({"task": 3}, "task is 3, .*text"),
         ({"prompt": "0"}, "prompt is '0', .*whole number"),
-        ({"index": -1}, "index is -1, .* 0$"),
+        ({"index": -1}, "index is -1, .* whole number"),
         ({"index": 10**9}, "index is 1000000000, .* 1,000,000,000$"),
         ({"program": None}, "program is None, .*text"),
         ({"instruction": 1}, "instruction is 1, .*text"),
@@ -307,12 +289,6 @@ def test_a_completion_of_what_is_none_is_refused(wrong: dict[str, Any], named: s
     right: dict[str, Any] = {"task": "LunchTime", "prompt": 0, "index": 0, "program": ""}
     with pytest.raises(codebotler.UserError, match=named):
         roboeval.Completion(**(right | wrong))
-
-
-def test_a_number_of_another_library_is_written_as_a_row() -> None:
-    number: Any = np.int64(2)
-    row = roboeval.Completion(task="LunchTime", prompt=number, index=number, program="").row
-    assert json.loads(json.dumps(row)) == {"task": "LunchTime", "prompt": 2, "index": 2, "program": ""}
 
 
 USES = """
@@ -358,12 +334,6 @@ def test_completions_are_read_from_a_file() -> None:
 def test_a_suite_is_named_by_its_folder(tmp_path: Path) -> None:
     with pytest.raises(codebotler.UserError, match=f'"{tmp_path}"'):
         roboeval.load_suite(tmp_path)
-
-
-def test_a_program_and_an_instruction_are_texts() -> None:
-    nothing: Any = None
-    with pytest.raises(codebotler.UserError, match="program is None"):
-        codebotler.check(nothing)
 
 
 def test_generate_works_in_a_notebook_and_refuses_what_makes_no_sense(paper: Suite) -> None:

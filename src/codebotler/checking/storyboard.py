@@ -1,4 +1,4 @@
-"""What a robot did, step by step: as plain data, and drawn room by room."""
+"""A trace for readers: its steps as plain data, and drawn room by room."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def steps_of(trace: Trace, room: Callable[[str], str | None] | None = None) -> l
 
     Args:
         trace: of a run.
-        room: tells which room a request to drive finds; without it, no step says where it happened.
+        room: finds the room that a drive asks for; without it, the steps have no places.
     """
     return [_step_data(number, event, room) for number, event in enumerate(trace, 1)]
 
@@ -82,11 +82,7 @@ def _repeating(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str,
 
 
 def step_text(step: Mapping[str, Any]) -> Text:
-    """A step as one line.
-
-    Args:
-        step: as `steps_of` gives it.
-    """
+    """A step of `steps_of` as one line."""
     text = f'"{shortened(step["text"])}"'
     if step["kind"] == "goto":
         return _drive(step, text)
@@ -118,7 +114,7 @@ def _options(options: Sequence[str | Mapping[str, str]]) -> str:
 
 
 def grid(*justify: Literal["left", "right"]) -> Table:
-    """A table without lines; numbers stand on the right and are never broken."""
+    """A table without lines; columns on the right, for numbers, are never wrapped."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for side in justify:
         table.add_column(justify=side, no_wrap=side == "right", overflow="fold")

@@ -144,8 +144,8 @@ class Appender:
             if is_new:
                 sync_folder(path.parent)
             self._is_file = path.is_file()  # and no device or pipe
-            if self._is_file:
-                self._file.truncate(_whole_length(path))
+            if self._is_file and (whole := _whole_length(path)) < path.stat().st_size:
+                self._file.truncate(whole)
         except BaseException:
             self._file.close()
             raise

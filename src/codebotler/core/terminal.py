@@ -1,4 +1,4 @@
-"""What commands print, and the only place that writes to a terminal: what that would obey is written out."""
+"""All output of the commands, with control characters written out so that a terminal does not obey them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Timer
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -22,34 +22,21 @@ if TYPE_CHECKING:
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 WIDEST = 10_000
-QUIET_S = 2.0  # for so long does a command say nothing at first
-
-
-def open_streams() -> None:
-    """Let standard streams that somebody closed lead nowhere, so that no file of ours takes their place.
-
-    What the output cannot show is written out there, and ends no command.
-    """
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")
+QUIET_S = 2.0  # after which a command says what it is doing
 
 
 @contextmanager
 def noting_all() -> Iterator[None]:
-    """While a command runs: what Python and libraries say is a note, be it a log, a warning or a traceback.
-
-    An error that nobody foresaw ends it with status 1.
-    """
+    """Print logs, warnings and tracebacks as notes while a command runs; an unknown error exits with 1."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # what the terminal cannot show ends no command
     before = logging.lastResort, warnings.showwarning, threading.excepthook
     logging.lastResort = _Notes(logging.WARNING)
     warnings.showwarning = _note_warning
     threading.excepthook = lambda args: _note_error(args.exc_value)
     try:
         yield
-    except Exception as error:  # noqa: BLE001 - whatever it is, it is told
+    except Exception as error:  # noqa: BLE001 - whatever it is
         _note_error(error)
         raise SystemExit(1) from None
     finally:
@@ -61,15 +48,8 @@ class _Notes(logging.Handler):
         note(self.format(record))
 
 
-def _note_warning(  # noqa: PLR0917 - as Python calls it
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,  # noqa: ARG001
-    line: str | None = None,
-) -> None:
-    note(warnings.formatwarning(message, category, filename, lineno, line).rstrip())
+def _note_warning(*warning: Any, **_: object) -> None:  # noqa: ANN401 - as Python calls it
+    note(warnings.formatwarning(*warning[:4]).rstrip())
 
 
 def _note_error(error: BaseException | None) -> None:
@@ -77,17 +57,17 @@ def _note_error(error: BaseException | None) -> None:
 
 
 def flush_output() -> None:
-    """Write what is not yet written."""
+    """Flush the output."""
     sys.stdout.flush()
 
 
 def drop_output() -> None:
-    """Let what is not yet written, and all that follows, go nowhere."""
+    """Discard the rest of the output."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def console(*, stderr: bool = False, highlight: bool = True) -> Console:
-    """Draws on a terminal; the only control characters are those of the drawing itself."""
+    """A rich console that writes no control characters but its own."""
     from rich.console import Console, ConsoleOptions
     from rich.segment import Segment
 
@@ -103,7 +83,7 @@ def console(*, stderr: bool = False, highlight: bool = True) -> Console:
 
 
 def progress(*columns: ProgressColumn) -> Progress:
-    """A bar beside the results, for as long as something goes on; nothing where there is no terminal."""
+    """A progress bar on stderr; nothing without a terminal."""
     from rich.progress import Progress
 
     where = console(stderr=True)
@@ -111,7 +91,7 @@ def progress(*columns: ProgressColumn) -> Progress:
 
 
 def print_rich(what: RenderableType) -> None:
-    """Draw on the terminal; or plainly into a pipe, where no line is broken unless COLUMNS is set."""
+    """Draw on the terminal, or plainly into a pipe, with lines of any length unless COLUMNS is set."""
     from rich.measure import Measurement
 
     drawing = console()
@@ -128,11 +108,7 @@ def print_rich(what: RenderableType) -> None:
 
 @contextmanager
 def busy(doing: str) -> Iterator[None]:
-    """Show that something goes on: on a terminal how long it has taken, elsewhere one line after a while.
-
-    Args:
-        doing: what goes on, such as `checking`.
-    """
+    """Show what a command is doing: with a timer on a terminal, elsewhere in one line after a while."""
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     line = Timer(QUIET_S, note, [f"{doing} ..."])
@@ -147,57 +123,57 @@ def busy(doing: str) -> Iterator[None]:
 
 
 def print_json(data: object) -> None:
-    """Print for machines."""
+    """Print JSON."""
     import json
 
     print(json.dumps(data, indent=2))
 
 
 def print_source(text: str) -> None:
-    """Print a text with an end to its last line; into a file or a pipe as it is, for what reads it there."""
+    """Print a program: visibly on a terminal, as it is into a file or a pipe."""
     if sys.stdout.isatty():
         text = visible_lines(text)
     print(text, end="" if text.endswith("\n") else "\n")
 
 
 def print_text(text: str) -> None:
-    """Print lines for people, at once."""
+    """Print lines for people."""
     print(visible_lines(text), flush=True)
 
 
 def note(sentence: str) -> None:
-    """Say something beside the results."""
+    """Print to stderr, beside the results."""
     print(visible_lines(sentence), file=sys.stderr)
 
 
 def says_yes(question: str) -> bool:
-    """Ask the person who reads this; whoever says nothing, or is not there, does not say yes."""
+    """Ask a question on stderr; anything but yes means no."""
     print(f"{visible(question)} [y/N] ", end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in {"y", "yes"}
 
 
 def system_sentence(error: OSError) -> str:
-    """What the system refuses, of which file, and the mend where there is one for sure."""
+    """An error of the system as a sentence with the file, and the mend for a full disk."""
     where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))
     mend = "; make room and give the same command again" if error.errno in FULL else ""
     return f"{where}: {error.strerror}{mend}"
 
 
 def visible(text: str) -> str:
-    """A text with whatever a terminal would obey or hide, such as ESC, written out as an escape."""
+    """A text with unprintable characters, such as ESC, written out as escapes."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
 
 
 def visible_lines(text: str) -> str:
-    """A text made visible, but for the ends of its lines, where programs and people end them, and tabs."""
+    """A text made visible line by line, with tabs as spaces."""
     if text.isprintable():
         return text
     return "\n".join(visible(line.expandtabs(4)) for line in re.split("\r\n?|\n", text))
 
 
 def shortened(text: str, most: int = 500) -> str:
-    """A text made visible, without what is too much to read."""
+    """A text made visible, and cut where it is too long to read."""
     left = len(text) - most
     return visible(text) if left <= 0 else f"{visible(text[:most])}... {left:,} more characters"

@@ -1,6 +1,5 @@
 """Rows of completions: what is accepted can be copied and read again, and nothing else is accepted."""
 
-import errno
 import json
 import os
 from pathlib import Path
@@ -11,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import MAX_ROW, Appender, sync_folder, to_line, write_whole
+from codebotler.core.files import MAX_ROW, Appender, to_line, write_whole
 from roboeval.evaluation.runs.completions import read_completions
 from roboeval.evaluation.runs.folder import Run, open_source
 from roboeval.suites.load import Suite
@@ -33,7 +32,7 @@ def error_about(path: Path, line: bytes) -> UserError:
         ("prompt", 10**9, "below 1,000,000,000"),
         ("index", 10**9, "below 1,000,000,000"),
         ("index", 10**25, "below 1,000,000,000"),
-        ("index", -1, "at least 0"),
+        ("index", -1, "whole number"),
         ("index", True, "whole number"),
         ("index", "3", "whole number"),
     ],
@@ -144,17 +143,3 @@ def test_a_new_folder_of_a_run_is_on_the_disk(
         (tmp_path / "runs", frozenset({"one"})),
         (tmp_path, frozenset({"runs"})),
     ]
-
-
-def test_a_folder_that_cannot_be_synced_is_told_only_where_the_disk_is_broken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    numbers = iter([errno.EINVAL, errno.EIO])
-
-    def refused(_descriptor: int) -> None:
-        raise OSError(next(numbers), "refused")
-
-    monkeypatch.setattr(os, "fsync", refused)
-    sync_folder(tmp_path)  # many a file system brings no folder to the disk
-    with pytest.raises(OSError, match=str(tmp_path)):
-        sync_folder(tmp_path)
