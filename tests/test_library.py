@@ -248,9 +248,7 @@ def test_a_single_text_is_no_list_of_rooms() -> None:
     [
         ({"samples": 0}, "samples is 0; .* 1 to"),
         ({"samples": 10**9}, "samples is 1000000000; .* 10,000$"),
-        ({"workers": -1}, "workers is -1, .* 1$"),
-        ({"workers": 0}, "workers is 0, .* 1$"),
-        ({"behaviours": {"fly": print}}, 'behaviour .*"get_current_location"'),
+        ({"behaviours": {"fly": print}}, '"get_current_location" has no behaviour'),
     ],
 )
 def test_a_check_of_what_cannot_be_checked_is_refused(wrong: dict[str, Any], named: str) -> None:
@@ -279,7 +277,7 @@ def test_settings_out_of_range_are_refused(wrong: dict[str, Any], named: str) ->
         ({"task": 3}, "task is 3, .*text"),
         ({"prompt": "0"}, "prompt is '0', .*whole number"),
         ({"index": -1}, "index is -1, .* whole number"),
-        ({"index": 10**9}, "index is 1000000000, .* 1,000,000,000$"),
+        ({"index": 10**9}, "index is 1000000000, .* 999,999,999$"),
         ({"program": None}, "program is None, .*text"),
         ({"instruction": 1}, "instruction is 1, .*text"),
         ({"model": 1}, "model is 1, .*text"),

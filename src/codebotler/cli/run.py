@@ -90,9 +90,10 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
 def _prepared(session: MissionSession) -> SessionView:
     """Wait for a checked program, and show what goes on meanwhile."""
     view = session.view
-    while view.busy:
-        with busy(view.busy):
-            view = session.wait_until(lambda now, before=view.busy: now.busy != before)  # type: ignore[misc]
+    while not (view.is_over or view.may_be_approved):
+        before = view.busy
+        with busy(before or "ending"):
+            view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]
     if session.error is not None:
         raise session.error
     return view

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import errno
 import io
 import json
+import os
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -178,6 +180,8 @@ def export(
     """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
+    if not path.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     if path.exists() and not path.is_file():
         whole = io.BytesIO()
         write_mcap(whole, summary, events, folder=folder, clock=clock)

@@ -40,7 +40,7 @@ PRINTS = {"print", "echo", "secho", "confirm", "prompt", "StreamHandler", "basic
 STREAMS = {"stdout", "stderr", "__stdout__", "__stderr__"}
 SOURCE = [Path(package.__file__ or "").parent for package in (codebotler, roboeval)]
 WRITER = Path(terminal.__file__ or "")
-CHILDREN = {"surroundings.py", "channel.py"}
+CHILDREN = {"environment.py", "channel.py"}
 """Programs of their own, whose output we read."""
 
 

@@ -156,7 +156,7 @@ def test_an_unknown_task_of_a_published_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("prompt", "value", "expected"),
     [
-        (-1, "-1", "at least 0"),
+        (-1, "-1", "from 0"),
         ("0", "'0'", "whole number"),
         (True, "True", "whole number"),
     ],

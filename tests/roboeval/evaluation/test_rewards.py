@@ -178,8 +178,6 @@ def test_what_cannot_be_rewarded_is_said_in_a_sentence(paper: Suite) -> None:
 @pytest.mark.parametrize(
     ("task", "prompt", "programs", "named"),
     [
-        ("LunchTime", 0, [None], ["programs is None"]),
-        ("LunchTime", 0, None, ["programs are None", "list"]),
         ("LunchTime", "0", [], ["prompt is '0'", "0 to 4"]),
         ("LunchTime", True, [], ["prompt is True", "0 to 4"]),
         ("LunchTime", -1, [], ["LunchTime/-1/0", "0 to 4"]),

@@ -114,12 +114,12 @@ def test_a_wrong_task_file_gets_a_sentence(tmp_path: Path, old: str, new: str, l
         (
             SUITE + "rules:\n  clock_starts: 2024-01-01T12:00:00\n",
             4,
-            ['"clock_starts" is 2024-01-01 12:00:00', "1970 to 2099"],
+            ['"clock_starts"', "2024", "1970 to 2099"],
         ),
         (
             SUITE + "rules:\n  clock_starts: 9999-12-31T23:59:59Z\n",
             4,
-            ['"clock_starts" is 9999-12-31', "1970 to 2099"],
+            ['"clock_starts"', "9999", "1970 to 2099"],
         ),
         (SUITE + "rules: {literals: loud}\n", 3, ['"literals"', "'loud'"]),
         (SUITE + "rules: {gravity: 9.81}\n", 3, ['"gravity"']),

@@ -56,7 +56,9 @@ class Completion:
     def __post_init__(self) -> None:
         for name, number in (("prompt", self.prompt), ("index", self.index)):
             if type(number) is not int or not 0 <= number < MOST:
-                raise UserError(f"the {name} is {number!r}, but must be a whole number below {MOST:,}")
+                raise UserError(
+                    f"the {name} is {number!r}, but must be a whole number from 0 to {MOST - 1:,}"
+                )
         for name in ("task", "program", "instruction", "model"):
             text = getattr(self, name)
             if not isinstance(text, str) and (text is not None or name in REQUIRED):
