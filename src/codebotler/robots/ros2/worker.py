@@ -115,7 +115,7 @@ class Ros2Worker(SkillWorker):
     """Performs skills over ROS 2."""
 
     def connect(self, start: Message) -> bool:
-        """Start our node, and a client for each server; nobody tells whether an earlier worker died."""
+        """Start our node, and a client for each server; an earlier worker that died leaves no sign."""
         self.graph = Ros2Graph(start["node"])
         actions = start["actions"]
         self.servers = {skill: Ros2Server(self.graph.ours, action) for skill, action in actions.items()}

@@ -53,7 +53,7 @@ class RosbridgeWorker(SkillWorker):
     settles = SETTLES
 
     def connect(self, start: Message) -> bool:
-        """Open the connection; nobody tells whether an earlier worker died."""
+        """Open the connection; an earlier worker that died leaves no sign."""
         actions = start["actions"]
         try:
             self.graph = Connection(start["address"], actions.values(), self._hear, self._lost)
@@ -134,11 +134,12 @@ class RosbridgeWorker(SkillWorker):
         """Cancel the goal that goes on over another connection."""
         goal = self.goal
         if goal is not None and goal.sent is not None and not goal.is_over:
+            where = self.graph.address
             if self.graph.insist(self.graph.protocol.cancel(goal.server.name, goal.handle)):
-                outcome = "; its goal was cancelled over another one"
+                text = f"the connection with {where} was lost; its goal was cancelled over another one"
             else:
-                outcome = ", and its goal goes on: STOP THE ROBOT BY HAND"
-            self.end(goal, "lost", text=f"{self.graph.why_left()}{outcome}")
+                text = f"the connection with {where} was lost, and its goal goes on: STOP THE ROBOT BY HAND"
+            self.end(goal, "lost", text=text)
 
 
 if __name__ == "__main__":
