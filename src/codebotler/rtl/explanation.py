@@ -69,12 +69,12 @@ def explain(formula: Formula, trace: Trace) -> Explanation | None:
     deciding = _deciding(clause, trace, is_true=False)
     facts = [_fact(test, trace, is_true=is_true) for test, is_true in deciding]
     if len(facts) == 1:
-        told = f"{facts[0].told}{facts[0].ending}{facts[0].detail}"
+        text = f"{facts[0].text}{facts[0].ending}{facts[0].detail}"
     else:
         both = "both" if len(facts) == 2 else "all"  # noqa: PLR2004 - that is what both means
-        told = f"{', and it '.join(fact.told for fact in facts)}; these must not {both} be so"
+        text = f"{', and it '.join(fact.text for fact in facts)}; these must not {both} be so"
     event = max((fact.event for fact in facts if fact.event is not None), default=None)
-    return Explanation(clause, event, " ".join(f"the robot {told}".split()))
+    return Explanation(clause, event, " ".join(f"the robot {text}".split()))
 
 
 def _failing_part(formula: Formula, trace: Trace) -> Formula:
@@ -126,7 +126,7 @@ class _Fact(NamedTuple):
     """Whether a test is true, in English; the words `the robot` stand before it."""
 
     event: int | None
-    told: str
+    text: str
     ending: str = ""  # what was required instead, unless other facts follow
     detail: str = ""  # what came nearest
 
@@ -147,8 +147,8 @@ def _presence(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
     at = next(at for at in here if matches(element, trace, at))
     done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
     place = "" if isinstance(test, Exists) else f" in {room(test.arrival.text)}"
-    told = f"{did}{place} at step {at + 1}{_where(test.scopes, trace)}"
-    return _Fact(at, told, ", which it must not do", "" if done == did else f": it {done}")
+    text = f"{did}{place} at step {at + 1}{_where(test.scopes, trace)}"
+    return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}")
 
 
 def _absence(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
@@ -161,8 +161,8 @@ def _absence(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
     arrivals = [at for at in span if matches(test.arrival, trace, at)]
     if not arrivals:
         _, detail = _instead(test.arrival, trace, span)
-        told = f"never {deed(test.arrival, 'past', negated=True)}{where}"
-        return _Fact(None, told, f", where it was to {deed(element, 'base')}", detail)
+        text = f"never {deed(test.arrival, 'past', negated=True)}{where}"
+        return _Fact(None, text, f", where it was to {deed(element, 'base')}", detail)
     first = isinstance(test, ActAtFirst)
     there = "during that stay" if first and len(arrivals) > 1 else "there"
     event, detail = _instead(element, trace, here)
@@ -173,8 +173,8 @@ def _absence(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> _Fact:
     visits = arrivals[:1] if first else arrivals
     rooms = dict.fromkeys(happening(trace[at], test.arrival) for at in visits)
     failed = f"did not {deed(element, 'base', negated=True)} {there}{where}"
-    told = f"went to {listed(few([*rooms]))} at {_steps(visits)} but {failed}"
-    return _Fact(arrivals[0] if event is None else event, told, detail=detail)
+    text = f"went to {listed(few([*rooms]))} at {_steps(visits)} but {failed}"
+    return _Fact(arrivals[0] if event is None else event, text, detail=detail)
 
 
 def _number(test: Count | AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
@@ -182,21 +182,21 @@ def _number(test: Count | AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
     span = scoped(test.scopes, trace)
     found = [at for at in span if _is_match(test.element, trace, at)]
     if found:
-        told = f"{deed(test.element, 'past')} {times(len(found))} ({_steps(found)}){where}"
+        text = f"{deed(test.element, 'past')} {times(len(found))} ({_steps(found)}){where}"
     else:
-        told = f"never {deed(test.element, 'past', negated=True)}{where}"
+        text = f"never {deed(test.element, 'past', negated=True)}{where}"
     if is_true:
         limit = (
             f"must not do so exactly {times(number)}"
             if exactly
             else f"must do so fewer than {number:,} times"
         )
-        return _Fact(found[-1] if found else None, told, f", but {limit}")
+        return _Fact(found[-1] if found else None, text, f", but {limit}")
     if not found:
         _, detail = _instead(test.element, trace, span)
-        return _Fact(None, told, f", but should have {'' if exactly else 'at least '}{times(number)}", detail)
+        return _Fact(None, text, f", but should have {'' if exactly else 'at least '}{times(number)}", detail)
     ending = f" instead of {'' if exactly else 'at least '}{times(number)}"
-    return _Fact(found[number] if len(found) > number else None, told, ending)
+    return _Fact(found[number] if len(found) > number else None, text, ending)
 
 
 def _positions(test: Exists | ActAtFirst | ActAtSome, trace: Trace) -> Iterable[int]:
@@ -218,7 +218,7 @@ def _where(scopes: tuple[Scope, ...], trace: Trace) -> str:
         at = bound(scope, trace, span)
         when = "after" if scope.name.startswith("After") else "before"
         if at is None:
-            done = f"{deed(scope.element, 'ing')} (which it did not do, so this sets no limit)"
+            done = f"{deed(scope.element, 'ing')} (no such step, so no limit)"
         else:
             done = f"{verb(scope.element.kind).ing} {happening(trace[at], scope.element)} (step {at + 1})"
         parts.append(f" {when} {done}")
