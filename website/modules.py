@@ -16,7 +16,7 @@ def section() -> str:
     parts = [HEAD.strip(), "The first line of each module; `python website/modules.py` writes this list."]
     for package in ("codebotler", "roboeval"):
         source = ROOT / "src" / package
-        rooms = [source, *sorted(path for path in source.rglob("*") if (path / "__init__.py").exists())]
+        rooms = sorted({path.parent for path in source.rglob("*.py")})
         parts += [table for room in rooms if (table := _table(room))]
     return "\n\n".join(parts) + "\n"
 
@@ -26,7 +26,8 @@ def _table(room: Path) -> str:
     if not rows:
         return ""
     name = str(room.relative_to(ROOT / "src"))
-    return "\n".join([f"| `{name}/` | {_first_line(room / '__init__.py')} |", "|---|---|", *rows])
+    entry = next(path for path in (room / "__init__.py", room / "__main__.py") if path.exists())
+    return "\n".join([f"| `{name}/` | {_first_line(entry)} |", "|---|---|", *rows])
 
 
 def _rows(room: Path) -> Iterator[str]:
@@ -41,7 +42,7 @@ def _first_line(path: Path) -> str:
 
 def page() -> str:
     """The page with the section as it should be."""
-    return PAGE.read_text().partition(HEAD)[0] + section()
+    return PAGE.read_text().partition(HEAD)[0].rstrip() + "\n\n" + section()
 
 
 if __name__ == "__main__":

@@ -479,7 +479,7 @@ def test_what_became_of_a_mission_is_said_after_the_tool_died(tmp_path: Path, op
         server.end(signal.SIGKILL)
     with PageServer(tmp_path) as server:
         page = opened(server)
-        expect(page.locator(".interrupted").first).to_contain_text("the tool died during go_to")
+        expect(page.locator(".interrupted").first).to_contain_text("ended unexpectedly during go_to")
         page.get_by_role("button", name="Dismiss").click()
         expect(page.locator(".interrupted").first).to_be_hidden()
         page.context.close()

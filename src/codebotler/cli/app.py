@@ -67,7 +67,7 @@ def generate(
     model: ModelOption = "recorded",
     world: WorldOption = None,
     retries: Annotated[
-        int | None, typer.Option(min=0, help="Ask so many times more while there are problems.")
+        int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
     ] = None,
     repair: Annotated[
         bool, typer.Option("--repair", help="Ask again with the program and its problems; once by default.")
@@ -113,9 +113,9 @@ def check(
     program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
     world: WorldOption = None,
     samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
-    seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
+    seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Draw also what the program never looks for.")
+        bool, typer.Option("--strict", help="Do not take for granted what the program never looks for.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="Runs that go on at the same time.")] = 1,
@@ -209,7 +209,7 @@ def missions(
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; name it, or `last`")
     if clock not in {"wall", "robot"}:
-        raise UserError(f'"{clock}" is no clock; write wall or robot')
+        raise UserError(f'unknown clock "{clock}"; use wall or robot')
     if mission is None:
         show_missions(home(), json=json)
     elif mcap is None:
@@ -264,7 +264,8 @@ def serve(
     ] = 60.0,
     face_token: Annotated[str | None, typer.Option(help="What opens the face; a new one by default.")] = None,
     stop_when_alone: Annotated[
-        float | None, typer.Option(min=1, help="Stop the robot so many seconds after the last page closed.")
+        float | None,
+        typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
 ) -> None:
@@ -310,7 +311,7 @@ def virtual_robot(
     port: Annotated[
         int | None,
         typer.Option(
-            min=1, max=65535, help="Of the ROS master; that of ROS_MASTER_URI, or 11311, by default."
+            min=1, max=65535, help="The port of the ROS master; by default from ROS_MASTER_URI, or 11311."
         ),
     ] = None,
     speed: Annotated[float, typer.Option(help="How many of the robot's seconds pass in a real one.")] = 1.0,

@@ -36,14 +36,14 @@ def read_program(name: str) -> str:
     """
     if name != "-":
         if not name:
-            raise UserError("nothing is named; name a file, or - for standard input")
+            raise UserError("no file is named; name one, or - for standard input")
         text = read_text(Path(name))
         if not text.strip():
             raise UserError("there is no program in it", file=name)
         return text
     text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
     if not text.strip():
-        raise UserError("nothing came; write a program or a model's reply to it", file=INPUT)
+        raise UserError("nothing came; pipe a program or a model's reply into it", file=INPUT)
     return text if TASK in bound_names(text) else program_of(text).source
 
 
@@ -100,7 +100,7 @@ def _rooms(found: Check) -> Text:
     if not found.rooms_are_guessed:
         return Text(f"rooms: {rooms}", "dim")
     told = f"rooms, taken from the program itself: {rooms}"
-    return Text(f"{told}\nwhether it misspells one shows only with --world FILE", "yellow")
+    return Text(f"{told}\nto find misspelt rooms, name a world with --world FILE", "yellow")
 
 
 def _in_vain(found: Check) -> Iterator[Text]:
@@ -108,7 +108,8 @@ def _in_vain(found: Check) -> Iterator[Text]:
     if 0 < count < len(found.samples):
         often = f"{count} of {len(found.samples)} worlds"
         yield Text(
-            f"in {often} the robot waits or searches in vain, which is not held against the program", "dim"
+            f"in {often} the robot waits or searches without success, which is not counted as a problem",
+            "dim",
         )
 
 

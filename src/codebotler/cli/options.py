@@ -15,8 +15,8 @@ ModelOption = Annotated[
     ),
 ]
 WorldOption = Annotated[Path | None, typer.Option(help="The world file that tells which rooms there are.")]
-TemperatureOption = Annotated[float, typer.Option(help="How far the model strays from the likeliest.")]
-TopPOption = Annotated[float, typer.Option(help="The share of likely tokens that are drawn from.")]
+TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
+TopPOption = Annotated[float, typer.Option(help="The share of likely tokens to sample from (top-p).")]
 MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
 SeedOption = Annotated[int | None, typer.Option(help="Fix the random numbers, where a model takes a seed.")]
 TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]

@@ -152,7 +152,7 @@ def robots_view(kinds: Sequence[Readiness]) -> Table:
     """Which robots work here, and what is missing for the others."""
     table = grid("left", "left", "left")
     for kind in kinds:
-        works = Text("works", "green") if kind.works else Text("missing", "red")
-        parts = [kind.missing, kind.mend and f"mend it with: {kind.mend}", kind.note]
+        works = Text("works", "green") if kind.works else Text("unavailable", "red")
+        parts = [kind.missing, kind.mend and f"to fix: {kind.mend}", kind.note]
         table.add_row(Text(kind.name, "bold"), works, Text("\n".join(filter(None, parts))))
     return table

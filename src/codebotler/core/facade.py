@@ -1,4 +1,4 @@
-"""Lazy public names of a package: each is imported when it is first used."""
+"""Lazy imports: the public names of a package, each imported when it is first used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All output of the commands, with control characters written out so that a terminal does not obey them."""
+"""All output of the commands; control characters are escaped, so that no terminal obeys them."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ GRACE = 10.0
 """Real seconds that a robot has to confirm a stop."""
 
 UNCONFIRMED = (
-    "the robot was told to stop and has not confirmed it; go and look, and use its emergency stop if it moves"
+    "the robot has not confirmed the stop; check it now, and press its emergency stop if it still moves"
 )
 
 
@@ -250,7 +250,7 @@ class Mission:
             self._wake.wait()
         except BaseException:
             with suppress(MissionError):
-                self.stop("the end of the tool")
+                self.stop("CodeBotler, which was shutting down")
             raise
         finally:
             if not self._over.wait(GRACE):
@@ -313,9 +313,9 @@ class Mission:
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state in {State.RUNNING, State.STOPPING}:
-            self.stop("the end of the tool")
+            self.stop("CodeBotler, which was shutting down")
         elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
-            self.stop("its creator")
+            self.stop("CodeBotler")
         else:
             self.fail(visible(str(error)) or type(error).__name__)
 

@@ -1,4 +1,4 @@
-"""What a robot is doing, where it is, and what was spoken, by the events of its mission."""
+"""What a robot is doing, where it is and what was said, derived from a mission's events."""
 
 from __future__ import annotations
 

@@ -112,11 +112,11 @@ def _last_told(events: list[Line]) -> Line | None:
 
 def _how(summary: Summary, events: list[Line]) -> str:
     if State(summary.state) not in {State.RUNNING, State.STOPPING}:
-        return f"the tool died while the mission was {summary.state}; nothing had moved"
+        return f"CodeBotler ended unexpectedly while the mission was {summary.state}; nothing had moved"
     skill = doing(events)
     if skill is None:
-        return "the tool died while the robot did nothing"
+        return "CodeBotler ended unexpectedly while the robot was idle"
     going = call_text(skill["skill"], list(skill["arguments"].values()))
     where = next((e["text"] for e in reversed(events) if e["event"] == "feedback"), "")
     where = f" ({where})" if where else ""
-    return f"the tool died during {going}{where}; {summary.if_tool_dies}"
+    return f"CodeBotler ended unexpectedly during {going}{where}; {summary.if_tool_dies}"

@@ -1,4 +1,4 @@
-"""The program in a model's reply; nothing is ever completed or repaired."""
+"""Extracts the program from a model's reply, without fixing or completing it."""
 
 from __future__ import annotations
 

@@ -205,7 +205,7 @@ class RosRobot:
             if not other.about["cancelled_all"]:
                 return UNCANCELLED
             self._in_doubt = False
-            return "another one has cancelled all goals"
+            return "another worker has cancelled all goals"
 
 
 def actions_of(skills: SkillTable) -> Message:

@@ -1,4 +1,4 @@
-"""A worker process of the robot's own Python, seen from the tool: lines of JSON in both directions."""
+"""CodeBotler's handle on a worker process under the robot's Python; they exchange lines of JSON."""
 
 from __future__ import annotations
 

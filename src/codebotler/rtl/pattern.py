@@ -1,4 +1,4 @@
-"""How RTL compiles a regex, and how it writes one."""
+"""The regexes in formulas: compiled, and printed back."""
 
 from __future__ import annotations
 

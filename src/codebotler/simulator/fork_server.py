@@ -1,4 +1,4 @@
-"""A fork server as seen from outside: forks an isolated child whenever one is asked for."""
+"""The engine's handle on a fork server: asks it for a new isolated process for each run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An isolated process as seen from outside: how it is started, frames in and out, and how it ended."""
+"""The engine's handle on an isolated process: starts it, exchanges messages, learns how it ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The preparer as seen from outside: turns programs into code that a child can run."""
+"""The engine's handle on the preparer: sends it a program and gets compiled code back."""
 
 from __future__ import annotations
 

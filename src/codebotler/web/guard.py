@@ -118,7 +118,7 @@ class Guard:
         if name not in self._rules.hosts and not (self._rules.any_address and _is_address(name)):
             raise RefusedError(
                 HTTPStatus.MISDIRECTED_REQUEST,
-                "this page does not go by that name; use the link that was printed when it started",
+                "this server does not answer to that host name; use the link that was printed at the start",
             )
 
     def _role(self, request: HTTPConnection) -> Role | None:
@@ -137,7 +137,7 @@ class Guard:
             return self._rules.access.of_token(token, request.client.host if request.client else "")
         except TooManyTriesError:
             raise RefusedError(
-                HTTPStatus.TOO_MANY_REQUESTS, "too many wrong tokens came from there; wait a minute"
+                HTTPStatus.TOO_MANY_REQUESTS, "too many wrong tokens came from your address; wait a minute"
             ) from None
 
     def _let_in(self, token: str, request: HTTPConnection) -> Response:

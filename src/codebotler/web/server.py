@@ -34,7 +34,7 @@ from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
 from codebotler.web.guard import MOST_BYTES, NO_PAGE, REFUSAL, Guard
 
 STATIC = Path(__file__).with_name("static")
-LEAVING = "the last operator, who left"
+LEAVING = "the last operator, who closed the page"
 RUNS = Path("runs")
 METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 SOCKETS = "/_nicegui_ws/"
@@ -214,5 +214,7 @@ class _Server(uvicorn.Server):
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:
-            threading.Thread(target=self._console.stop, args=("the end of the page",), daemon=True).start()
+            threading.Thread(
+                target=self._console.stop, args=("CodeBotler, which was shutting down",), daemon=True
+            ).start()
         super().handle_exit(sig, frame)

@@ -94,7 +94,7 @@ def strips(check: Check) -> list[Strip]:
 def _strip(sample: Sample, check: Check) -> Strip:
     error = sample.outcome.error
     if sample.in_vain:
-        ending = "The robot waits or searches in vain, which is not counted as a problem."
+        ending = "The robot waits or searches without success, which is not counted as a problem."
     elif error is not None:
         ending = f"Fails: {shortened(error.message, MOST_TEXT)} ({shortened(error.kind)})"
     else:

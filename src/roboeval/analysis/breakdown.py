@@ -1,4 +1,4 @@
-"""What makes a difference to models: abilities that tasks take, coming back to report, and phrasing."""
+"""Pass rates by the abilities a task needs, by whether the robot must report back, and by phrasing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Failing completions put together by what went wrong, with the reason and a near program that passes."""
+"""Groups failing programs by cause, each with its reason and the most similar program that passes."""
 
 from __future__ import annotations
 

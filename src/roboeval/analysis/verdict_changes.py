@@ -1,4 +1,4 @@
-"""What other checks change: completions with another verdict, and whether models change places."""
+"""Verdicts under two suites compared: which completions change, and whether the ranking of models does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts of a report's page: tables, which are written as CSV as well, figures and texts."""
+"""The building blocks of a report: tables (also written as CSV), figures and text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Covering arrays: few rows in which every two values of any two factors meet."""
+"""Pairwise testing: a small set of combinations that covers every pair of values."""
 
 from __future__ import annotations
 

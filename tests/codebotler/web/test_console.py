@@ -291,7 +291,7 @@ def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
     mission._log.close()
     with desk_of(tmp_path) as console:
         assert [summary.id for summary in console.interrupted] == [mission.id]
-        assert "the tool died" in console.interrupted[0].reason
+        assert "ended unexpectedly" in console.interrupted[0].reason
 
 
 def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:

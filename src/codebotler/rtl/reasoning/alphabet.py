@@ -1,4 +1,4 @@
-"""The alphabet of formulas: one sample event for each way in which their elements can match an event."""
+"""Reduces all possible events to a finite set: one for each way in which formulas can tell them apart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sample strings that match some texts of formulas and not others.
+"""Strings that match some of the regexes in formulas but not the others.
 
 They are put together from samples of the texts' regexes, and each is tried. A combination for which none was
 found may still have one.

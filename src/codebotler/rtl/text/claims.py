@@ -1,4 +1,4 @@
-"""Texts of formulas that match what a sentence claims: a number of things, a time of day, a yes or a no."""
+"""Matchers for what a sentence claims: a count, a time of day, yes or no."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The socket between a child and the engine: frames of JSON go out, frames of marshal come in.
+"""The socket between an isolated process and the engine: JSON goes out, Python's `marshal` comes in.
 
 Only what the engine has written is ever unmarshalled. Nothing that a program does to `json`, `os` or the
 builtins is felt here: all that is needed is held under names of our own.

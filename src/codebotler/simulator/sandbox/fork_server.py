@@ -1,4 +1,4 @@
-"""The fork server: forks one child a run, each from the same heap, and reports how it ended."""
+"""Forks a process for each run, always from the same memory image, and reports how each ended."""
 
 from __future__ import annotations
 

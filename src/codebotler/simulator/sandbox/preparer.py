@@ -1,4 +1,4 @@
-"""The preparer: a closed process that parses and compiles programs, and never runs a line of one.
+"""Parses and compiles programs in an isolated process, and never executes them.
 
 A program runs in several worlds, each time in a fresh child. Compiled here, once and in a process that is
 warm, it costs each of them next to nothing. Code goes through the engine unopened, to the child that runs it.

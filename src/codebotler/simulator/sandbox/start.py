@@ -1,4 +1,4 @@
-"""The script that isolated processes start with: fixes addresses and limits, then hands over to a role."""
+"""Starts every isolated process: fixes memory layout and limits, then its role: preparer or fork server."""
 
 from __future__ import annotations
 
