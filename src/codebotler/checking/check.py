@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -14,6 +13,7 @@ from codebotler.checking.static import static_problems
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import Flaw, parsed, tree_of
 from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.world import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import Behaviour
@@ -127,7 +127,10 @@ def _checked(program: str, room_map: RoomMap, settings: CheckSettings, runs: Sam
 def _room_map(program: str, rooms: Sequence[str] | None, start: str | None, skills: SkillTable) -> RoomMap:
     if rooms is not None:
         for room in rooms:
-            _expect_regex(room)
+            try:
+                check_regex(room)
+            except ValueError as error:
+                raise UserError(f'the room is "{room}", but {error}') from None
         names = tuple(dict.fromkeys(rooms)) or (start or START,)
         start = start or (START if START in names else names[0])
         if start not in names:
@@ -139,13 +142,6 @@ def _room_map(program: str, rooms: Sequence[str] | None, start: str | None, skil
     if len(named) < len(SOME_ROOMS) and lists_rooms(tree):
         named += [room for room in SOME_ROOMS if room not in named]
     return RoomMap((*named, start), start, guessed=True)
-
-
-def _expect_regex(room: str) -> None:
-    try:
-        re.compile(room)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise UserError(f'the room "{room}" is no valid regular expression: {error}') from None
 
 
 def _widened(room_map: RoomMap, ran: Iterable[Sample]) -> RoomMap:

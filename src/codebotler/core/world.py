@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import warnings
 from dataclasses import dataclass, replace
-from math import dist
 from pathlib import Path
 from typing import Annotated, TypeAlias
 
@@ -148,6 +147,19 @@ def laid_out(world: World) -> World:
 
 Text = Annotated[str, StringConstraints(strict=True)]
 Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
+
+
+def check_regex(text: str) -> str:
+    """A text, unless it is no regular expression."""
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise ValueError(f"it is no valid regular expression: {error}") from None
+    return text
+
+
+Pattern = Annotated[Text, AfterValidator(check_regex)]
+NamePattern = Annotated[Name, AfterValidator(check_regex)]
 Metres = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
 Corner: TypeAlias = tuple[Metres, Metres]
 
@@ -173,16 +185,16 @@ def _kind_of_answer(value: object) -> str:
 
 
 AnswerFile = Annotated[
-    Annotated[Text, Tag("text")] | Annotated[OptionFile, Tag("option")], Discriminator(_kind_of_answer)
+    Annotated[Pattern, Tag("text")] | Annotated[OptionFile, Tag("option")], Discriminator(_kind_of_answer)
 ]
 
 
 class PersonFile(_Form):
     """A person in a world file."""
 
-    name: Name
+    name: NamePattern
     answers: list[AnswerFile] = []
-    topics: dict[Name, AnswerFile] = {}
+    topics: dict[NamePattern, AnswerFile] = {}
     after_looks: Annotated[int, Field(strict=True, ge=0, le=1_000)] = 0
     leaves: Annotated[bool, Field(strict=True)] = False
 
@@ -200,7 +212,7 @@ def _answer(form: AnswerFile) -> Answer:
 class RoomFile(_Form):
     """A room in a world file: its name alone, or with geometry."""
 
-    name: Name
+    name: NamePattern
     footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
     stand_at: Corner | None = None
 
@@ -216,7 +228,7 @@ class WorldFile(_Form):
     about: Text = ""
     robot: Name
     rooms: Annotated[list[RoomFile], Field(min_length=1)]
-    objects: dict[Text, list[Name]] = {}
+    objects: dict[Text, list[NamePattern]] = {}
     people: dict[Text, list[PersonFile]] = {}
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
 
@@ -229,14 +241,19 @@ class WorldFile(_Form):
         """
         names = [room.name for room in self.rooms]
         for index, room in enumerate(self.rooms):
-            expect_regex(room.name, file, (*at, "rooms", index))
             if room.name in names[:index]:
                 raise file.wrong(f'the room "{room.name}" is here twice; remove one', *at, "rooms", index)
-            if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
+            if room.stand_at and room.footprint and not _is_around(room.footprint, room.stand_at):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
                 raise file.wrong(f"{sentence}; move one of them", *at, "rooms", index, "stand_at")
-        self._check_places(file, at, names)
+        known = ", ".join(names)
+        if self.robot not in names:
+            raise file.wrong(f'the robot starts in "{self.robot}", but the rooms are: {known}', *at, "robot")
+        for key, named in (("objects", self.objects), ("people", self.people)):
+            for name in named:
+                if name not in names:
+                    raise file.wrong(f'there is no room "{name}"; the rooms are: {known}', *at, key, name)
         return World(
             rooms=tuple(
                 Room(
@@ -253,55 +270,11 @@ class WorldFile(_Form):
             may_wait_forever=self.may_wait_forever,
         )
 
-    def _check_places(self, file: YamlFile, at: Place, rooms: list[str]) -> None:
-        known = ", ".join(rooms)
-        if self.robot not in rooms:
-            raise file.wrong(f'the robot starts in "{self.robot}", but the rooms are: {known}', *at, "robot")
-        for key, named in (("objects", self.objects), ("people", self.people)):
-            for room in named:
-                if room not in rooms:
-                    raise file.wrong(f'there is no room "{room}"; the rooms are: {known}', *at, key, room)
-        self._check_regexes(file, at)
 
-    def _check_regexes(self, file: YamlFile, at: Place) -> None:
-        for room, labels in self.objects.items():
-            for index, label in enumerate(labels):
-                expect_regex(label, file, (*at, "objects", room, index))
-        for room, people in self.people.items():
-            for index, person in enumerate(people):
-                here = (*at, "people", room, index)
-                expect_regex(person.name, file, (*here, "name"))
-                for number, answer in enumerate(person.answers):
-                    expect_regex(answer, file, (*here, "answers", number))
-                for topic, answer in person.topics.items():
-                    expect_regex(topic, file, (*here, "topics", topic))
-                    expect_regex(answer, file, (*here, "topics", topic))
-
-
-_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
-
-
-def _is_within(point: Point, corners: list[Point]) -> bool:
-    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
-    x, y = point
-    odd = False
-    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
-    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        detour = dist(point, (x1, y1)) + dist(point, (x2, y2)) - dist((x1, y1), (x2, y2))
-        if detour <= _ON_EDGE * size:
-            return True
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
-            odd = not odd
-    return odd
-
-
-def expect_regex(text: str | OptionFile, file: YamlFile, place: Place) -> None:
-    """Refuse a text that is no regular expression."""
-    try:
-        if isinstance(text, str):
-            re.compile(text)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise file.wrong(f'"{text}" is no valid regular expression: {error}', *place) from None
+def _is_around(corners: list[Corner], point: Corner) -> bool:
+    """Whether a point is between the smallest and the largest coordinates of a footprint."""
+    axes = zip(point, zip(*corners, strict=True), strict=True)
+    return all(min(values) <= coordinate <= max(values) for coordinate, values in axes)
 
 
 def _person_data(person: Person) -> dict[str, object]:

@@ -60,7 +60,8 @@ def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
 
 
 def _quoted(value: object) -> str:
-    text, half = repr(value), LONGEST_VALUE // 2
+    text = f'"{value}"' if isinstance(value, str) else str(value)
+    half = LONGEST_VALUE // 2
     return text if len(text) <= LONGEST_VALUE else f"{text[:half]}...{text[-half:]}"
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from codebotler.core.errors import UserError
 from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.world import expect_regex
 from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
 from roboeval.suites.schema import DrawnTaskFile, ScenarioFile, TaskFile
@@ -54,9 +53,6 @@ def read_task(
     form = file.validate(DrawnTaskFile, data) if drawn else file.validate(TaskFile, data)
     if form.name != path.stem:
         raise file.wrong(f'the task is named "{form.name}", but its file "{path.name}"', "name")
-    for number, fact in enumerate(form.facts):
-        for word in fact.words:
-            expect_regex(word, file, ("facts", number, "words"))
     ablation = None
     if isinstance(form, DrawnTaskFile):
         reader = _Reader(form, file, skills, _phrases(form, file, words))
