@@ -61,7 +61,7 @@ serve: $(VENV)/installed
 	@CODEBOTLER_HOME=$(VENV)/home $(BIN)/codebotler serve --world examples/office.yaml --speed 5
 
 test: $(VENV)/tested
-	$(BIN)/python -m pytest --numprocesses 3 --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)
+	$(BIN)/python -m pytest --numprocesses 2 --dist worksteal -m "not slow" $(addprefix --ignore ,$(APART)) $(TESTS)
 
 test-all: test test-slow test-suites test-guide test-ros1 test-browser test-faulty-server test-transformers test-pyrobosim \
 	test-inspect test-ray
@@ -76,10 +76,10 @@ test-guide: $(VENV)/tested
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadgroup tests/guide
 
 test-ros1: $(VENV)/tested
-	$(BIN)/python -m pytest --no-skips --numprocesses 4 tests/ros1
+	$(BIN)/python -m pytest --no-skips --numprocesses 3 tests/ros1
 
 test-browser: $(VENV)/tested
-	$(BIN)/python -m pytest --no-skips --numprocesses 3 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
+	$(BIN)/python -m pytest --no-skips --numprocesses 2 --dist loadfile $(if $(SHOTS),--shots "$(SHOTS)") tests/browser
 
 pictures: $(VENV)/tested
 	@shots=$$(mktemp -d) && \

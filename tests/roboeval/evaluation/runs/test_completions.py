@@ -29,9 +29,9 @@ def error_about(path: Path, line: bytes) -> UserError:
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("prompt", 10**9, "below 1,000,000,000"),
-        ("index", 10**9, "below 1,000,000,000"),
-        ("index", 10**25, "below 1,000,000,000"),
+        ("prompt", 10**9, "999,999,999"),
+        ("index", 10**9, "999,999,999"),
+        ("index", 10**25, "999,999,999"),
         ("index", -1, "whole number"),
         ("index", True, "whole number"),
         ("index", "3", "whole number"),
