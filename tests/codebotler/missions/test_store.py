@@ -47,7 +47,7 @@ THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "r
         (State.APPROVED, [], ["approved", "nothing"]),
         (State.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen")', "(at (1.0, 2.0))", IF_TOOL_DIES]),
         (State.STOPPING, [RUNNING, DRIVE], ['go_to("kitchen"); ', IF_TOOL_DIES]),
-        (State.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot did nothing"]),
+        (State.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot was idle"]),
     ],
 )
 def test_mission_of_a_tool_that_died_was_interrupted(
