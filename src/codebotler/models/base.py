@@ -41,7 +41,7 @@ class SamplingSettings:
 
     def __post_init__(self) -> None:
         if self.temperature is not None and not 0 <= self.temperature <= HOTTEST:
-            raise UserError(f"the temperature is {self.temperature:g}, but it must be from 0 to {HOTTEST}")
+            raise UserError(f"the temperature is {self.temperature:g}, but must be between 0 and {HOTTEST}")
         if self.top_p is not None and not 0 < self.top_p <= 1:
             raise UserError(f"top-p is {self.top_p:g}, but it must be above 0 and at most 1")
         if self.max_tokens < 1:

@@ -158,8 +158,8 @@ def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"temperature": -0.1}, ["temperature", " -0.1,", "0 to 100"]),
-        ({"temperature": float("nan")}, ["temperature", " nan,", "0 to 100"]),
+        ({"temperature": -0.1}, ["temperature", " -0.1,", "0 and 100"]),
+        ({"temperature": float("nan")}, ["temperature", " nan,", "0 and 100"]),
         ({"top_p": 0.0}, ["top-p", " 0,", " 1"]),
         ({"top_p": 1.5}, ["top-p", " 1.5,", " 1"]),
         ({"max_tokens": 0}, ["tokens", " 0,", " 1"]),
