@@ -96,7 +96,7 @@ def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
     [
         (("--model", "nonsense"), ['"nonsense"', "recorded, "]),
         (("--tasks", "Nonsense"), ['"paper"', '"Nonsense"', "CountSavory"]),
-        (("--temperature", "-1"), ["temperature", "-1", "0 to 100"]),
+        (("--temperature", "-1"), ["temperature", "-1", "0 and 100"]),
         (("--num-completions", "0"), ["invalid value", "'--num-completions'"]),
         (("--concurrency", "0"), ["invalid value", "'--concurrency'"]),
         (("--out", ""), ["nothing", "a run"]),
