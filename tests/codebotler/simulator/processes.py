@@ -43,5 +43,12 @@ def are_gone(pids: set[int]) -> bool:
 
 
 def fork_servers() -> set[int]:
-    """The processes directly below this one, which fork those of the runs."""
-    return {pid for pid, parent in parents().items() if parent == os.getpid()}
+    """The isolated processes directly below this one; not what else tests have started."""
+    return {pid for pid, parent in parents().items() if parent == os.getpid() and _is_isolated(pid)}
+
+
+def _is_isolated(pid: int) -> bool:
+    try:
+        return b"sandbox/start.py" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False

@@ -281,7 +281,7 @@ def test_the_robot_is_stopped_when_the_tool_ends_and_told_of_when_it_is_killed(t
         server.end(signal.SIGINT)
     (stopped,) = missions(tmp_path / "home")
     assert stopped.state == "stopped"
-    assert "end of the page" in stopped.reason
+    assert "shutting down" in stopped.reason
     with PageServer(tmp_path) as server:
         view = begun(server, FAR)
         server.call("POST", "/api/missions/current/approve", {"program": view["digest"]})
