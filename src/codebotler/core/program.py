@@ -87,6 +87,9 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
         source: any text.
         compiled: whether to look also for errors that the compiler finds, such as a stray `return`.
     """
+    if "\0" in source:
+        line = source[: source.index("\0")].count("\n") + 1
+        return Flaw(line, "SyntaxError", "the program holds a null character")
     try:
         tree = parse(source)
         if compiled:
@@ -94,9 +97,12 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
                 compile(tree, FILE, "exec", dont_inherit=True)
     except SyntaxError as error:
         return Flaw(error.lineno or None, type(error).__name__, f"the program does not parse: {error.msg}")
+    except UnicodeEncodeError as error:
+        line = source[: error.start].count("\n") + 1
+        return Flaw(line, type(error).__name__, "the program holds half a character, which cannot be encoded")
     except (RecursionError, MemoryError) as error:
         return _too_deep(error)
-    except (ValueError, OverflowError, SystemError) as error:  # such as a null character
+    except (ValueError, OverflowError, SystemError) as error:
         return Flaw(None, type(error).__name__, f"the program cannot be read: {error}")
     return tree
 
