@@ -1,6 +1,6 @@
 """Judge a program in every world of a task, and say why it fails where it does."""
 
-from codebotler.core.tracefile import trace_from
+from codebotler.core.trace import trace_from
 from codebotler.rtl import explain
 from roboeval import Completion, evaluate, load_suite
 

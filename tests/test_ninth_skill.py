@@ -10,8 +10,7 @@ from codebotler.checking.check import check
 from codebotler.core.errors import UserError
 from codebotler.core.program import Flaw, Program
 from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
-from codebotler.core.trace import Event, Option, Outcome, RunError, Status
-from codebotler.core.tracefile import trace_data, trace_from
+from codebotler.core.trace import Event, Option, Outcome, RunError, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
 from codebotler.rtl import holds, parse

@@ -28,7 +28,7 @@ WIDTH = 82  # letters in a line of `--help` here
 MODULES = {
     "codebotler": (
         *("codebotler", "codebotler.simulator", "codebotler.core.program", "codebotler.core.world"),
-        *("codebotler.core.trace", "codebotler.core.tracefile", "codebotler.core.skills", "codebotler.rtl"),
+        *("codebotler.core.trace", "codebotler.core.skills", "codebotler.rtl"),
         *("codebotler.rtl.reasoning", "codebotler.missions.mission"),
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
         *("codebotler.robots.ros", "codebotler.robots.ros1.robot", "codebotler.robots.virtual"),

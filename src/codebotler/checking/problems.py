@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.trace import Outcome
-from codebotler.core.tracefile import outcome_data
+from codebotler.core.trace import Outcome, outcome_data
 from codebotler.core.words import counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler
 from codebotler.simulator.sampled_robot import Fact, RoomMap, brief

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -29,6 +30,9 @@ from codebotler.cli.options import (
     WorldOption,
 )
 from codebotler.core.terminal import note, noting_all, print_text
+
+if TYPE_CHECKING:
+    from codebotler.models.base import Model
 
 app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
 
@@ -275,8 +279,6 @@ def serve(
     """
     from codebotler.core.files import home
     from codebotler.core.world import World
-    from codebotler.models.base import Model, SamplingSettings
-    from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
@@ -286,14 +288,7 @@ def serve(
     place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)
     known = None if world is None else World.read(world)
     models = tuple(model or ("recorded:careful", "recorded:hasty"))
-    for each in models:
-        kind_of(each)
-    if base_url is not None:
-        expect_server(*models)
-
-    def opened(name: str) -> Model:
-        return open_model(name, SamplingSettings(base_url=base_url if runs_on_server(name) else None))
-
+    opened = _opener(models, base_url)
     options = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
     body = open_robot(robot, options) if shown is None else open_with_face(robot, options, shown)
@@ -303,6 +298,20 @@ def serve(
     from codebotler.web.server import serve as serve_page
 
     serve_page(console, place, access, installed(), runs, alone_for=stop_when_alone)
+
+
+def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:
+    """What opens models by their names; names that make no sense are refused at once."""
+    from codebotler.models.base import SamplingSettings
+    from codebotler.models.open import expect_server, kind_of, open_model, runs_on_server
+
+    for each in models:
+        kind_of(each)
+    if base_url is not None:
+        expect_server(*models)
+    return lambda name: open_model(
+        name, SamplingSettings(base_url=base_url if runs_on_server(name) else None)
+    )
 
 
 @app.command("virtual-robot")

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import typer
 from typer.main import get_command
 
-from codebotler.core.terminal import FULL, drop_output, flush_output, note, system_sentence
+from codebotler.core.terminal import FULL, drop_output, flush_output, note, open_streams, system_sentence
 
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
@@ -41,6 +41,7 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     if sys.platform == "win32":
         note(f"{name}: {ON_WINDOWS}")
         raise SystemExit(1)
+    open_streams()
     if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
         del os.environ["COLUMNS"]
     try:

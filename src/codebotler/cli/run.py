@@ -93,7 +93,7 @@ def _prepared(session: MissionSession) -> SessionView:
     while not (view.is_over or view.may_be_approved):
         before = view.busy
         with busy(before or "ending"):
-            view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]
+            view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]  # mypy does not infer such lambdas
     if session.error is not None:
         raise session.error
     return view

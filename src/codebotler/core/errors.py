@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+
+LONGEST = 600  # characters of a sentence; of a longer one, the ends are shown
 
 
 class UserError(ValueError):
     """Something that a user gave cannot be used; one sentence says what, where, and how to mend it.
 
     Args:
-        sentence: what is wrong and, where it helps, the mend; put on one line.
+        sentence: what is wrong and, where it helps, the mend; put on one line, and a very long one shortened.
         file: the file it is in.
         line: the line, counted from 1.
     """
 
     def __init__(self, sentence: str, *, file: Path | str | None = None, line: int | None = None) -> None:
-        self.sentence, self.file, self.line = " ".join(sentence.splitlines()), file, line
+        self.sentence, self.file, self.line = _brief(" ".join(sentence.splitlines())), file, line
         where = "" if file is None else f"{file}: " if line is None else f"{file}, line {line}: "
         super().__init__(where + self.sentence)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return partial(type(self), file=self.file, line=self.line), (self.sentence,), vars(self)
+
+
+def _brief(text: str) -> str:
+    half = LONGEST // 2
+    return text if len(text) <= LONGEST else f"{text[:half]} ... {text[-half:]}"
 
 
 BadInput = UserError  # the former name, for one version

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import io
 import json
@@ -14,6 +15,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from codebotler.core.errors import UserError
+
+CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP)  # of a file system that does not sync folders
 
 MAX_BYTES = 5_000_000
 MAX_ROW = 5_000_000
@@ -205,10 +208,10 @@ def write_whole(path: Path, content: bytes | memoryview) -> None:
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[BinaryIO]:
+def written_whole(path: Path, temporary: Path | None = None) -> Iterator[BinaryIO]:
     """A file to write to that takes its place when all is written; after an error the old one stays."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(path.name + ".new")
+    temporary = temporary or path.with_name(path.name + ".new")
     try:
         with naming(path):
             with temporary.open("wb") as file:
@@ -226,12 +229,17 @@ def sync_folder(folder: Path) -> None:
 
     Without it, a file whose content is on the disk may be gone after a power failure.
     """
-    with suppress(OSError):
+    try:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+    except PermissionError:  # a folder that may be written but not read
+        return
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in CANNOT_SYNC:
+            raise OSError(error.errno, error.strerror, str(folder)) from None
+    finally:
+        os.close(descriptor)
 
 
 def expect_replaceable(path: Path, *beginnings: bytes) -> None:

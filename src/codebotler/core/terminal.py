@@ -56,6 +56,13 @@ def _note_error(error: BaseException | None) -> None:
     note("".join(traceback.format_exception(error)).rstrip())
 
 
+def open_streams() -> None:
+    """Let closed standard streams lead nowhere, since files that we open would take their numbers."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
+
+
 def flush_output() -> None:
     """Flush the output."""
     sys.stdout.flush()

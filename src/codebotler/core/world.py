@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from dataclasses import dataclass, replace
@@ -243,7 +244,7 @@ class WorldFile(_Form):
         for index, room in enumerate(self.rooms):
             if room.name in names[:index]:
                 raise file.wrong(f'the room "{room.name}" is here twice; remove one', *at, "rooms", index)
-            if room.stand_at and room.footprint and not _is_around(room.footprint, room.stand_at):
+            if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
                 raise file.wrong(f"{sentence}; move one of them", *at, "rooms", index, "stand_at")
@@ -271,10 +272,29 @@ class WorldFile(_Form):
         )
 
 
-def _is_around(corners: list[Corner], point: Corner) -> bool:
-    """Whether a point is between the smallest and the largest coordinates of a footprint."""
-    axes = zip(point, zip(*corners, strict=True), strict=True)
-    return all(min(values) <= coordinate <= max(values) for coordinate, values in axes)
+_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
+
+
+def _is_within(point: Point, corners: list[Point]) -> bool:
+    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
+    x, y = point
+    odd = False
+    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
+    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
+            return True
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            odd = not odd
+    return odd
+
+
+def _distance(point: Point, start: Point, end: Point) -> float:
+    """How far a point is from a line between two others."""
+    (x, y), (x1, y1), (x2, y2) = point, start, end
+    dx, dy = x2 - x1, y2 - y1
+    square = dx * dx + dy * dy
+    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
+    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
 def _person_data(person: Person) -> dict[str, object]:

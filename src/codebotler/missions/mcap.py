@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import IO, Any, Literal, TypeAlias
+from uuid import uuid4
 
 from mcap.writer import Writer
 
@@ -187,5 +188,6 @@ def export(
         write_mcap(whole, summary, events, folder=folder, clock=clock)
         path.write_bytes(whole.getvalue())
         return
-    with written_whole(path) as file:
+    temporary = path.with_name(f".{uuid4().hex}.mcap")  # no file of the user's, and no name that is too long
+    with written_whole(path, temporary) as file:
         write_mcap(file, summary, events, folder=folder, clock=clock)

@@ -220,5 +220,5 @@ def _bounded(provider: Provider[object], name: str, settings: SamplingSettings) 
         return provider
     limit = limit_of(settings.max_tokens)
     bound(first, name, limit)
-    provider._http_client_factory = lambda: bound(make(), name, limit)  # noqa: SLF001
+    provider._http_client_factory = lambda: bound(make(), name, limit)  # noqa: SLF001 - it has no other way
     return provider

@@ -35,6 +35,8 @@ class ZeroShotDetector:
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
             raise UserError(f"{self.name} cannot be loaded as a zero-shot detector: {brief(error)}") from None
         guard_logs()
+        if not all(bool(torch.isfinite(weight).all()) for weight in self._pipeline.model.parameters()):
+            raise UserError(f"{self.name} has weights that are no numbers, so it would find nothing")
 
     def look(self, image: Image, label: str) -> Sighting:
         """Look for the label; the clearest place counts."""

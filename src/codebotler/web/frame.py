@@ -1,4 +1,4 @@
-"""What all pages share: the bar and STOP; and how other packages add pages."""
+"""What all pages share: the bar and STOP, texts and buttons; and how other packages add pages."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI
 from nicegui import html, ui
+from nicegui.elements.mixins.text_element import TextElement
 
-from codebotler.core.terminal import note
+from codebotler.core.terminal import note, visible_lines
 
 HEAD = '<link rel="stylesheet" href="/static/page.css">'
 BAR = """<div id="stop-bar"><span id="stop-told" role="status" aria-live="assertive"></span>
@@ -62,6 +64,57 @@ class Frame:
                     link = html.a(name, href=address)
                     if address == here:
                         link.props('aria-current="page"')
+
+
+# --- texts and buttons, shown as text and never as markup, with hidden characters written out
+
+
+class PlainText(TextElement):
+    """An HTML element with a text; `kind` is its CSS classes."""
+
+    def __init__(self, tag: str, text: str = "", kind: str = "") -> None:
+        super().__init__(tag=tag, text=visible_lines(text))
+        self.classes(kind)
+        self.props("dir=auto")
+
+    def say(self, text: str) -> None:
+        """Show another text; an empty one hides the element."""
+        shown = visible_lines(text)
+        if shown != self.text:
+            self.text = shown
+        self.set_visibility(bool(text))
+
+
+def scroll_up() -> None:
+    """Show the first pane, where panes stand one below another."""
+    ui.run_javascript("matchMedia('(max-width: 1180px)').matches && scrollTo(0, 0)")
+
+
+def warn(sentence: str, seconds: float = 5.0) -> None:
+    """Show a warning for some seconds."""
+    ui.notify(visible_lines(sentence), type="warning", position="top", timeout=1000 * seconds)
+
+
+class Button(PlainText):
+    """A button that calls a function when it is pressed."""
+
+    def __init__(self, text: str, pressed: Callable[..., Any], kind: str = "") -> None:
+        super().__init__("button", text, kind)
+        self.props("type=button")
+        self.on("click", pressed)
+        self._may = True
+
+    def allow(self, may: bool) -> None:  # noqa: FBT001 - one word after the verb
+        """Enable or disable it."""
+        if may != self._may:
+            self._may = may
+            if may:
+                self.props(remove="disabled")
+            else:
+                self.props("disabled")
+
+
+# --- pages of other packages
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ from nicegui import background_tasks, ui
 
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
-from codebotler.web.elements import PlainText
-from codebotler.web.frame import PATIENCE, Frame
+from codebotler.web.frame import PATIENCE, Frame, PlainText
 from codebotler.web.panes.instruction import InstructionPane
 from codebotler.web.panes.past_missions import add as add_past_missions
 from codebotler.web.panes.program import ProgramPane

@@ -15,7 +15,7 @@ from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.core.words import listed
 from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Whereabouts, brief
-from codebotler.web.elements import PlainText
+from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
 VERBS = SKILLS.verbs

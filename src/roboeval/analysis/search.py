@@ -9,8 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
-from codebotler.core.trace import Trace
-from codebotler.core.tracefile import trace_from
+from codebotler.core.trace import Trace, trace_from
 from codebotler.rtl import Formula, Inconclusive, holds, parse
 from roboeval.evaluation.runs.completions import Key
 from roboeval.evaluation.runs.rows import key_of

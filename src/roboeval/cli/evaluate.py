@@ -57,7 +57,6 @@ def evaluate(
 ) -> None:
     """Say of every completion whether it does what is asked."""
     from roboeval.analysis.summary import summary
-    from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, open_source, tasks_to_judge
     from roboeval.evaluation.runs.results import Scope
     from roboeval.evaluation.runs.table import TableBuilder
@@ -92,9 +91,15 @@ def evaluate(
         raise SystemExit(STOPPED) from None
     if run is not None:
         tally.say_how_to_look(run.path, suite, ablated=ablation)
-    if (left_out := scope.total - tally.count) > 0:
-        again = "the same command tries again" if run is not None else "the others are judged as always"
-        note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
+    _exit_if_left_out(scope.total - tally.count, scope.total, is_kept=run is not None)
+
+
+def _exit_if_left_out(left_out: int, total: int, *, is_kept: bool) -> None:
+    from roboeval.evaluation.runs.completions import how_many
+
+    if left_out > 0:
+        again = "the same command tries again" if is_kept else "the others are judged as always"
+        note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; {again}")
         raise SystemExit(1)
 
 

@@ -7,8 +7,7 @@ from functools import cache, partial
 from typing import Any
 
 from codebotler.checking.storyboard import steps_of
-from codebotler.core.trace import Event, Trace
-from codebotler.core.tracefile import trace_from
+from codebotler.core.trace import Event, Trace, trace_from
 from codebotler.core.words import counted
 from codebotler.rtl import explain
 from codebotler.simulator.robot import located, resolve_room

@@ -17,8 +17,7 @@ from msgspec import to_builtins
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
-from codebotler.core.trace import Outcome, Status, Trace
-from codebotler.core.tracefile import outcome_data
+from codebotler.core.trace import Outcome, Status, Trace, outcome_data
 from codebotler.rtl import Inconclusive, holds
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import PAPER

@@ -43,7 +43,7 @@ class RayCluster:
         self._workers, self._required = workers, require_isolation
         self._warned = False
         self._address = os.environ.get("RAY_ADDRESS") or "auto"
-        current = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108
+        current = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108 - Ray's own
         starts = self._address == "local" or (self._address == "auto" and not current.exists())
         if starts:
             os.environ.setdefault("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")  # listen on loopback only

@@ -104,7 +104,7 @@ def written(figure: Figure) -> dict[str, bytes]:
         layout.execute(figure)
         figure.set_layout_engine(None)
     again = Repetition(figure)
-    renderer = canvas.get_renderer()  # type: ignore[no-untyped-call]
+    renderer = canvas.get_renderer()  # type: ignore[no-untyped-call]  # theirs
     figure.draw(Recorder(renderer, again.calls))  # type: ignore[arg-type]  # it has all that one has
     found = {"png": io.BytesIO(), "pdf": io.BytesIO(), "svg": io.BytesIO()}
     picture = Image.frombuffer("RGBA", canvas.get_width_height(), renderer.buffer_rgba()).convert("RGB")
@@ -126,7 +126,7 @@ class Recorder:
         if not name.startswith("draw_"):
             return found
 
-        def noted(pen: GraphicsContextBase, *args: Any, **more: Any) -> None:  # noqa: ANN401
+        def noted(pen: GraphicsContextBase, *args: Any, **more: Any) -> None:  # noqa: ANN401 - as the renderer is called
             kept = GraphicsContextBase()
             kept.copy_properties(pen)
             self._calls.append((name, kept, args, more))

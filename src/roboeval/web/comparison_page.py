@@ -10,7 +10,7 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import PlainText
+from codebotler.web.frame import PlainText
 from roboeval.web.heat_map import TaskCells, address, failure_rows, models_of
 from roboeval.web.run_store import RunStore
 from roboeval.web.serializers import run_data

@@ -13,8 +13,8 @@ from codebotler.checking.storyboard import step_text
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.core.world import World
-from codebotler.web.elements import PlainText
 from codebotler.web.floorplan import floorplan
+from codebotler.web.frame import PlainText
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED, cut_told

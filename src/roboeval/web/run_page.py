@@ -10,7 +10,7 @@ from urllib.parse import quote
 from nicegui import html, ui
 
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import Button, PlainText
+from codebotler.web.frame import Button, PlainText
 from roboeval.evaluation.failures import plural_of
 from roboeval.web.heat_map import NONE, TaskCells, address, failure_text, models_of, percent
 from roboeval.web.run_store import RunGoneError, RunStore

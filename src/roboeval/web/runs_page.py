@@ -11,7 +11,7 @@ from nicegui import html, ui
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import Button, PlainText
+from codebotler.web.frame import Button, PlainText
 from roboeval.web.heat_map import NONE, address
 from roboeval.web.serializers import RunList
 from roboeval.web.widgets import EVERY, count_text, show_state

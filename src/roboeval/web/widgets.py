@@ -14,8 +14,7 @@ from nicegui.element import Element
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
-from codebotler.web.elements import PlainText
-from codebotler.web.frame import Frame
+from codebotler.web.frame import Frame, PlainText
 from roboeval.web.heat_map import NONE
 from roboeval.web.serializers import State
 

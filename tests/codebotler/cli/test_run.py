@@ -354,6 +354,16 @@ def test_reader_who_leaves_stops_the_robot(folder: Path) -> None:
     assert states(folder) == ["failed"]
 
 
+@pytest.mark.parametrize(("closed", "status"), [("0<&-", 1), ("1>&-", 0), ("2>&-", 0), ("0<&- 1>&- 2>&-", 1)])
+def test_closed_stream_leads_nowhere(folder: Path, closed: str, status: int) -> None:
+    arguments = ("run", "good.py", "--world", "world.yaml", "--speed", "0")
+    process = started(folder, *arguments, wrapper=("sh", "-c", f'exec "$0" "$@" {closed}'))
+    _, err = process.communicate("y\n", timeout=60)
+    assert process.returncode == status
+    assert "Traceback" not in err
+    assert states(folder) == [["done", "stopped"][status]]
+
+
 def test_home_that_nobody_knows_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("CODEBOTLER_HOME", "XDG_STATE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)

@@ -1,5 +1,6 @@
 """Files are read or refused in a sentence; logs and replaced files survive a crash."""
 
+import errno
 import os
 import re
 import tempfile
@@ -8,7 +9,15 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import MAX_BYTES, Appender, make_folder, read_text, text_of, written_whole
+from codebotler.core.files import (
+    MAX_BYTES,
+    Appender,
+    make_folder,
+    read_text,
+    sync_folder,
+    text_of,
+    written_whole,
+)
 
 NOBODY = 65534
 
@@ -118,3 +127,17 @@ def test_a_folder_that_cannot_be_written_to_is_refused() -> None:
         finally:
             os.seteuid(user)
             folder.chmod(0o755)
+
+
+def test_a_folder_that_cannot_be_synced_is_told_only_where_the_disk_is_broken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numbers = iter([errno.EINVAL, errno.EIO])
+
+    def refused(_descriptor: int) -> None:
+        raise OSError(next(numbers), "refused")
+
+    monkeypatch.setattr(os, "fsync", refused)
+    sync_folder(tmp_path)  # many a file system brings no folder to the disk
+    with pytest.raises(OSError, match=str(tmp_path)):
+        sync_folder(tmp_path)

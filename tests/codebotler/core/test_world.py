@@ -277,3 +277,40 @@ def test_world_file_is_written_for_people_to_read() -> None:
         "about: früh\nrobot: café\nrooms:\n- café\n- hall\nobjects:\n  café:\n  - Ölkanne\n"
         "people:\n  café:\n  - name: Łucja\n    answers:\n    - tak\n"
     )
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e5])
+def test_a_point_on_a_slanted_edge_is_within(shift: float) -> None:
+    room = "{{name: a, footprint: [[{0}, 0], [{1}, 0.3], [{0}, 3]], stand_at: [{2}, {3}]}}"
+    room = f"robot: a\nrooms: [{room}]\n"
+    ends = shift, shift + 0.7
+    assert read(room.format(*ends, shift + 0.7 / 3, 0.1)).rooms[0].stand_at
+    assert read(room.format(*ends, shift + 0.7, 0.3)).rooms[0].stand_at
+    with pytest.raises(UserError, match="outside"):
+        read(room.format(*ends, shift + 0.7 / 3 + 0.001, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("point", "is_within"),
+    [
+        ((1, 1), True),
+        ((5, 1), True),
+        ((1, 5), True),
+        ((5, 5), False),
+        ((2, 4), True),
+        ((0, 3), True),
+        ((6, 2), True),
+        ((6, 6), False),
+        ((-1, 2), False),
+        ((7, 0), False),
+        ((2, 6.1), False),
+    ],
+)
+def test_the_robot_stands_within_a_room_of_any_shape(point: tuple[float, float], *, is_within: bool) -> None:
+    corner = "[[0, 0], [6, 0], [6, 2], [2, 2], [2, 6], [0, 6]]"  # 2 m wide, around a corner
+    text = f"robot: a\nrooms: [{{name: a, footprint: {corner}, stand_at: [{point[0]}, {point[1]}]}}]\n"
+    if is_within:
+        assert read(text).rooms[0].stand_at == point
+    else:
+        with pytest.raises(UserError, match="outside"):
+            read(text)

@@ -171,3 +171,8 @@ def test_part_of_a_file_is_validated_where_it_stands() -> None:
     with pytest.raises(UserError, match='"name"') as error:
         file.validate(Inner, file.data[1], at=(1,))
     assert (error.value.file, error.value.line) == ("w.yaml", 2)
+
+
+def test_a_sentence_is_short_and_one_line() -> None:
+    error = UserError("a\nb" + "c" * 10_000, file="a.yaml", line=1)
+    assert str(error) == "a.yaml, line 1: a b" + "c" * 297 + " ... " + "c" * 300

@@ -163,3 +163,12 @@ def test_file_is_written_whole_or_not_at_all(mission: tuple[Summary, list[Line]]
         export(path, mission[0], [{"event": "state"}], "wall")
     assert path.read_bytes() == before
     assert [file.name for file in tmp_path.iterdir()] == ["mission.mcap"]
+
+
+def test_no_other_file_is_touched(mission: tuple[Summary, list[Line]], tmp_path: Path) -> None:
+    path, other = tmp_path / f"{'m' * 245}.mcap", tmp_path / f"{'m' * 245}.mcap.new"
+    other.write_text("of the user")
+    export(path, *mission, "wall")
+    assert other.read_text() == "of the user"
+    assert sorted(tmp_path.iterdir()) == [path, other]
+    assert path.stat().st_mode == other.stat().st_mode

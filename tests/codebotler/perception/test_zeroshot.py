@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -122,3 +123,12 @@ def test_box_ends_with_the_picture() -> None:
     assert _within(30, 55, 40) == (0.75, 1)
     assert _within(40, 40, 40) == (39 / 40, 1)
     assert _within(10, 10, 40) == (0.25, 11 / 40)
+
+
+def test_broken_weights_are_refused(tmp_path: Path, folder: Path) -> None:
+    broken = shutil.copytree(folder, tmp_path / "broken")
+    model = transformers.OwlViTForObjectDetection.from_pretrained(folder)
+    model.class_head.dense0.weight.data[0, 0] = math.nan
+    model.save_pretrained(broken)
+    with pytest.raises(UserError, match="weights"):
+        open_detector(f"hf:{broken}")

@@ -52,3 +52,8 @@ def _is_isolated(pid: int) -> bool:
         return b"sandbox/start.py" in Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
         return False
+
+
+def engine_processes() -> set[int]:
+    """All processes of the engine below this one."""
+    return {pid for server in fork_servers() for pid in {server, *children_of(server)}}

@@ -28,7 +28,7 @@ from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.skill_protocol import OVERRUN, SkillAnswer, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
-from processes import are_gone, children_of, fork_servers
+from processes import are_gone, children_of, engine_processes, fork_servers
 
 WORLD = World((Room("start_loc"), Room("lab")), "start_loc")
 OTHER = World((Room("elsewhere"),), "elsewhere")
@@ -59,7 +59,7 @@ def links_in(folder: Path) -> list[Path]:
 def held() -> tuple[set[object], ...]:
     """What this process holds: file descriptors, children and threads."""
     descriptors = {f"{link.name} {link.readlink()}" for link in links_in(Path("/proc/self/fd"))}
-    return {*descriptors}, {*children_of(os.getpid())}, {thread.name for thread in threading.enumerate()}
+    return {*descriptors}, {*engine_processes()}, {thread.name for thread in threading.enumerate()}
 
 
 @pytest.fixture
@@ -262,7 +262,7 @@ def test_nothing_is_left_after_all_outcomes_were_read() -> None:
 def test_nothing_is_left_after_the_consumer_stopped_early() -> None:
     outcomes = run(((saying(str(number)), WORLD) for number in count()), workers=2)
     next(outcomes)
-    assert children_of(os.getpid())
+    assert engine_processes()
     outcomes.close()  # type: ignore[attr-defined]  # it is a generator
 
 
@@ -374,7 +374,7 @@ def killing(times: int) -> Behaviour:
 
     def say(robot: SimulatedRobot, message: str) -> None:
         if next(left, None) is not None:
-            family = children_of(os.getpid())
+            family = engine_processes()
             for pid in fork_servers():
                 os.kill(pid, signal.SIGKILL)
             assert are_gone(family)
@@ -421,7 +421,7 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
             worker.run, saying("a"), lambda: SimulatedRobot(WORLD, behaviours=doing(busy))
         )
         assert is_busy.wait(30)
-        family = children_of(os.getpid())
+        family = engine_processes()
         worker.stop()
         assert are_gone(family)
         may_go_on.set()

@@ -30,8 +30,7 @@ from typing import IO
 import pytest
 
 from codebotler.core.files import to_line
-from codebotler.core.trace import Event, Outcome, Status
-from codebotler.core.tracefile import outcome_data
+from codebotler.core.trace import Event, Outcome, Status, outcome_data
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import parse
 from codebotler.simulator.isolated_process import PROCESSOR_TIME

@@ -23,7 +23,7 @@ CHECK = """
 import json, os, sys
 from codebotler.simulator.engine import run
 from codebotler.simulator.rules import Rules
-from codebotler.core.tracefile import outcome_data
+from codebotler.core.trace import outcome_data
 from codebotler.core.world import Room, World
 
 world = World((Room("start"),), "start")
@@ -103,7 +103,7 @@ def copied_python(to: Path) -> Path:
 def needed() -> list[Path]:
     """The packages and modules outside the standard library that the engine needs."""
     listing = (
-        "import sys, codebotler.core.tracefile, codebotler.simulator.engine\n"
+        "import sys, codebotler.core.trace, codebotler.simulator.engine\n"
         "for name, module in list(sys.modules.items()):\n"
         "    if '.' not in name and getattr(module, '__file__', None): print(module.__file__)"
     )

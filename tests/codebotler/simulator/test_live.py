@@ -16,7 +16,7 @@ from codebotler.core.trace import Event, Outcome, Status, Trace
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, PAPER
 from codebotler.simulator.worker import EngineError, Worker
-from processes import are_gone, children_of, fork_servers
+from processes import are_gone, children_of, engine_processes, fork_servers
 
 LIVE = replace(PAPER, literals="as-written", limits=ENDLESS)
 
@@ -164,7 +164,7 @@ def test_what_the_robot_throws_besides_ends_the_child_and_comes_through(worker: 
 
 def test_run_whose_process_is_lost_is_not_run_again(worker: Worker) -> None:
     def does(_: str) -> Result:
-        family = children_of(os.getpid())
+        family = engine_processes()
         for pid in fork_servers():
             os.kill(pid, signal.SIGKILL)
         assert are_gone(family)
@@ -191,7 +191,7 @@ def test_stop_ends_a_run_that_sleeps(worker: Worker) -> None:
         program = "def task_program():\n    time.sleep(3600)\n    say('a')\n"
         running = thread.submit(worker.run_live, program, machine)
         assert sleeps.wait(30)
-        family = children_of(os.getpid())
+        family = engine_processes()
         worker.stop()
         assert are_gone(family)
         may_go_on.set()

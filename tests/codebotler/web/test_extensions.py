@@ -13,7 +13,7 @@ import pytest
 from pageserver import PageServer
 
 GOOD = """from codebotler.web.frame import Pages
-from codebotler.web.elements import PlainText
+from codebotler.web.frame import PlainText
 from nicegui import ui
 
 def add(site):

@@ -24,7 +24,7 @@ def lines_of(path: Path) -> list[bytes]:
 
 
 def keys(frame: Any) -> list[Any]:  # noqa: ANN401 - a table
-    return frame.select("task", "prompt", "index").rows()  # type: ignore[no-any-return]
+    return frame.select("task", "prompt", "index").rows()  # type: ignore[no-any-return]  # of any columns
 
 
 def test_a_row_for_each_completion(runs: Path) -> None:

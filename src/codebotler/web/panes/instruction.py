@@ -18,7 +18,7 @@ from codebotler.missions.view import Order, SessionView
 from codebotler.models.recorded import recorded_model
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import Console
-from codebotler.web.elements import Button, PlainText, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, scroll_up, warn
 
 MOST_EXAMPLES, MOST_BEFORE, MOST_TEXT = 4, 6, 400
 RECORDED = "recorded"

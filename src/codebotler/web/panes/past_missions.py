@@ -16,8 +16,7 @@ from codebotler.missions.mission import State
 from codebotler.missions.store import find, missions, summary_of
 from codebotler.missions.wording import event_text
 from codebotler.web.console import Console
-from codebotler.web.elements import PlainText
-from codebotler.web.frame import Frame
+from codebotler.web.frame import Frame, PlainText
 
 MOST, MOST_EVENTS = 200, 1_000
 STEPS: Mapping[str, str] = {

@@ -18,7 +18,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.missions.mission import MissionError, State
 from codebotler.missions.view import SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
-from codebotler.web.elements import Button, PlainText, scroll_up, warn
+from codebotler.web.frame import Button, PlainText, scroll_up, warn
 from codebotler.web.storyboard import draw_strips
 
 SKILL_CALL = re.compile(rf"\b({'|'.join(SKILLS)})(?=\s*\()")

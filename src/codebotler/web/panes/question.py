@@ -7,7 +7,7 @@ from nicegui import ui
 from codebotler.core.terminal import shortened
 from codebotler.core.words import counted
 from codebotler.robots.face import AnswerError, Face, Question
-from codebotler.web.elements import Button, PlainText, warn
+from codebotler.web.frame import Button, PlainText, warn
 
 MOST_OPTIONS, MOST_TEXT = 50, 200
 

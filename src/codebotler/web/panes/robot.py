@@ -9,8 +9,8 @@ from codebotler.missions.mission import State
 from codebotler.missions.progress import Moment
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
-from codebotler.web.elements import Button, PlainText
 from codebotler.web.floorplan import floorplan
+from codebotler.web.frame import Button, PlainText
 from codebotler.web.panes.question import QuestionPane
 
 HEADLINES = {

@@ -5,8 +5,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.errors import UserError
-from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
-from codebotler.core.tracefile import outcome_data, trace_data, trace_from
+from codebotler.core.trace import (
+    Event,
+    Option,
+    Outcome,
+    RunError,
+    Status,
+    Trace,
+    outcome_data,
+    trace_data,
+    trace_from,
+)
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=10)
 options = st.builds(Option, texts, st.booleans())
