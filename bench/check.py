@@ -3,7 +3,7 @@
 The programs are those that models wrote and those of recorded:careful, and apart from them those that were
 written by hand to show one fault or one odd way each (where CODEBOTLER_CORPUS names the corpus; else the
 recorded models). A program is right if it passes every world of its task. PART=10 takes every tenth program,
-SEEDS=20 checks each with so many seeds; worlds that are alike to a program are run once for all seeds.
+SEEDS=20 checks each with so many seeds.
 """
 
 import json
@@ -17,7 +17,6 @@ from functools import partial
 from pathlib import Path
 
 from codebotler.checking.check import check_on
-from codebotler.checking.problems import Sample
 from codebotler.checking.sampled import SAMPLES, CheckSettings
 from codebotler.simulator.engine import digest
 from codebotler.simulator.fact_sampler import FactSampler
@@ -106,8 +105,7 @@ def rejections(
     def one(source: Source) -> list[bool]:
         task, program = source
         plan = plans[task] if with_rooms else None
-        known: dict[RoomMap, list[Sample]] = {}
-        checks = (check_on(pool.here(), program, plan, CheckSettings(seed=seed), known) for seed in seeds)
+        checks = (check_on(pool.here(), program, plan, CheckSettings(seed=seed)) for seed in seeds)
         return [bool(check.problems) for check in checks]
 
     return list(pool.map_distinct(one, sources, name=lambda source: digest(*source)))

@@ -18,10 +18,11 @@ from statistics import median, quantiles
 
 from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room, World
-from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1.robot import WORKER, Ros1
-from codebotler.robots.virtual import VirtualRobot
+from codebotler.robots.base import ROS_PYTHON, Options, Robot
+from codebotler.robots.open import open_robot
+from codebotler.robots.ros.robot import actions_of
+from codebotler.robots.ros.virtual import VirtualRobot
+from codebotler.robots.ros.worker import WORKERS
 
 GOALS = int(os.environ.get("GOALS", "500"))
 ROUNDS = 5
@@ -36,7 +37,7 @@ def raw(robot: VirtualRobot, goals: int) -> list[float]:
     script = str(Path(__file__).with_name("raw_actionlib.py"))
     action = json.dumps(actions_of(SKILLS)["say"])
     done = subprocess.run(
-        [str(ROS_PYTHON), script, str(WORKER), action, str(goals)],
+        [str(ROS_PYTHON), script, str(WORKERS), action, str(goals)],
         env={**os.environ, "ROS_MASTER_URI": robot.address},
         stdout=subprocess.PIPE,
         check=True,
@@ -45,7 +46,7 @@ def raw(robot: VirtualRobot, goals: int) -> list[float]:
     return found
 
 
-def ours(robot: Ros1, goals: int) -> list[float]:
+def ours(robot: Robot, goals: int) -> list[float]:
     """The seconds that each goal takes by the tool."""
     took = []
     for _ in range(goals):
@@ -63,13 +64,13 @@ def told(name: str, took: list[float]) -> None:
 
 
 @contextmanager
-def on_a_graph() -> Iterator[tuple[VirtualRobot, Ros1]]:
+def on_a_graph() -> Iterator[tuple[VirtualRobot, Robot]]:
     """A virtual robot with a master of its own, and the tool's robot, connected to it."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     virtual = VirtualRobot(WORLD, speed=None, port=port)
-    robot = Ros1(virtual.address)
+    robot = open_robot("ros1", Options(address=virtual.address))
     try:
         virtual.start()
         robot.connect()

@@ -21,13 +21,12 @@ from statistics import median
 from codebotler.core.world import Room, World
 from codebotler.missions.log import EVENTS, Line, events_of
 from codebotler.missions.mission import Mission
-from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
-from codebotler.robots.open import all_readiness
+from codebotler.robots.base import Argument, CancelledError, Feedback, Options, Result, Robot, no_feedback
+from codebotler.robots.open import all_readiness, open_robot
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.ros1.robot import Ros1
+from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.simulated import Simulated
-from codebotler.robots.virtual import VirtualRobot
 
 STOPS = int(os.environ.get("STOPS", "50"))
 AIM = 100.0
@@ -80,7 +79,7 @@ def by_ros1(home: Path) -> Iterator[Times]:
     try:
         for _ in range(STOPS):
             server.drives.clear()
-            start = stopped(Ros1(server.address), home, server.drives)
+            start = stopped(open_robot("ros1", Options(address=server.address)), home, server.drives)
             yield 1000 * (server.heard - start), 1000 * (server.ended - start)
     finally:
         server.stop()

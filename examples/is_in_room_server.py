@@ -30,10 +30,9 @@ from codebotler.perception import (
     read_image,
 )
 from codebotler.robots.base import NotReadyError
-from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1.robot import master_uri
-from codebotler.robots.virtual import SERVERS
-from codebotler.robots.worker import RosWorker
+from codebotler.robots.ros.robot import actions_of
+from codebotler.robots.ros.ros1 import master_uri
+from codebotler.robots.ros.worker import RosWorker
 
 SKILL = "is_in_room"
 HEARS = 3600.0  # seconds of one turn of listening
@@ -58,7 +57,7 @@ class Server:
         address = master_uri()
         actions = actions_of(SkillTable((SKILLS[SKILL],)))
         start = {"node": f"{SKILL}_server", "actions": actions, "port": None, "camera": topic, "show": True}
-        self.worker = RosWorker(python, SERVERS, start, {"ROS_MASTER_URI": address})
+        self.worker = RosWorker(python, "servers.py", start, {"ROS_MASTER_URI": address})
         print(f"at {address}; ready, Ctrl-C ends it", flush=True)
         self.goals: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
         self.images: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()

@@ -13,7 +13,7 @@ from codebotler.core.trace import Option
 SOURCES = Path(__file__).parent.parent / "src"
 ROOTS = {"Exception", "ValueError", "RuntimeError", "UserError"}
 WITHIN = {
-    "codebotler.robots.ros1.worker.channel",
+    "codebotler.robots.ros.workers.channel",
     "codebotler.simulator.sandbox.execution",
 }  # of another Python
 A_SENTENCE = ("a sentence",)

@@ -11,7 +11,7 @@ from codebotler.cli.ending import EXTRAS
 ROOT = Path(__file__).parent.parent
 WITHOUT = f"""
 import sys
-for package in {sorted(EXTRAS)}:
+for package in {sorted({*EXTRAS, "pyrobosim", "ray", "torch", "transformers"})}:
     sys.modules[package] = None
 from {{package}}.cli.app import main
 sys.argv = [{{package!r}}, *sys.argv[1:]]
@@ -31,10 +31,17 @@ def without_extras(command: str, folder: Path) -> subprocess.CompletedProcess[st
     ("command", "extra"),
     [
         ("codebotler generate Hello --model openai-chat:gpt-5.1", "models"),
+        ("codebotler generate Hello --model completions:m --base-url http://localhost:1/v1", "models"),
+        ("codebotler generate Hello --model hf:m", "transformers"),
+        ("codebotler run Hello --yes --world office.yaml --model openai-chat:gpt-5.1", "models"),
         ("codebotler serve --world office.yaml", "page"),
         ("codebotler run say.py --yes --robot rosbridge --address ws://localhost:1", "robots"),
+        ("codebotler run say.py --yes --robot pyrobosim --world office.yaml", "pyrobosim"),
         ("codebotler missions last --mcap a.mcap", "robots"),
         ("roboeval serve .", "page"),
+        ("roboeval generate --model openai-chat:gpt-5.1", "models"),
+        ("roboeval run", "report"),
+        ("roboeval evaluate recorded:careful --engine ray", "ray"),
         ("roboeval report recorded:careful --out report", "report"),
     ],
 )
@@ -56,6 +63,7 @@ def test_a_missing_extra_is_one_sentence(command: str, extra: str, tmp_path: Pat
         "codebotler robots",
         "roboeval tasks",
         "roboeval evaluate recorded:careful --tasks SayGoodDay",
+        "roboeval run --model recorded:careful --tasks SayGoodDay --num-completions 1 --no-report",
     ],
 )
 def test_the_core_works_without_any_extra(command: str, tmp_path: Path) -> None:

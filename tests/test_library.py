@@ -27,7 +27,7 @@ EXAMPLES = re.findall(r"^```python\n(.*?)^```\n\n```text\n(.*?)^```", PAGE, re.D
 PACKAGES = {"codebotler": codebotler.__all__, "roboeval": roboeval.__all__}
 NAMES = [(package, name) for package, names in PACKAGES.items() for name in names]
 WEB = {"nicegui", "fastapi", "starlette", "uvicorn", "websockets"}
-MODELS = {"pydantic_ai", "openai", "anthropic", "google.genai", "httpx", "tenacity", "torch", "transformers"}
+MODELS = {"pydantic_ai", "openai", "anthropic", "google.genai", "httpx", "torch", "transformers"}
 FIGURES = {"matplotlib", "numpy", "polars", "PIL"}
 DRAWING = {"rich"}
 WORK = {"yaml", "asyncio"}
@@ -58,8 +58,7 @@ def test_importing_a_package_imports_next_to_nothing(package: str) -> None:
     ],
 )
 def test_using_the_names_imports_no_library_for_pages_figures_or_models(code: str) -> None:
-    allowed = {"tenacity"} if "generate" in code else set()  # small, and tries requests again
-    assert not (imported_by(code) & (WEB | MODELS | FIGURES | DRAWING) - allowed)
+    assert not imported_by(code) & (WEB | MODELS | FIGURES | DRAWING)
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], [], ["run", "--help"], ["serve", "--help"]])

@@ -90,7 +90,7 @@ def test_all_of_the_packages_is_in_the_wheel(wheel: Path) -> None:
         "roboeval/suites/paper/solutions/LunchTime.yaml",
         "roboeval/suites/plus/solutions/GetDrink.yaml",
         "codebotler/models/recorded/StaplerReport.yaml",
-        "codebotler/robots/ros1/worker/__main__.py",
+        "codebotler/robots/ros/workers/ros1_worker.py",
         "codebotler/py.typed",
     ):
         assert known in packed

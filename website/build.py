@@ -31,8 +31,8 @@ MODULES = {
         *("codebotler.core.trace", "codebotler.core.skills", "codebotler.rtl"),
         *("codebotler.rtl.reasoning", "codebotler.missions.mission"),
         *("codebotler.robots.base", "codebotler.robots.simulated", "codebotler.robots.reservation"),
-        *("codebotler.robots.ros", "codebotler.robots.ros1.robot", "codebotler.robots.virtual"),
-        *("codebotler.robots.worker", "codebotler.models.base", "codebotler.models.open"),
+        *("codebotler.robots.ros.robot", "codebotler.robots.ros.ros1", "codebotler.robots.ros.virtual"),
+        *("codebotler.robots.ros.worker", "codebotler.models.base", "codebotler.models.open"),
         *("codebotler.models.rate_limit", "codebotler.perception", "codebotler.web.frame"),
     ),
     "roboeval": (

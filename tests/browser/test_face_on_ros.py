@@ -16,8 +16,8 @@ from playwright.sync_api import expect
 
 from codebotler.robots.base import ROS_PYTHON
 from codebotler.robots.face import without_speech
-from codebotler.robots.ros1.robot import MEND, NEEDS
-from codebotler.robots.worker import lacks
+from codebotler.robots.ros.ros1 import MEND, NEEDS
+from codebotler.robots.ros.worker import lacks
 from faces import SPEAKING
 from pageserver import WORLD, PageServer
 from ros_graph import Graph

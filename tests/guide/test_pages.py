@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from codebotler.missions.mission import State
+from codebotler.missions.log import State
 from codebotler.missions.wording import EVENTS
 from server import Server
 
@@ -368,7 +368,7 @@ def test_a_task_that_is_written_by_the_guide_is_a_package_in_the_end(
 
 
 def test_states_and_events_of_missions_are_documented() -> None:
-    states, _, lines = (DOCS / "robots.md").read_text().partition("### What lies on the disk")
+    states, _, lines = (DOCS / "robots.md").read_text().partition("### On the disk")
     assert re.findall(r"^\| `(\w+)` \|", states, re.MULTILINE) == [
         *(
             state

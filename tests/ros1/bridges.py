@@ -16,8 +16,8 @@ from websockets.sync.server import ServerConnection, serve
 
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1.robot import WORKER
+from codebotler.robots.ros.robot import actions_of
+from codebotler.robots.ros.worker import WORKERS
 
 ROS_SIDE = Path(__file__).parent / "bridge_to_ros.py"
 
@@ -72,7 +72,7 @@ def over_ros(master: str, skills: tuple[str, ...] = tuple(SKILLS)) -> Callable[[
 
     def handle(connection: ServerConnection) -> None:
         with subprocess.Popen(
-            [str(ROS_PYTHON), str(ROS_SIDE), str(WORKER), json.dumps(actions)],
+            [str(ROS_PYTHON), str(ROS_SIDE), str(WORKERS), json.dumps(actions)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

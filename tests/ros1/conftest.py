@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros1.robot import MEND, NEEDS
-from codebotler.robots.worker import lacks
+from codebotler.robots.ros.ros1 import MEND, NEEDS
+from codebotler.robots.ros.worker import lacks
 from ros_graph import Graph
 
 HERE = Path(__file__).parent

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.core.skills import SKILLS, Skill
-from codebotler.robots.base import ROS_PYTHON
-from codebotler.robots.ros import Waits
-from codebotler.robots.ros1.robot import WORKER, Ros1
+from codebotler.robots.base import ROS_PYTHON, Options
+from codebotler.robots.ros import ros1
+from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.worker import WORKERS
 
 HERE = Path(__file__).parent
 MASTER = HERE / "ros_master.py"
@@ -81,7 +82,7 @@ class Graph:
         self.port = free_port()
         self.uri = f"http://localhost:{self.port}"
         self.processes: list[Process] = []
-        self.robots: list[Ros1] = []
+        self.robots: list[RosRobot] = []
         self.start_master()
 
     def start_master(self) -> None:
@@ -91,14 +92,14 @@ class Graph:
     def serve(self, *skills: Skill, **environment: str) -> Process:
         """An action server for each skill; what a goal says is how it goes."""
         actions = [[s.ros.type, s.ros.server, s.ros.definition] for s in skills if s.ros is not None]
-        server = Process(SERVER, str(WORKER), json.dumps(actions), master=self.uri, **environment)
+        server = Process(SERVER, str(WORKERS), json.dumps(actions), master=self.uri, **environment)
         self.processes.append(server)
         server.expect("ready")
         return server
 
-    def robot(self, **options: Any) -> Ros1:  # noqa: ANN401 - those of Ros1
-        options.setdefault("waits", Waits(patience=1.5, silence=1.5, longest=20.0))
-        robot = Ros1(self.uri, **options)
+    def robot(self, waits: Waits | None = None, **options: Any) -> RosRobot:  # noqa: ANN401 - fields of Options
+        short = Waits(patience=1.5, silence=1.5, longest=20.0)
+        robot = ros1.robot(Options(address=self.uri, **options), waits or short)
         self.robots.append(robot)
         return robot
 
@@ -140,6 +141,6 @@ def installed(folder: Path, name: str, definition: str) -> str:
     package = folder / "robot_actions_pkg" / "msg"
     package.mkdir(parents=True)
     package.with_name("__init__.py").touch()
-    code = INSTALLED.format(worker=str(WORKER), name=name, definition=definition)
+    code = INSTALLED.format(worker=str(WORKERS), name=name, definition=definition)
     (package / "__init__.py").write_text(code)
     return str(folder)

@@ -12,7 +12,7 @@ import pytest
 
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError
-from codebotler.robots.ros1.robot import MEND
+from codebotler.robots.ros.ros1 import MEND
 from codebotler.simulator.robot import RobotError
 from ros_graph import GO_TO, Graph, Process, free_port, installed, started
 

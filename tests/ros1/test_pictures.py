@@ -24,8 +24,8 @@ from codebotler.core.skills import SKILLS
 from codebotler.missions.log import events_of
 from codebotler.perception import image_of
 from codebotler.robots.base import ROS_PYTHON, CancelledError, Picture
-from codebotler.robots.ros import Waits
-from codebotler.robots.ros1.robot import WORKER
+from codebotler.robots.ros.robot import Waits
+from codebotler.robots.ros.worker import WORKERS
 from codebotler.simulator.robot import RobotError
 from ros_graph import LONG, Graph, Process, free_port, started
 from server import Fault, Request, Server
@@ -106,7 +106,7 @@ def looking(graph: Graph, model: Server, *arguments: str) -> Iterator[None]:
 
 def camera(graph: Graph, kind: str, fields: dict[str, Any], topic: str = TOPIC) -> Process:
     """A camera that publishes until it is ended."""
-    process = Process(CAMERA, str(WORKER), topic, kind, json.dumps(fields), master=graph.uri)
+    process = Process(CAMERA, str(WORKERS), topic, kind, json.dumps(fields), master=graph.uri)
     graph.processes.append(process)
     process.expect("ready")
     return process
@@ -211,7 +211,7 @@ def test_picture_may_come_from_a_file(graph: Graph, model: Server, tmp_path: Pat
         with pytest.raises(RobotError, match=r"room\.png .*broken or cut off"):
             asked(graph, "mug")
         path.unlink()
-        with pytest.raises(RobotError, match=r"room\.png: .*No such file"):
+        with pytest.raises(RobotError, match=r"room\.png: there is no such file"):
             asked(graph, "mug")
 
 
@@ -220,7 +220,7 @@ def test_no_picture_yet_and_no_picture_any_more_are_said(graph: Graph, model: Se
         with pytest.raises(RobotError) as error:
             asked(graph, "mug")
         assert error.value.kind == "IsInRoomFailed"
-        assert f"no picture has come on {TOPIC}" in str(error.value)
+        assert f"no picture has arrived on {TOPIC}" in str(error.value)
         filming = camera(graph, "sensor_msgs/Image", raw("rgb8"))
         assert asked(graph, "mug")[0]
         filming.end()
@@ -236,7 +236,7 @@ def test_what_is_no_picture_is_said(graph: Graph, model: Server) -> None:
     for topic, sentence in (
         ("/words", "/words .*std_msgs/String.* sensor_msgs/Image or sensor_msgs/Comp"),
         ("/depth", '/depth .*"16UC1", not one of rgb8'),
-        ("/noise", "/noise .*no JPEG, PNG or WebP file"),
+        ("/noise", "/noise .*not a JPEG, PNG or WebP file"),
     ):
         with looking(graph, model, "--topic", topic, "--oldest", "1"), pytest.raises(RobotError) as error:
             asked(graph, "mug")
@@ -278,7 +278,7 @@ def test_look_that_is_cancelled_ends_at_once(graph: Graph, model: Server) -> Non
 @pytest.mark.parametrize(
     ("arguments", "named"),
     [
-        (["recorded"], ["recorded sees no pictures", "hf:PATH"]),
+        (["recorded"], ["recorded does not accept pictures", "hf:PATH"]),
         (["openai-chat:eyes"], ["no ROS master", "http://localhost:"]),
         (["openai-chat:eyes", "--oldest", "nan"], ["--oldest is nan", "seconds"]),
         (["openai-chat:eyes", "--oldest", "0"], ["--oldest is 0", "seconds"]),
@@ -334,7 +334,7 @@ def test_any_server_may_show_what_it_sees(graph: Graph, tmp_path: Path) -> None:
     assert action is not None
     script = tmp_path / "eyes.py"
     script.write_text(SHOWS)
-    process = Process(script, str(WORKER), action.definition, master=graph.uri)
+    process = Process(script, str(WORKERS), action.definition, master=graph.uri)
     graph.processes.append(process)
     process.expect("ready")
     robot = graph.robot(waits=Waits(patience=1.5, silence=1.5, longest=20.0))
@@ -363,7 +363,7 @@ def test_messages_made_in_memory_are_those_of_ros() -> None:
         "print(json.dumps({c._type: [c._md5sum, c._type, c.__slots__] for c in made}))"
     )
     done = subprocess.run(
-        [str(ROS_PYTHON), "-c", code], cwd=WORKER, capture_output=True, text=True, check=True
+        [str(ROS_PYTHON), "-c", code], cwd=WORKERS, capture_output=True, text=True, check=True
     )
     assert json.loads(done.stdout) == {  # as `rosmsg md5` and `rosmsg show` tell them
         "sensor_msgs/Image": [

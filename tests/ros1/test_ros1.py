@@ -19,8 +19,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, Parameter, RosAction, Skill
 from codebotler.robots.base import ROS_PYTHON, CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros import RosRobot, Waits
-from codebotler.robots.ros1.robot import WORKER, Ros1
+from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.worker import WORKERS
 from codebotler.simulator.robot import RobotError
 from ros_graph import GO_TO, LONG, SAY, Graph, free_port, installed, started
 
@@ -69,7 +69,7 @@ def test_skill_that_fails_in_several_ways_names_itself(graph: Graph) -> None:
 def test_no_master_is_said_at_once() -> None:
     uri = f"http://localhost:{free_port()}"
     with pytest.raises(NotReadyError, match=f"no ROS master .*{uri}"):
-        Ros1(uri).connect()
+        open_robot("ros1", Options(address=uri)).connect()
 
 
 @pytest.mark.parametrize("uri", ["robot", "http://robot", "http://robot:a", "ws://robot:9090"])
@@ -80,9 +80,9 @@ def test_address_that_is_no_uri_is_refused(uri: str) -> None:
 
 def test_no_rospy_is_said_with_the_mend(graph: Graph) -> None:
     with pytest.raises(NotReadyError, match="No module named"):
-        Ros1(graph.uri, python=Path(sys.executable)).connect()
+        graph.robot(ros_python=Path(sys.executable)).connect()
     with pytest.raises(NotReadyError, match="--ros-python"):
-        Ros1(graph.uri, python=Path("/nowhere/python3")).connect()
+        graph.robot(ros_python=Path("/nowhere/python3")).connect()
 
 
 def test_robot_without_any_server_is_not_ready(graph: Graph) -> None:
@@ -253,7 +253,7 @@ def test_killed_worker_is_replaced_by_one_that_cancels_all(graph: Graph) -> None
     with started(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         assert robot._worker is not None
-        os.kill(robot._worker.pid, signal.SIGKILL)
+        os.kill(robot._worker._process.pid, signal.SIGKILL)
         server.expect("cancel", "never")
     assert isinstance(ended["error"], RobotLostError)
     assert re.search(r"\bros1 has died \(signal 9\).*cancelled", ended["error"].sentence)
@@ -268,7 +268,7 @@ def test_stop_works_where_the_worker_hangs(graph: Graph) -> None:
     with started(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         assert robot._worker is not None
-        os.kill(robot._worker.pid, signal.SIGSTOP)
+        os.kill(robot._worker._process.pid, signal.SIGSTOP)
         robot.cancel()
         server.expect("cancel", "never")
     assert isinstance(ended["error"], RobotLostError)
@@ -279,7 +279,7 @@ def test_stop_works_where_the_worker_hangs_before_it_took_the_goal(graph: Graph)
     robot = graph.robot(waits=Waits(patience=LONG))
     robot.connect()
     assert robot._worker is not None
-    os.kill(robot._worker.pid, signal.SIGSTOP)
+    os.kill(robot._worker._process.pid, signal.SIGSTOP)
     more_than_a_pipe_holds = ("x" * 10_000,) * 20
     with started(lambda: robot.perform("ask", ["ann", "tea?", more_than_a_pipe_holds])) as ended:
         while robot._number == 0:
@@ -295,7 +295,7 @@ def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
     with started(lambda: robot.perform("go_to", ["never"])) as ended:
         server.expect("goal", "never")
         assert robot._worker is not None
-        os.kill(robot._worker.pid, signal.SIGSTOP)
+        os.kill(robot._worker._process.pid, signal.SIGSTOP)
         server.expect("cancel", "never")
     assert isinstance(ended["error"], RobotLostError)
     assert re.search(r"\bros1 does not answer.*cancelled", ended["error"].sentence)
@@ -303,8 +303,9 @@ def test_hanging_worker_is_noticed_without_a_stop(graph: Graph) -> None:
 
 TOOL = """
 import sys
-from codebotler.robots.ros1.robot import Ros1
-robot = Ros1(sys.argv[1])
+from codebotler.robots.base import Options
+from codebotler.robots.open import open_robot
+robot = open_robot("ros1", Options(address=sys.argv[1]))
 robot.connect()
 robot.perform("go_to", ["never"])
 """
@@ -350,7 +351,7 @@ def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: G
     server.expect("goal", "no result")
     robot.disconnect()
     environment = {"ROS_MASTER_URI": graph.uri}
-    other = RosRobot("ros1", graph.uri, WORKER, ROS_PYTHON, environment, node="somebody_else")
+    other = RosRobot("ros1", graph.uri, "ros1_worker.py", Options(), environment, node="somebody_else")
     other.connect()
     with started(lambda: other.perform("say", ["never"])) as ended:  # stands for what nobody looks after
         server.expect("goal", "never")
@@ -367,11 +368,11 @@ def test_robot_that_was_left_in_doubt_is_cleared_at_the_next_connection(graph: G
 
 CANCELLED = """
 from channel import serve
-from actions import Ros1Worker
+from ros1_worker import Ros1Worker
 class Cancelled(Ros1Worker):
-    def send(self, goal, arguments):
+    def start(self, goal, arguments):
         goal.cancel()
-        super().send(goal, arguments)
+        super().start(goal, arguments)
 serve(Cancelled)
 """
 
@@ -380,8 +381,8 @@ def test_goal_that_is_cancelled_before_it_is_sent_never_is(graph: Graph, tmp_pat
     server = graph.serve(SAY)
     script = tmp_path / "cancelled.py"
     script.write_text(CANCELLED)
-    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKER)}
-    robot = RosRobot("ros1", graph.uri, script, ROS_PYTHON, environment)
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKERS)}
+    robot = RosRobot("ros1", graph.uri, str(script), Options(), environment)
     robot.connect()
     with pytest.raises(CancelledError):
         robot.perform("say", ["hello"])
@@ -425,7 +426,7 @@ def test_goal_is_cancelled_when_another_node_takes_the_name(graph: Graph) -> Non
 LATE = f"""
 import subprocess, sys, time
 from channel import serve
-from actions import Ros1Worker
+from ros1_worker import Ros1Worker
 class Late(Ros1Worker):
     def connect(self, start):
         left_behind = super().connect(start)
@@ -446,8 +447,8 @@ def test_tool_whose_name_is_taken_while_it_connects_says_so(graph: Graph, tmp_pa
     graph.serve(GO_TO)
     script = tmp_path / "late.py"
     script.write_text(LATE)
-    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKER)}
-    robot = RosRobot("ros1", graph.uri, script, ROS_PYTHON, environment, waits=Waits(patience=LONG))
+    environment = {"ROS_MASTER_URI": graph.uri, "PYTHONPATH": str(WORKERS)}
+    robot = RosRobot("ros1", graph.uri, str(script), Options(), environment, waits=Waits(patience=LONG))
     began = time.monotonic()
     with pytest.raises(NotReadyError, match="node called /codebotler"):
         robot.connect()
@@ -546,7 +547,7 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
 
     actions = [{"type": s.ros.type, "definition": s.ros.definition} for s in SKILLS.rows if s.ros is not None]
     said = subprocess.run(
-        [str(ROS_PYTHON), "-c", MD5, str(WORKER), json.dumps(actions)],
+        [str(ROS_PYTHON), "-c", MD5, str(WORKERS), json.dumps(actions)],
         capture_output=True,
         text=True,
         check=True,
@@ -574,6 +575,6 @@ def test_messages_made_in_memory_are_those_of_the_code_generator() -> None:
         assert made[f"{name}Action"][0] == action
 
 
-@pytest.mark.parametrize("path", sorted(WORKER.glob("*.py")))
+@pytest.mark.parametrize("path", sorted(p for p in WORKERS.glob("*.py") if "rosbridge" not in p.name))
 def test_workers_are_read_by_python_3_8(path: Path) -> None:
     ast.parse(path.read_text(), feature_version=(3, 8))

@@ -21,15 +21,19 @@ from websockets.sync.server import ServerConnection
 
 from bridges import Bridge, bridge, like_ros_2, over_ros
 from codebotler.core.skills import SKILLS
-from codebotler.robots.base import CancelledError, NotReadyError, Picture, RobotLostError
+from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.ros import Waits
-from codebotler.robots.rosbridge.robot import Rosbridge
+from codebotler.robots.ros import rosbridge
+from codebotler.robots.ros.robot import RosRobot, Waits
 from codebotler.simulator.robot import RobotError
 from processes import are_gone, children_of
 from ros_graph import GO_TO, SAY, Graph, free_port, started
 
 WAITS = Waits(patience=5.0, silence=1.5, longest=20.0)
+
+
+def behind(address: str, waits: Waits | None = None) -> RosRobot:
+    return rosbridge.robot(Options(address=address), waits)
 
 
 @pytest.fixture
@@ -39,13 +43,13 @@ def double(graph: Graph) -> Iterator[Bridge]:
 
 
 @pytest.fixture
-def robot(double: Bridge) -> Iterator[Rosbridge]:
-    robot = Rosbridge(double.address, waits=WAITS)
+def robot(double: Bridge) -> Iterator[RosRobot]:
+    robot = behind(double.address, WAITS)
     yield robot
     robot.disconnect()
 
 
-def test_goal_is_executed_and_the_result_comes_back(graph: Graph, robot: Rosbridge) -> None:
+def test_goal_is_executed_and_the_result_comes_back(graph: Graph, robot: RosRobot) -> None:
     server = graph.serve(*SKILLS.rows)
     robot.connect()
     assert robot.perform("go_to", ["the hall"]) is None
@@ -57,7 +61,7 @@ def test_goal_is_executed_and_the_result_comes_back(graph: Graph, robot: Rosbrid
         robot.perform("say", ["hello"])
 
 
-def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph, robot: Rosbridge) -> None:
+def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph, robot: RosRobot) -> None:
     graph.serve(SAY, KNOWS_LATE="1.0")
     robot.connect()
     robot.perform("say", ["hello"])
@@ -72,7 +76,7 @@ def test_no_result_is_lost_of_a_server_that_knows_late_who_wants_it(graph: Graph
     ],
 )
 def test_final_status_is_that_of_the_result(
-    graph: Graph, robot: Rosbridge, goal: str, kind: str, message: str
+    graph: Graph, robot: RosRobot, goal: str, kind: str, message: str
 ) -> None:
     graph.serve(GO_TO)
     robot.connect()
@@ -82,7 +86,7 @@ def test_final_status_is_that_of_the_result(
 
 
 def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_connect(
-    graph: Graph, robot: Rosbridge
+    graph: Graph, robot: RosRobot
 ) -> None:
     server = graph.serve(GO_TO, SAY)
     robot.connect()
@@ -98,7 +102,7 @@ def test_cancel_reaches_the_server_and_nothing_is_performed_before_the_next_conn
     server.expect("goal", "again")
 
 
-def test_cancel_right_after_the_first_goal_ends_it(graph: Graph, robot: Rosbridge) -> None:
+def test_cancel_right_after_the_first_goal_ends_it(graph: Graph, robot: RosRobot) -> None:
     graph.serve(GO_TO)
     robot.connect()
     with started(lambda: robot.perform("go_to", ["never"])) as ended:
@@ -108,7 +112,7 @@ def test_cancel_right_after_the_first_goal_ends_it(graph: Graph, robot: Rosbridg
     assert isinstance(ended["error"], CancelledError)
 
 
-def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: Rosbridge) -> None:
+def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: RosRobot) -> None:
     graph.serve(GO_TO)
     robot.connect()
     with pytest.raises(RobotLostError, match=r"/go_to_server has died.* 1\.5 s"):
@@ -117,14 +121,14 @@ def test_server_that_dies_in_a_goal_is_noticed(graph: Graph, robot: Rosbridge) -
 
 def test_server_that_sends_no_result_is_noticed(graph: Graph, double: Bridge) -> None:
     graph.serve(GO_TO)
-    robot = Rosbridge(double.address, waits=Waits(patience=2.0))
+    robot = behind(double.address, Waits(patience=2.0))
     robot.connect()
     with pytest.raises(RobotLostError, match=r"/go_to_server .*no result .*2 s"):
         robot.perform("go_to", ["no result"])
     robot.disconnect()
 
 
-def test_missing_server_is_said(graph: Graph, robot: Rosbridge) -> None:
+def test_missing_server_is_said(graph: Graph, robot: RosRobot) -> None:
     graph.serve(GO_TO)
     robot.connect()
     with pytest.raises(RobotLostError, match=r"no action server .*/say_server"):
@@ -134,7 +138,7 @@ def test_missing_server_is_said(graph: Graph, robot: Rosbridge) -> None:
 def test_messages_that_the_robot_does_not_know_are_said(graph: Graph) -> None:
     graph.serve(GO_TO)
     with bridge(over_ros(graph.uri, ("say",))) as double:
-        robot = Rosbridge(double.address, waits=WAITS)
+        robot = behind(double.address, WAITS)
         robot.connect()
         with pytest.raises(RobotLostError, match="Unable to import robot_actions_pkg/"):
             robot.perform("ask", ["ann", "tea?", ()])
@@ -143,7 +147,7 @@ def test_messages_that_the_robot_does_not_know_are_said(graph: Graph) -> None:
 
 def test_robot_that_does_not_stop_is_said_not_to(graph: Graph, double: Bridge) -> None:
     server = graph.serve(GO_TO)
-    robot = Rosbridge(double.address, waits=Waits(patience=2.0))
+    robot = behind(double.address, Waits(patience=2.0))
     robot.connect()
     with started(lambda: robot.perform("go_to", ["never, whatever you say"])) as ended:
         server.expect("goal", "never, whatever you say")
@@ -154,7 +158,7 @@ def test_robot_that_does_not_stop_is_said_not_to(graph: Graph, double: Bridge) -
 
 
 def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
-    graph: Graph, double: Bridge, robot: Rosbridge
+    graph: Graph, double: Bridge, robot: RosRobot
 ) -> None:
     server = graph.serve(GO_TO)
     robot.connect()
@@ -168,8 +172,9 @@ def test_goal_is_cancelled_over_another_connection_when_one_is_lost(
 
 TOOL = """
 import sys
-from codebotler.robots.rosbridge.robot import Rosbridge
-robot = Rosbridge(sys.argv[1])
+from codebotler.robots.ros import rosbridge
+from codebotler.robots.base import Options
+robot = rosbridge.robot(Options(address=sys.argv[1]))
 robot.connect()
 robot.perform("get_all_rooms", [])
 robot.perform("go_to", ["never"])
@@ -195,7 +200,7 @@ def test_killed_tool_leaves_no_moving_robot(graph: Graph, double: Bridge) -> Non
     assert are_gone(workers)
 
 
-def test_worker_of_a_tool_that_leaves_cancels_nothing(graph: Graph, robot: Rosbridge) -> None:
+def test_worker_of_a_tool_that_leaves_cancels_nothing(graph: Graph, robot: RosRobot) -> None:
     server = graph.serve(GO_TO)
     robot.connect()
     robot.perform("go_to", ["the hall"])
@@ -209,9 +214,9 @@ def test_worker_of_a_tool_that_leaves_cancels_nothing(graph: Graph, robot: Rosbr
 def test_no_rosbridge_is_said_with_the_mend() -> None:
     address = f"ws://127.0.0.1:{free_port()}"
     with pytest.raises(NotReadyError, match=f"no rosbridge .*{address}"):
-        Rosbridge(address).connect()
+        behind(address).connect()
     with pytest.raises(NotReadyError, match=r"no rosbridge .*nonsense"):
-        Rosbridge("nonsense").connect()
+        behind("nonsense").connect()
 
 
 # --- ROS 2, against a stand-in
@@ -222,11 +227,11 @@ def test_two_tools_are_kept_from_one_robot_whatever_their_homes_and_words(tmp_pa
     with bridge(like_ros_2([])) as double:
         port = double.address.rpartition(":")[2]
         with (
-            Reservation(Rosbridge(double.address), tmp_path / "one"),
+            Reservation(behind(double.address), tmp_path / "one"),
             pytest.raises(NotReadyError, match=f"another tool .process {os.getpid()}, since"),
         ):
-            Reservation(Rosbridge(other.format(port)), tmp_path / "two").__enter__()
-        with Reservation(Rosbridge(f"ws://localhost:{port}/"), tmp_path / "two"):
+            Reservation(behind(other.format(port)), tmp_path / "two").__enter__()
+        with Reservation(behind(f"ws://localhost:{port}/"), tmp_path / "two"):
             pass
 
 
@@ -236,15 +241,15 @@ def heard() -> list[dict[str, Any]]:
 
 
 @pytest.fixture
-def second(heard: list[dict[str, Any]]) -> Iterator[Rosbridge]:
+def second(heard: list[dict[str, Any]]) -> Iterator[RosRobot]:
     with bridge(like_ros_2(heard)) as double:
-        robot = Rosbridge(double.address, waits=Waits(patience=1.0, longest=2.0))
+        robot = behind(double.address, Waits(patience=1.0, longest=2.0))
         robot.connect()
         yield robot
         robot.disconnect()
 
 
-def test_stand_in_for_ros_2_executes_goals(second: Rosbridge, heard: list[dict[str, Any]]) -> None:
+def test_stand_in_for_ros_2_executes_goals(second: RosRobot, heard: list[dict[str, Any]]) -> None:
     told: list[str | Picture] = []
     assert second.perform("ask", ["ann", "tea?", ("yes", "no")], told.append) == "yes"
     assert told == ["near: the hall"]
@@ -259,7 +264,7 @@ def test_stand_in_for_ros_2_executes_goals(second: Rosbridge, heard: list[dict[s
     }
 
 
-def test_stand_in_for_ros_2_aborts_and_refuses(second: Rosbridge) -> None:
+def test_stand_in_for_ros_2_aborts_and_refuses(second: RosRobot) -> None:
     with pytest.raises(RobotError) as error:
         second.perform("go_to", ["abort"])
     assert error.value.kind == "GoToInvalidLocation"
@@ -270,7 +275,7 @@ def test_stand_in_for_ros_2_aborts_and_refuses(second: Rosbridge) -> None:
 @pytest.mark.parametrize(
     "said", ["{nonsense", '{"op": "action_result", "id": 1, "status": []}', '{"op": [' + "[" * 5_000]
 )
-def test_stand_in_for_ros_2_that_talks_nonsense_is_not_lost(second: Rosbridge, said: str) -> None:
+def test_stand_in_for_ros_2_that_talks_nonsense_is_not_lost(second: RosRobot, said: str) -> None:
     with pytest.raises(RobotLostError, match=r"not finish .*2 s"):
         second.perform("go_to", [said])
     assert second.perform("ask", ["ann", "tea?", ("yes", "no")]) == "yes"
@@ -292,11 +297,11 @@ def test_message_that_is_none_is_survived_and_shown(
             connection.send(json.dumps(message))
 
     with bridge(handle) as double:
-        robot = Rosbridge(double.address, waits=Waits(patience=1.0))
+        robot = behind(double.address, Waits(patience=1.0))
         robot.connect()
         with pytest.raises(RobotLostError, match=r"no action server .*/say_server") as error:
             robot.perform("say", ["hello"])
-        assert re.search("no message of rosbridge|bad", error.value.sentence)
+        assert re.search("not a rosbridge message|bad", error.value.sentence)
         robot.disconnect()
 
 
@@ -327,7 +332,7 @@ def test_stand_in_for_ros_2_may_end_a_stopped_goal_in_any_way(
                 connection.send(json.dumps({"op": "action_result", "id": message["id"], **end}))
 
     with bridge(handle) as double:
-        robot = Rosbridge(double.address)
+        robot = behind(double.address)
         robot.connect()
         with started(lambda: robot.perform("go_to", ["the hall"])) as ended:
             assert sent.wait(30)
@@ -337,7 +342,7 @@ def test_stand_in_for_ros_2_may_end_a_stopped_goal_in_any_way(
 
 
 def test_stand_in_for_ros_2_hears_of_a_stop_and_of_what_takes_too_long(
-    second: Rosbridge, heard: list[dict[str, Any]]
+    second: RosRobot, heard: list[dict[str, Any]]
 ) -> None:
     with pytest.raises(RobotLostError, match=r"not finish .*2 s.*cancelled"):
         second.perform("go_to", ["never"])

@@ -18,10 +18,10 @@ from codebotler.core.trace import Status
 from codebotler.core.world import Person, Room, World
 from codebotler.missions.live import LiveRobot
 from codebotler.models.recorded import recorded_model
-from codebotler.robots.base import CancelledError, NotReadyError, RobotLostError
-from codebotler.robots.ros1.robot import Ros1
+from codebotler.robots.base import CancelledError, NotReadyError, Options, RobotLostError
+from codebotler.robots.open import open_robot
+from codebotler.robots.ros.virtual import VirtualRobot
 from codebotler.robots.simulated import ROBOT_RULES
-from codebotler.robots.virtual import VirtualRobot
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError
 from codebotler.simulator.worker import Worker
@@ -112,7 +112,7 @@ def test_taken_port_and_distant_master_are_said() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-        with pytest.raises(NotReadyError, match=f"port {port} .*no ROS master"):
+        with pytest.raises(NotReadyError, match=f"port {port} .*not a ROS master"):
             VirtualRobot(WORLD, port=port).start()
 
 
@@ -131,7 +131,7 @@ def test_second_virtual_robot_is_refused(graph: Graph, virtual: VirtualRobot) ->
 
 def test_killed_worker_is_said(virtual: VirtualRobot) -> None:
     assert virtual._worker is not None
-    os.kill(virtual._worker.pid, signal.SIGKILL)
+    os.kill(virtual._worker._process.pid, signal.SIGKILL)
     with pytest.raises(RobotLostError, match=r"virtual robot has died \(signal 9\)"):
         virtual.wait()
 
@@ -149,7 +149,7 @@ def test_command_starts_a_master_that_ends_with_it(tmp_path: Path) -> None:
     )
     assert process.stderr is not None
     assert re.search(rf"ROS master .*http://localhost:{port}\b.*Ctrl-C", process.stderr.readline())
-    robot = Ros1(f"http://localhost:{port}")
+    robot = open_robot("ros1", Options(address=f"http://localhost:{port}"))
     robot.connect()
     robot.perform("go_to", ["kitchen"])
     with pytest.raises(RobotError):

@@ -18,8 +18,10 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.robots.base import CancelledError, NotReadyError, Options, Picture, RobotLostError
 from codebotler.robots.open import open_robot
-from codebotler.robots.ros import Waits
-from codebotler.robots.ros2.robot import NOTE, WORKER, Ros2, readiness
+from codebotler.robots.ros import ros2
+from codebotler.robots.ros.robot import RosRobot, Waits
+from codebotler.robots.ros.ros2 import NOTE, readiness
+from codebotler.robots.ros.worker import WORKERS
 from codebotler.simulator.robot import RobotError
 
 STUB = Path(__file__).parent / "stub"
@@ -36,8 +38,8 @@ def notes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def robot() -> Iterator[Ros2]:
-    robot = Ros2(python=Path(sys.executable), waits=WAITS)
+def robot() -> Iterator[RosRobot]:
+    robot = ros2.robot(Options(ros_python=Path(sys.executable)), WAITS)
     robot.connect()
     yield robot
     robot.disconnect()
@@ -50,7 +52,7 @@ def until(noted: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def stopped(robot: Ros2, notes: Path, goal: str) -> BaseException | None:
+def stopped(robot: RosRobot, notes: Path, goal: str) -> BaseException | None:
     """What a goal ends with that is cancelled once it is sent."""
     ended: list[BaseException] = []
 
@@ -68,7 +70,7 @@ def stopped(robot: Ros2, notes: Path, goal: str) -> BaseException | None:
     return ended[0] if ended else None
 
 
-def test_goal_is_executed_and_the_result_comes_back(robot: Ros2, notes: Path) -> None:
+def test_goal_is_executed_and_the_result_comes_back(robot: RosRobot, notes: Path) -> None:
     told: list[str | Picture] = []
     assert robot.missing == {}
     assert robot.perform("go_to", ["feedback"], told.append) is None
@@ -81,35 +83,35 @@ def test_goal_is_executed_and_the_result_comes_back(robot: Ros2, notes: Path) ->
 
 
 @pytest.mark.parametrize("state", ["abort", "reject"])
-def test_rejected_or_aborted_goal_is_a_robot_error(robot: Ros2, state: str) -> None:
+def test_rejected_or_aborted_goal_is_a_robot_error(robot: RosRobot, state: str) -> None:
     with pytest.raises(RobotError) as error:
         robot.perform("go_to", [state])
     assert error.value.kind == "GoToInvalidLocation"
     assert f"/go_to_server {state}ed " in str(error.value)
 
 
-def test_cancel_reaches_the_server(robot: Ros2, notes: Path) -> None:
+def test_cancel_reaches_the_server(robot: RosRobot, notes: Path) -> None:
     assert isinstance(stopped(robot, notes, "never"), CancelledError)
     assert "cancel never\n" in notes.read_text()
 
 
-def test_cancel_before_the_server_has_taken_the_goal(robot: Ros2, notes: Path) -> None:
+def test_cancel_before_the_server_has_taken_the_goal(robot: RosRobot, notes: Path) -> None:
     assert isinstance(stopped(robot, notes, "slow"), CancelledError)
     assert "cancel never\n" in notes.read_text()
 
 
-def test_goal_that_somebody_else_cancels_is_cancelled(robot: Ros2) -> None:
+def test_goal_that_somebody_else_cancels_is_cancelled(robot: RosRobot) -> None:
     with pytest.raises(CancelledError):
         robot.perform("go_to", ["by somebody else"])
 
 
-def test_robot_that_does_not_stop_is_said_not_to(robot: Ros2, notes: Path) -> None:
+def test_robot_that_does_not_stop_is_said_not_to(robot: RosRobot, notes: Path) -> None:
     error = stopped(robot, notes, "never, whatever you say")
     assert isinstance(error, RobotLostError)
     assert re.search(r"told to stop.* 1 s", error.sentence)
 
 
-def test_server_that_dies_or_takes_no_notice(robot: Ros2) -> None:
+def test_server_that_dies_or_takes_no_notice(robot: RosRobot) -> None:
     with pytest.raises(RobotLostError, match=r"accept the goal .*1 s"):
         robot.perform("say", ["ignore"])
     with pytest.raises(RobotLostError, match=r"/go_to_server has died.* 0\.5 s"):
@@ -118,7 +120,7 @@ def test_server_that_dies_or_takes_no_notice(robot: Ros2) -> None:
 
 def test_missing_server_and_second_tool(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LACKS", "/pick_server")
-    robot = Ros2(python=Path(sys.executable), waits=WAITS)
+    robot = ros2.robot(Options(ros_python=Path(sys.executable)), WAITS)
     robot.connect()
     assert set(robot.missing) == {"pick"}
     assert "robot_actions_pkg/action/Pick" in robot.missing["pick"]
@@ -128,11 +130,11 @@ def test_missing_server_and_second_tool(monkeypatch: pytest.MonkeyPatch) -> None
         robot.connect()
 
 
-def test_killed_worker_is_replaced_by_one_that_cancels_all(robot: Ros2, notes: Path) -> None:
+def test_killed_worker_is_replaced_by_one_that_cancels_all(robot: RosRobot, notes: Path) -> None:
     def kill() -> None:
         until(lambda: "goal never\n" in notes.read_text())
         assert robot._worker is not None
-        os.kill(robot._worker.pid, signal.SIGKILL)
+        os.kill(robot._worker._process.pid, signal.SIGKILL)
 
     killer = threading.Thread(target=kill)
     killer.start()
@@ -154,4 +156,4 @@ def test_address_is_a_domain() -> None:
 
 
 def test_worker_is_read_by_python_3_8() -> None:
-    ast.parse(WORKER.read_text(), feature_version=(3, 8))
+    ast.parse((WORKERS / "ros2_worker.py").read_text(), feature_version=(3, 8))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.room_names import MOST_ROOMS, lists_rooms, named_rooms
-from codebotler.checking.sampled import SAMPLES, CheckSettings, SampledRuns, failures, run_sample
+from codebotler.checking.sampled import SAMPLES, CheckSettings, Run, failures, run_sample, sampled_runs
 from codebotler.checking.static import static_problems
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import Flaw, parsed, tree_of
@@ -72,7 +72,7 @@ def check(
             futures = [opened.submit(one, room_map, sampler) for sampler in samplers]
             return [future.result() for future in futures]
 
-        return _checked(program, known, settings, SampledRuns(run, opened.workers))
+        return _checked(program, known, settings, run, opened.workers)
 
 
 def check_on(
@@ -80,41 +80,29 @@ def check_on(
     program: str,
     room_map: RoomMap | None = None,
     settings: CheckSettings | None = None,
-    known: dict[RoomMap, list[Sample]] | None = None,
 ) -> Check:
-    """The same check on one worker, for checking many programs at the same time.
-
-    Args:
-        worker: the calling thread's own.
-        program: its source, which need not even parse.
-        room_map: the rooms; by default those in the program.
-        settings: how to check it.
-        known: the runs of the same program under the same rules in other checks; those of this one are added.
-
-    Raises:
-        EngineError: a process was lost twice, or the worker was stopped.
-    """
+    """The same check on one worker, the calling thread's own, for checking many programs at the same time."""
     how = settings or CheckSettings()
 
     def run(room_map: RoomMap, samplers: Iterable[FactSampler]) -> Iterable[Sample]:
         return (run_sample(worker, program, room_map, sampler, how) for sampler in samplers)
 
     rooms = room_map or _room_map(program, None, None, how.skills)
-    return _checked(program, rooms, how, SampledRuns(run, known={} if known is None else known))
+    return _checked(program, rooms, how, run)
 
 
-def _checked(program: str, room_map: RoomMap, settings: CheckSettings, runs: SampledRuns) -> Check:
+def _checked(program: str, room_map: RoomMap, settings: CheckSettings, run: Run, width: int = 1) -> Check:
     tree = parsed(program, compiled=True)
     if isinstance(tree, Flaw):
         problem = Problem(tree.kind, tree.message, tree.line)
         return Check((problem,), (), room_map, settings.seed, settings.strict)
     problems = static_problems(program, tree, room_map, settings.skills)
-    ran = runs.samples(room_map, settings)
+    ran = sampled_runs(run, room_map, settings, width)
     for _ in range(GUESSES if room_map.guessed else 0):
         wider = _widened(room_map, ran)
         if wider == room_map:
             break
-        room_map, ran = wider, runs.samples(wider, settings)
+        room_map, ran = wider, sampled_runs(run, wider, settings, width)
     blamed = {problem.line for problem in problems}
     problems += [problem for problem in failures(ran, room_map) if problem.line not in blamed]
     problems.sort(key=lambda problem: problem.line or 0)

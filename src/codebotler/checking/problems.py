@@ -41,21 +41,13 @@ class Problem:
 
 @dataclass(frozen=True)
 class Sample:
-    """One run in a sampled world.
+    """One run in a sampled world."""
 
-    Args:
-        number: of the world, from 0.
-        outcome: how the run ended.
-        facts: what was settled about the world while it ran, in that order.
-        draws: the draws that settled it, in order.
-        in_vain: whether the robot waited or searched in vain, so that the end says little about the program.
-    """
-
-    number: int
+    number: int  # of the world, from 0
     outcome: Outcome
-    facts: tuple[Fact, ...] = field(default=(), repr=False)
-    draws: tuple[Draw, ...] = field(default=(), repr=False)
-    in_vain: bool = False
+    facts: tuple[Fact, ...] = field(default=(), repr=False)  # about the world, in the order of the run
+    draws: tuple[Draw, ...] = field(default=(), repr=False)  # that settled them, in order
+    in_vain: bool = False  # it waited or searched in vain, so that its end says little
 
     def is_as_in(self, sampler: FactSampler) -> bool:
         """Whether a run in another world would meet the same facts, and so be the same."""

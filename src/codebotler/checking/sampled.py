@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from codebotler.checking.problems import Problem, Sample, no_room
 from codebotler.core.errors import UserError
@@ -24,26 +25,14 @@ MOST_FACTS = 4
 
 @dataclass(frozen=True)
 class CheckSettings:
-    """How programs are checked.
-
-    Args:
-        samples: how many worlds to sample, 1 to 10,000.
-        seed: of the worlds: the same ones on every machine.
-        strict: whether to draw also what the program takes for granted.
-        rules: how a run is simulated.
-        skills: what the program may call.
-        behaviours: what each skill does; those of the eight skills by default.
-
-    Raises:
-        UserError: the number of samples is out of range.
-    """
+    """How programs are checked."""
 
     samples: int = SAMPLES
-    seed: int = 0
-    strict: bool = False
+    seed: int = 0  # of the worlds: the same ones on every machine
+    strict: bool = False  # whether to draw also what the program takes for granted
     rules: Rules = AS_WRITTEN
     skills: SkillTable = SKILLS
-    behaviours: Mapping[str, Behaviour] | None = None
+    behaviours: Mapping[str, Behaviour] | None = None  # by default those of the eight skills
 
     def __post_init__(self) -> None:
         if not 1 <= self.samples <= MOST_SAMPLES:
@@ -73,35 +62,34 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
     return outcome.status is Status.TIMEOUT
 
 
-@dataclass
-class SampledRuns:
-    """A program's runs in sampled worlds; worlds that are alike to it are run once."""
+Run: TypeAlias = Callable[[RoomMap, Iterable[FactSampler]], Iterable[Sample]]
+"""Runs one program in several worlds."""
 
-    run: Callable[[RoomMap, Iterable[FactSampler]], Iterable[Sample]]
-    width: int = 1  # runs at the same time
-    known: dict[RoomMap, list[Sample]] = field(default_factory=dict)
 
-    def samples(self, room_map: RoomMap, settings: CheckSettings) -> list[Sample]:
-        """The runs in so many worlds, and in more if the program waits or searches in vain in all of them."""
-        first = FactSampler(settings.seed, 0, settings.strict)
-        ran = self._in(room_map, [replace(first, sample=number) for number in range(settings.samples)])
-        for more in range(MORE):
-            if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
-                break
-            # A program that waits in many places needs luck to end; a search, that not all is full of things.
-            ran += self._in(room_map, [replace(first, sample=len(ran), lucky=more % 2 == 1)])
-        return ran
+def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
+    """The runs in so many worlds, and in more if the program waits or searches in vain in all of them.
 
-    def _in(self, room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
-        known = self.known.setdefault(room_map, [])
-        found = []
-        for start in range(0, len(samplers), self.width):
-            these = samplers[start : start + self.width]
-            known += self.run(room_map, [new for new in these if not any(one.is_as_in(new) for one in known)])
+    Worlds that are alike to the program are run once; `width` runs go on at the same time.
+    """
+    known: list[Sample] = []
+    ran: list[Sample] = []
+
+    def add(samplers: Sequence[FactSampler]) -> None:
+        for start in range(0, len(samplers), width):
+            these = samplers[start : start + width]
+            known.extend(run(room_map, [s for s in these if not any(one.is_as_in(s) for one in known)]))
             for sampler in these:
                 same = next(one for one in known if one.is_as_in(sampler))
-                found.append(replace(same, number=sampler.sample))
-        return found
+                ran.append(replace(same, number=sampler.sample))
+
+    first = FactSampler(settings.seed, 0, settings.strict)
+    add([replace(first, sample=number) for number in range(settings.samples)])
+    for more in range(MORE):
+        if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
+            break
+        # A program that waits in many places needs luck to end; a search, that not all is full of things.
+        add([replace(first, sample=len(ran), lucky=more % 2 == 1)])
+    return ran
 
 
 def _only_computed(sample: Sample) -> bool:
@@ -146,4 +134,4 @@ def _where(same: Sequence[Sample], ran: Sequence[Sample]) -> str:
     telling = [fact for fact in shared if not others or not all(fact in other.drawn for other in others)]
     facts = telling or list(same[0].drawn if others else ())
     left = len(facts) - MOST_FACTS
-    return listed([*([f"{left} more such facts hold"] if left > 0 else []), *facts[-MOST_FACTS:]])
+    return listed([*([f"{left} more facts like these"] if left > 0 else []), *facts[-MOST_FACTS:]])

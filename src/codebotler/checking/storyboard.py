@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, Literal
 
@@ -21,12 +21,7 @@ MOST_OPTIONS = 20
 
 
 def steps_of(trace: Trace, room: Callable[[str], str | None] | None = None) -> list[dict[str, Any]]:
-    """The events of a trace as plain data, counted from 1.
-
-    Args:
-        trace: of a run.
-        room: finds the room that a drive asks for; without it, the steps have no places.
-    """
+    """The events of a trace, counted from 1; with their places if `room` finds the room of a drive."""
     return [_step_data(number, event, room) for number, event in enumerate(trace, 1)]
 
 
@@ -44,7 +39,7 @@ def _step_data(number: int, event: Event, room: Callable[[str], str | None] | No
     return data
 
 
-def storyboard(steps: Sequence[Mapping[str, Any]], needed: set[int | None]) -> Table:
+def storyboard(steps: Sequence[Mapping[str, Any]], needed: Container[int | None]) -> Table:
     """The steps room by room; a long trace keeps its ends and the steps that explanations name."""
     table = grid("right", "left")
     if not steps:
@@ -52,21 +47,27 @@ def storyboard(steps: Sequence[Mapping[str, Any]], needed: set[int | None]) -> T
         return table
     if steps[0]["kind"] != "goto" and "place" in steps[0]:
         table.add_row(Text(), Text(f"in {visible(steps[0]['place'])}", "bold"))
-    last = len(steps) - LAST_STEPS
-
-    def is_shown(step: Mapping[str, Any]) -> bool:
-        number = step["step"]
-        return len(steps) <= MOST_STEPS or number <= FIRST_STEPS or number > last or number in needed
-
-    for shown, some in groupby(steps, key=is_shown):
-        if shown:
+    for is_shown, some in cut(steps, needed):
+        if is_shown:
             for step in some:
                 indent = 0 if step["kind"] == "goto" else 4
                 table.add_row(Text(str(step["step"]), "dim"), Padding(step_text(step), (0, 0, 0, indent)))
         else:
-            hidden = list(some)
-            table.add_row(Text(), Text(f"... {len(hidden):,} more{_repeating(steps, hidden)} ...", "dim"))
+            table.add_row(Text(), Text(f"... {len(some):,} more{_repeating(steps, some)} ...", "dim"))
     return table
+
+
+def cut(
+    steps: Sequence[Mapping[str, Any]], needed: Container[int | None]
+) -> Iterator[tuple[bool, Sequence[Mapping[str, Any]]]]:
+    """Steps in a row, and whether they are shown: of a long trace its ends, and those that are needed."""
+
+    def is_shown(step: Mapping[str, Any]) -> bool:
+        number = step["step"]
+        is_end = number <= FIRST_STEPS or number > len(steps) - LAST_STEPS
+        return len(steps) <= MOST_STEPS or is_end or number in needed
+
+    return ((shown, list(some)) for shown, some in groupby(steps, key=is_shown))
 
 
 def _repeating(steps: Sequence[Mapping[str, Any]], hidden: Sequence[Mapping[str, Any]]) -> str:

@@ -9,26 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from codebotler import __version__
+from codebotler.cli import options
 from codebotler.cli.ending import obey
-from codebotler.cli.options import (
-    ROS_PYTHON,
-    AddressOption,
-    BaseUrlOption,
-    HostOption,
-    MaxTokensOption,
-    ModelOption,
-    NameOption,
-    NoTokenOption,
-    PortOption,
-    RosPythonOption,
-    SeedOption,
-    SpeedOption,
-    TemperatureOption,
-    TimeoutOption,
-    TokenOption,
-    TopPOption,
-    WorldOption,
-)
 from codebotler.core.terminal import note, noting_all, print_text
 
 if TYPE_CHECKING:
@@ -57,7 +39,7 @@ def codebotler(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
-    """Robot programs from plain words: checked before a robot moves."""
+    """Turn instructions into robot programs, check them, and run them on robots."""
     if version:
         print_text(f"codebotler {__version__}")
         raise typer.Exit
@@ -67,9 +49,9 @@ def codebotler(
 
 @app.command()
 def generate(
-    instruction: Annotated[str, typer.Argument(help="What the robot is to do, in plain words.")],
-    model: ModelOption = "recorded",
-    world: WorldOption = None,
+    instruction: Annotated[str, typer.Argument(help="What the robot should do, in plain words.")],
+    model: options.ModelOption = "recorded",
+    world: options.WorldOption = None,
     retries: Annotated[
         int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
     ] = None,
@@ -80,14 +62,14 @@ def generate(
         Path | None, typer.Option(help="Add a line of JSON for every attempt to this file.")
     ] = None,
     show_prompt: Annotated[
-        bool, typer.Option("--show-prompt", help="Print what the model would be asked, and ask nobody.")
+        bool, typer.Option("--show-prompt", help="Print the prompt without asking a model.")
     ] = False,
-    temperature: TemperatureOption = 0.2,
-    top_p: TopPOption = 0.95,
-    max_tokens: MaxTokensOption = 512,
-    seed: SeedOption = None,
-    timeout: TimeoutOption = 60.0,
-    base_url: BaseUrlOption = None,
+    temperature: options.TemperatureOption = 0.2,
+    top_p: options.TopPOption = 0.95,
+    max_tokens: options.MaxTokensOption = 512,
+    seed: options.SeedOption = None,
+    timeout: options.TimeoutOption = 60.0,
+    base_url: options.BaseUrlOption = None,
 ) -> None:
     """Have a model write a program, and print it.
 
@@ -100,7 +82,7 @@ def generate(
     from codebotler.prompts import prompt_for
 
     if not instruction.strip():
-        raise UserError("the instruction is empty; say what the robot is to do")
+        raise UserError("the instruction is empty; say what the robot should do")
     known = None if world is None else World.read(world)
     prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
     if show_prompt:
@@ -115,18 +97,18 @@ def generate(
 @app.command()
 def check(
     program: Annotated[str, typer.Argument(help="A file, or - for a program or a reply on standard input.")],
-    world: WorldOption = None,
+    world: options.WorldOption = None,
     samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
     seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Do not take for granted what the program never looks for.")
+        bool, typer.Option("--strict", help="Do not assume that what the program never looks for is there.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
-    workers: Annotated[int, typer.Option(min=1, help="Runs that go on at the same time.")] = 1,
+    workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,
 ) -> None:
     """Look for problems in a program before it is run.
 
-    It looks in the text and in imagined worlds; the status is 1 if there are any.
+    It reads the text and runs it in imagined worlds; the status is 1 if there are problems.
     """
     from codebotler.checking.check import check as look_for_problems
     from codebotler.cli.check import check_view, read_program
@@ -162,13 +144,13 @@ def run(
     model: Annotated[
         str, typer.Option(help="The model that writes the program for an instruction.")
     ] = "recorded",
-    yes: Annotated[bool, typer.Option("--yes", help="Run it without asking.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Run the program without asking.")] = False,
     despite_problems: Annotated[
         bool, typer.Option("--despite-problems", help="Run it even if the check finds problems.")
     ] = False,
-    speed: SpeedOption = 1.0,
-    address: AddressOption = "",
-    ros_python: RosPythonOption = ROS_PYTHON,
+    speed: options.SpeedOption = 1.0,
+    address: options.AddressOption = "",
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
 ) -> None:
     """Check a program, ask, and run it on a robot.
 
@@ -184,13 +166,13 @@ def run(
     from codebotler.robots.open import open_robot
 
     request = Request(program, model, yes, despite_problems)
-    options = Options(
+    settings = Options(
         world=None if world is None else World.read(world),
         speed=speed or None,
         address=address,
         ros_python=ros_python,
     )
-    body = open_robot(robot, options)
+    body = open_robot(robot, settings)
     raise typer.Exit(run_mission(body, request, home(), lambda name: open_model(name, SamplingSettings())))
 
 
@@ -200,7 +182,7 @@ def missions(
         str | None, typer.Argument(metavar="ID", help="Show this one; `last` is the last one.")
     ] = None,
     mcap: Annotated[
-        Path | None, typer.Option(help="Write it to this file, which Foxglove opens, with the program in it.")
+        Path | None, typer.Option(help="Write the mission and its program to this MCAP file, for Foxglove.")
     ] = None,
     clock: Annotated[str, typer.Option(help="With --mcap: wall, or robot for simulated time.")] = "wall",
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
@@ -224,12 +206,12 @@ def missions(
 
 @app.command()
 def robots(
-    ros_python: RosPythonOption = ROS_PYTHON,
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """List the kinds of robots, and which of them work here.
 
-    For the others it says what is missing, and how to get it.
+    For the others, it shows what is missing and how to install it.
     """
     from dataclasses import asdict
 
@@ -246,27 +228,29 @@ def robots(
 
 @app.command()
 def serve(
-    host: HostOption = "127.0.0.1",
-    port: PortOption = None,
-    name: NameOption = None,
-    token: TokenOption = None,
-    no_token: NoTokenOption = False,
+    host: options.HostOption = "127.0.0.1",
+    port: options.PortOption = None,
+    name: options.NameOption = None,
+    token: options.TokenOption = None,
+    no_token: options.NoTokenOption = False,
     robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file, for the robot and for the map.")] = None,
     model: Annotated[
         list[str] | None, typer.Option(help="A model that may write programs; may be given several times.")
     ] = None,
-    base_url: BaseUrlOption = None,
-    speed: SpeedOption = 1.0,
-    address: AddressOption = "",
-    ros_python: RosPythonOption = ROS_PYTHON,
+    base_url: options.BaseUrlOption = None,
+    speed: options.SpeedOption = 1.0,
+    address: options.AddressOption = "",
+    ros_python: options.RosPythonOption = options.ROS_PYTHON,
     face: Annotated[
         bool, typer.Option("--face", help="Have the robot speak and ask on a page of its own, /face.")
     ] = False,
     face_timeout: Annotated[
         float, typer.Option(min=1, help="Seconds that people have to answer there.")
     ] = 60.0,
-    face_token: Annotated[str | None, typer.Option(help="What opens the face; a new one by default.")] = None,
+    face_token: Annotated[
+        str | None, typer.Option(help="The token that opens the face; a new one by default.")
+    ] = None,
     stop_when_alone: Annotated[
         float | None,
         typer.Option(min=1, help="Stop the robot this many seconds after the last page is closed."),
@@ -282,16 +266,17 @@ def serve(
     from codebotler.robots.base import Options
     from codebotler.robots.face import Face
     from codebotler.robots.open import open_robot, open_with_face
-    from codebotler.web.access import entrance
+    from codebotler.web.access import Access, Place
     from codebotler.web.console import Console
 
-    place, access = entrance(host, port, name or (), token, face_token, no_token=no_token)
+    place = Place(host, port, tuple(name or ()))
+    access = Access.asked_for(token, face_token, open_to_all=no_token, is_loopback=place.is_loopback)
     known = None if world is None else World.read(world)
     models = tuple(model or ("recorded:careful", "recorded:hasty"))
     opened = _opener(models, base_url)
-    options = Options(known, speed or None, address, ros_python)
+    settings = Options(known, speed or None, address, ros_python)
     shown = Face(face_timeout) if face else None
-    body = open_robot(robot, options) if shown is None else open_with_face(robot, options, shown)
+    body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
     console = Console(body, home(), opened, models=models, world=known, face=shown)
 
     from codebotler.web.frame import installed
@@ -316,17 +301,19 @@ def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Mode
 
 @app.command("virtual-robot")
 def virtual_robot(
-    world: Annotated[Path, typer.Option(help="The world file that tells where the robot is.")],
+    world: Annotated[Path, typer.Option(help="The world file in which the robot lives.")],
     port: Annotated[
         int | None,
         typer.Option(
             min=1, max=65535, help="The port of the ROS master; by default from ROS_MASTER_URI, or 11311."
         ),
     ] = None,
-    speed: Annotated[float, typer.Option(help="How many of the robot's seconds pass in a real one.")] = 1.0,
+    speed: Annotated[
+        float, typer.Option(help="How fast the robot's clock runs, such as 20 times real time.")
+    ] = 1.0,
     ros_python: Annotated[
         Path, typer.Option(help="The Python that has rospy, actionlib and rosmaster.")
-    ] = ROS_PYTHON,
+    ] = options.ROS_PYTHON,
 ) -> None:
     """Offer a simulated robot's skills on ROS 1.
 
@@ -335,7 +322,7 @@ def virtual_robot(
     from contextlib import suppress
 
     from codebotler.core.world import World
-    from codebotler.robots.virtual import VirtualRobot
+    from codebotler.robots.ros.virtual import VirtualRobot
 
     def show(line: str) -> None:
         with suppress(OSError):  # the robot goes on where nobody reads any more

@@ -26,35 +26,22 @@ MOST_ROOMS = 12
 
 
 def read_program(name: str) -> str:
-    """Read a program that a user names.
-
-    Args:
-        name: a file, or `-` for standard input, where also a model's whole reply is understood.
-
-    Raises:
-        UserError: there is no such file, or nothing in it.
-    """
+    """The program in a file, or on standard input (`-`), where it may be a model's whole reply."""
     if name != "-":
         if not name:
-            raise UserError("no file is named; name one, or - for standard input")
+            raise UserError("the file name is empty; name a file, or - for standard input")
         text = read_text(Path(name))
         if not text.strip():
-            raise UserError("there is no program in it", file=name)
+            raise UserError("it contains no program", file=name)
         return text
     text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
     if not text.strip():
-        raise UserError("nothing came; pipe a program or a model's reply into it", file=INPUT)
+        raise UserError("standard input is empty; pipe a program or a model's reply into it", file=INPUT)
     return text if TASK in bound_names(text) else program_of(text).source
 
 
 def check_view(found: Check, program: str, name: str) -> RenderableType:
-    """What a check found, for a person: the verdict, the problems, and what the robot would do.
-
-    Args:
-        found: by the check.
-        program: its source.
-        name: what the user calls it.
-    """
+    """What a check found, for a person: the verdict, the problems, and what the robot would do."""
     parts: list[RenderableType] = [_verdict(found, name)]
     lines = program.rstrip("\n").split("\n")
     for problem in found.problems:
@@ -99,8 +86,8 @@ def _rooms(found: Check) -> Text:
     rooms = ", ".join([*shown, *([f"and {left} more"] if left > 0 else [])])
     if not found.rooms_are_guessed:
         return Text(f"rooms: {rooms}", "dim")
-    told = f"rooms, taken from the program itself: {rooms}"
-    return Text(f"{told}\nto find misspelt rooms, name a world with --world FILE", "yellow")
+    told = f"rooms named by the program: {rooms}"
+    return Text(f"{told}\nto find misspelled rooms, add --world FILE", "yellow")
 
 
 def _in_vain(found: Check) -> Iterator[Text]:

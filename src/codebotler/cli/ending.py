@@ -19,7 +19,7 @@ USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this 
 ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
 
 EXTRAS = {
-    **dict.fromkeys(("anthropic", "google", "httpx", "openai", "pydantic_ai", "tenacity"), "models"),
+    **dict.fromkeys(("anthropic", "google", "httpx", "openai", "pydantic_ai"), "models"),
     **dict.fromkeys(("fastapi", "nicegui", "starlette", "uvicorn"), "page"),
     **dict.fromkeys(("PIL", "mcap", "websockets"), "robots"),
     "matplotlib": "report",
@@ -33,10 +33,6 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     """Run a command line and end the process; what a user can cause ends in one sentence.
 
     The status is 2 for what was asked wrongly, 1 for what the machine could not do.
-
-    Args:
-        app: its commands.
-        name: how a user calls it.
     """
     if sys.platform == "win32":
         note(f"{name}: {ON_WINDOWS}")
@@ -79,7 +75,7 @@ def _ending(error: Exception) -> tuple[int, str] | None:
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence
     if isinstance(error, ModuleNotFoundError) and (package := (error.name or "").split(".")[0]) in EXTRAS:
-        return 2, f"{package} is not installed; `pip install 'codebotler[{EXTRAS[package]}]'` brings it"
+        return 2, f"{package} is not installed; `pip install 'codebotler[{EXTRAS[package]}]'` installs it"
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None
@@ -91,4 +87,4 @@ def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' 
     if error.ctx is None:
         return message
     after = " " if message.endswith("?") else "; "
-    return f"{message}{after}`{error.ctx.command_path} --help` lists what there is"
+    return f"{message}{after}`{error.ctx.command_path} --help` shows what there is"

@@ -26,14 +26,7 @@ def write(
     repair: bool,
     record: Path | None,
 ) -> bool:
-    """Have a model write a program, print it, and say whether the check accepts it.
-
-    Raises:
-        UserError: there is no such model.
-        ModelError: a reply did not arrive, or not all of it.
-        EngineError: no isolated process could be started.
-        OSError: an attempt could not be recorded; the program is printed all the same.
-    """
+    """Have a model write a program, print it, and say whether the check accepts it."""
     with ExitStack() as recording:
         with busy(f"asking {model}"):
             asked = open_model(model, settings)
@@ -53,15 +46,9 @@ def write(
 
 @contextmanager
 def recorder(path: Path | None, model: str) -> Iterator[Callable[[Attempt], None]]:
-    """What adds attempts to a file, each when it has ended; nothing is added if no file is named.
+    """Adds attempts to a file, each when it has ended; without a file, nothing.
 
-    Args:
-        path: the file.
-        model: the name of who is asked.
-
-    Raises:
-        UserError: the file holds something else.
-        OSError: at the end, if an attempt could not be added; after it, none is.
+    An OSError comes at the end, so that the program is printed all the same.
     """
     if path is None:
         yield ignore
@@ -94,15 +81,7 @@ def _tell(attempt: Attempt, most: int) -> None:
 
 
 def show(prompt: Prompt, model: str) -> None:
-    """Print what a model is asked: the messages of a chat, or the one text that base models go on from.
-
-    Args:
-        prompt: what is asked.
-        model: the name of the model, which tells in which way it is asked.
-
-    Raises:
-        UserError: there is no such kind of model.
-    """
+    """Print what a model is asked: the messages of a chat, or the one text that base models go on from."""
     kind = kind_of(model)
     if kind == "completions":
         print_source(prompt.text)

@@ -14,21 +14,22 @@ ModelOption = Annotated[
         "or hf:PATH."
     ),
 ]
-WorldOption = Annotated[Path | None, typer.Option(help="The world file that tells which rooms there are.")]
+WorldOption = Annotated[Path | None, typer.Option(help="The world file with the rooms.")]
 TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
 TopPOption = Annotated[float, typer.Option(help="The share of likely tokens to sample from (top-p).")]
 MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
-SeedOption = Annotated[int | None, typer.Option(help="Fix the random numbers, where a model takes a seed.")]
+SeedOption = Annotated[int | None, typer.Option(help="Fix the random numbers, if the model takes a seed.")]
 TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
 BaseUrlOption = Annotated[
-    str | None, typer.Option(help="Where the model is served, such as http://localhost:8000/v1.")
+    str | None, typer.Option(help="The address of the model's server, such as http://localhost:8000/v1.")
 ]
 RosPythonOption = Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")]
 ROS_PYTHON = Path("/usr/bin/python3")
 SpeedOption = Annotated[
-    float, typer.Option(min=0, help="Seconds of the robot's clock in a real one; 0: nothing takes time.")
+    float,
+    typer.Option(min=0, help="How fast the robot's clock runs, such as 20 times real time; 0: no delays."),
 ]
-AddressOption = Annotated[str, typer.Option(help="Where the robot is, if it is not at its usual place.")]
+AddressOption = Annotated[str, typer.Option(help="The robot's address, if it is not the usual one.")]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
     int | None,
@@ -37,9 +38,9 @@ PortOption = Annotated[
     ),
 ]
 NameOption = Annotated[
-    list[str] | None, typer.Option(help="A name by which the page is called, besides its address.")
+    list[str] | None, typer.Option(help="Another host name for the page, besides its address.")
 ]
-TokenOption = Annotated[str | None, typer.Option(help="What opens the page; a new one by default.")]
+TokenOption = Annotated[str | None, typer.Option(help="The token that opens the page; a new one by default.")]
 NoTokenOption = Annotated[
     bool, typer.Option("--no-token", help="Let everybody on this machine in; not with --host.")
 ]

@@ -11,12 +11,13 @@ from pathlib import Path
 
 from codebotler.checking.check import check
 from codebotler.cli.check import check_view, read_program
-from codebotler.cli.missions import note_interrupted
 from codebotler.cli.views import Watcher, ending, source_view
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import busy, note, print_rich, says_yes, shortened
-from codebotler.missions.mission import GRACE, MissionError, State
+from codebotler.missions.log import State
+from codebotler.missions.mission import GRACE, MissionError
 from codebotler.missions.session import MissionSession
+from codebotler.missions.store import recover
 from codebotler.missions.view import Order, SessionView
 from codebotler.models.base import Model
 from codebotler.robots.base import Robot
@@ -45,11 +46,11 @@ class Request:
 
     def __post_init__(self) -> None:
         if not self.what.strip():
-            raise UserError("nothing is asked for; name a program, or say what the robot is to do")
+            raise UserError("the argument is empty; name a program, or say what the robot should do")
         if self.what.endswith(".py") and not self.is_program:
-            raise UserError("there is no such file; name one, or write an instruction", file=self.what)
+            raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
-            raise UserError("the program comes on standard input, so nobody can be asked there; add --yes")
+            raise UserError("standard input holds the program, so it cannot hold your answer; add --yes")
 
     @property
     def is_program(self) -> bool:
@@ -68,7 +69,7 @@ def run(robot: Robot, request: Request, home: Path, open_model: Callable[[str], 
         stopped it.
     """
     program = read_program(request.what) if request.is_program else ""
-    note_interrupted(home)
+    recover(home)
     order = Order(program=program) if program else Order(request.what, request.model)
     session = MissionSession(
         robot, home, order, open_model=open_model, check=lambda source, rooms: check(source, room_map=rooms)
@@ -106,17 +107,17 @@ def _show_check(view: SessionView, request: Request) -> None:
     name = request.what if request.is_program and request.what != "-" else "the program"
     print_rich(check_view(view.check, view.program, name))
     for sentence in (*view.missing_skills, *view.unknown_rooms):
-        note(shortened(f"before it moves: {sentence}"))
+        note(shortened(f"before the robot moves: {sentence}"))
 
 
 def _is_approved(session: MissionSession, view: SessionView, robot: Robot, request: Request) -> bool:
     if view.problems and not request.despite_problems:
         session.reject(f"the check found {'a problem' if len(view.problems) == 1 else 'problems'}")
-        note("not run, because it has problems; --despite-problems runs it anyway")
+        note("not run because of problems; --despite-problems runs it anyway")
         return False
-    if not request.yes and not says_yes(f"run it on the robot {robot.name}?"):
+    if not request.yes and not says_yes(f"run the program on the robot {robot.name}?"):
         session.stop("the person who was asked")
-        note("not run; nothing has moved")
+        note("not run; the robot has not moved")
         return False
     return True
 
@@ -150,7 +151,7 @@ def _stopped_by_signals(session: MissionSession) -> Iterator[list[int]]:
         threading.Thread(target=session.stop, args=(by,), daemon=True).start()
         got.append(number)
         if len(got) > 1:
-            note(f"\nthe robot was told to stop; it has {GRACE:g} s to confirm that")
+            note(f"\nthe robot was told to stop; it has {GRACE:g} s to confirm")
 
     outlives = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     obeyed = [number for number in SIGNALS if not (outlives and number is signal.SIGHUP)]

@@ -13,8 +13,7 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import console, shortened, visible
-from codebotler.missions.log import Line, Summary
-from codebotler.missions.mission import State
+from codebotler.missions.log import Line, State, Summary
 from codebotler.missions.wording import event_text
 from codebotler.robots.base import Readiness
 
@@ -90,11 +89,11 @@ def _event_line(line: Line) -> Text:
 
 def ending(summary: Summary) -> Group:
     """How a mission ended, and how to see it again, in a line that is not broken, to be pasted."""
-    state = State(summary.state)
+    state = summary.state
     text = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))
     if state is State.STOPPED:
         text.append("\nthe robot has stopped")
-    again = f"`codebotler missions {summary.id}` shows it again"
+    again = f"`codebotler missions {summary.id}` shows this mission again"
     return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
 
 
@@ -109,7 +108,7 @@ def list_view(summaries: Sequence[Summary]) -> RenderableType:
         return Text("there are no missions yet", "dim")
     table = grid("left", "left", "left", "left")
     for summary in summaries:
-        state = State(summary.state)
+        state = summary.state
         what = summary.instruction or "a program"
         table.add_row(
             summary.id,
@@ -135,7 +134,7 @@ def mission_view(summary: Summary, events: Sequence[Line]) -> RenderableType:
             before = text if line["event"] == "state" else None
             at = datetime.fromtimestamp(line["time"]).astimezone()
             table.add_row(Text(f"{at:%H:%M:%S}", "dim"), Text(_at(line), "dim"), text)
-    state = State(summary.state)
+    state = summary.state
     problems = [Text(f"problem: {shortened(problem)}", "red") for problem in summary.problems]
     program = Group(Text(), source_view(summary.program))
     end = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))

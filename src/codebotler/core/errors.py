@@ -19,7 +19,7 @@ class UserError(ValueError):
     """
 
     def __init__(self, sentence: str, *, file: Path | str | None = None, line: int | None = None) -> None:
-        self.sentence, self.file, self.line = _brief(" ".join(sentence.splitlines())), file, line
+        self.sentence, self.file, self.line = both_ends(" ".join(sentence.splitlines()), LONGEST), file, line
         where = "" if file is None else f"{file}: " if line is None else f"{file}, line {line}: "
         super().__init__(where + self.sentence)
 
@@ -27,9 +27,10 @@ class UserError(ValueError):
         return partial(type(self), file=self.file, line=self.line), (self.sentence,), vars(self)
 
 
-def _brief(text: str) -> str:
-    half = LONGEST // 2
-    return text if len(text) <= LONGEST else f"{text[:half]} ... {text[-half:]}"
+def both_ends(text: str, longest: int) -> str:
+    """A text, or the two ends of a longer one."""
+    half = longest // 2
+    return text if len(text) <= longest else f"{text[:half]} ... {text[-half:]}"
 
 
 BadInput = UserError  # the former name, for one version
@@ -38,4 +39,4 @@ BadInput = UserError  # the former name, for one version
 def expect_list(given: Sequence[str] | None, what: str) -> None:
     """Refuse a single text in place of a list, since Python would take its letters."""
     if isinstance(given, str):
-        raise UserError(f"{what} must be a list, not the single text {given[:40]!r}")
+        raise UserError(f"{what} must be a list, not the single string {given[:40]!r}")

@@ -27,22 +27,20 @@ MAX_ROW = 5_000_000
 
 def read_text(path: Path, *, limit: int = MAX_BYTES) -> str:
     """The content of a UTF-8 file of at most so many bytes, or a UserError."""
+    return text_of(read_bytes(path, limit + 1), path, limit=limit)
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """The first bytes of a file, or a UserError."""
     with _opened(path, path) as file:
         try:
-            data = file.read(limit + 1)
+            return file.read(most)
         except OSError as error:
             raise UserError(f"cannot be read ({error.strerror})", file=path) from None
-    return text_of(data, path, limit=limit)
 
 
 def text_of(data: bytes, name: Path | str, *, limit: int = MAX_BYTES) -> str:
-    """The text of a file's bytes, with the line ends of any system and without a byte order mark.
-
-    Args:
-        data: the bytes; of a larger file, one more than the limit is enough.
-        name: what errors call the file.
-        limit: the largest size in bytes.
-    """
+    """The text of a file's bytes, with the line ends of any system and without a byte order mark."""
     if len(data) > limit:
         raise UserError(f"is larger than {limit:,} bytes", file=name)
     try:
@@ -69,13 +67,7 @@ def _opened(path: Path, name: Path | str) -> BinaryIO:
 def read_lines(
     path: Path, *, limit: int = MAX_ROW, name: Path | str | None = None
 ) -> Iterator[tuple[int, bytes]]:
-    """The lines of a file with their numbers, counted from 1; a line past the limit is a UserError.
-
-    Args:
-        path: the file.
-        limit: the longest line in bytes.
-        name: what errors call the file; its path by default.
-    """
+    """The lines of a file with their numbers, counted from 1; a line past the limit is a UserError."""
     with _opened(path, name or path) as file:
         for number in count(1):
             line = file.readline(limit + 1)
@@ -87,12 +79,7 @@ def read_lines(
 
 
 def read_rows(path: Path, *, growing: bool = False) -> Iterator[tuple[int, dict[str, Any]]]:
-    """The objects of a file of JSON lines with the numbers of their lines, or a UserError.
-
-    Args:
-        path: the file.
-        growing: whether we append to it, so that a crash may have torn the last line, which is left out.
-    """
+    """The objects in a file of JSON lines and their line numbers; a growing file may end in a torn line."""
     for number, line in read_lines(path):
         if line.strip():
             try:
@@ -114,7 +101,7 @@ def parsed_row(line: bytes, example: str | None = None) -> dict[str, Any] | None
         return None
     if not isinstance(row, dict):
         mend = "" if example is None else f"; a row looks like {example}"
-        raise UserError(f"this line is no JSON object{mend}")
+        raise UserError(f"this line is not a JSON object{mend}")
     return row
 
 
@@ -132,9 +119,7 @@ def to_text(data: dict[str, Any]) -> bytes:
 class Appender:
     """A file of lines that only grows; a last line that a crash has torn is cut off when it is opened.
 
-    Args:
-        path: the file.
-        exclusive: whether to lock the file; a BlockingIOError if another process has locked it.
+    If it is exclusive, a BlockingIOError says that another process has locked it.
     """
 
     def __init__(self, path: Path, *, exclusive: bool = False) -> None:

@@ -29,17 +29,11 @@ os.register_at_fork(
 
 @dataclass(frozen=True)
 class Flaw:
-    """Something that is certainly wrong with a program.
+    """Something that is certainly wrong with a program."""
 
-    Args:
-        line: where, counted from 1; None where no line is to blame.
-        kind: the failure it leads to when a run gets there, such as `NameError` or `AskEmptyOptions`.
-        message: what is wrong, in one plain sentence.
-    """
-
-    line: int | None
-    kind: str
-    message: str
+    line: int | None  # counted from 1; None where no line is to blame
+    kind: str  # of the failure that it leads to, such as `NameError` or `AskEmptyOptions`
+    message: str  # one plain sentence
 
 
 @dataclass(frozen=True)
@@ -81,15 +75,13 @@ def parse_expression(source: str) -> ast.expr:
 
 
 def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
-    """The syntax tree of a source, or why there is none; hostile nesting ends in CPython's own exceptions.
+    """The syntax tree of any text, or why there is none; hostile nesting ends in CPython's own exceptions.
 
-    Args:
-        source: any text.
-        compiled: whether to look also for errors that the compiler finds, such as a stray `return`.
+    If `compiled` is set, the compiler looks for further errors, such as a stray `return`.
     """
     if "\0" in source:
         line = source[: source.index("\0")].count("\n") + 1
-        return Flaw(line, "SyntaxError", "the program holds a null character")
+        return Flaw(line, "SyntaxError", "the program contains a null character")
     try:
         tree = parse(source)
         if compiled:
@@ -99,7 +91,7 @@ def parsed(source: str, *, compiled: bool = False) -> ast.Module | Flaw:
         return Flaw(error.lineno or None, type(error).__name__, f"the program does not parse: {error.msg}")
     except UnicodeEncodeError as error:
         line = source[: error.start].count("\n") + 1
-        return Flaw(line, type(error).__name__, "the program holds half a character, which cannot be encoded")
+        return Flaw(line, type(error).__name__, "the program contains a lone surrogate")
     except (RecursionError, MemoryError) as error:
         return _too_deep(error)
     except (ValueError, OverflowError, SystemError) as error:
@@ -261,7 +253,7 @@ def _mismatch(node: ast.Call, skill: Skill) -> str | None:
     keywords = [k.arg for k in node.keywords if k.arg]
     for word in keywords:
         if word not in names:
-            return f"{takes}, but an argument named {word} is given"
+            return f"{takes}, not an argument {word}"
         if word in names[: len(node.args)]:
             return f"{takes}, but {word} is given twice"
     count = len(node.args) + len(keywords)

@@ -12,70 +12,42 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Parameter:
-    """One argument of a skill.
+    """One argument of a skill."""
 
-    Args:
-        name: the keyword by which a program may pass it.
-        type: `str` or `list`; an argument must have exactly this type.
-        annotation: the type as a reader sees it, such as `list[str]`.
-    """
-
-    name: str
-    type: type[str] | type[list[object]] = str
-    annotation: str = "str"
+    name: str  # by which a program may pass it
+    type: type[str] | type[list[object]] = str  # an argument must have exactly this type
+    annotation: str = "str"  # the type as a reader sees it, such as `list[str]`
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What a skill leaves in the trace.
+    """What a skill leaves in the trace."""
 
-    Args:
-        kind: the event's kind, which is also its name in RTL, such as `goto`.
-        text: the parameter whose value is the event's text.
-        options: the parameter whose value is the event's list of options, for a question.
-    """
-
-    kind: str
-    text: str
-    options: str | None = None
+    kind: str  # of the event, and its name in RTL, such as `goto`
+    text: str  # the parameter whose value is the event's text
+    options: str | None = None  # the parameter whose value is the event's list of options
 
 
 @dataclass(frozen=True)
 class Verb:
-    """A skill in English; the event's text follows it.
+    """A skill in English; the event's text follows it."""
 
-    Args:
-        base: the infinitive without "to", such as `pick up`.
-        third: what the robot does, such as `picks up`.
-        past: what it did, such as `picked up`.
-        ing: such as `picking up`.
-        alone: the past without an object, such as `picked something up`.
-    """
-
-    base: str
-    third: str
-    past: str
-    ing: str
-    alone: str = ""
+    base: str  # `pick up`
+    third: str  # `picks up`
+    past: str  # `picked up`
+    ing: str  # `picking up`
+    alone: str = ""  # `picked something up`, where no object follows
 
 
 @dataclass(frozen=True)
 class RosAction:
-    """The ROS action that carries a skill to a robot (paper, section III.C).
+    """The ROS action that carries a skill to a robot (paper, section III.C)."""
 
-    Args:
-        type: of the action, in the package `robot_actions_pkg`.
-        server: the topic under which the robot offers it.
-        goal: its fields, in the order of the skill's parameters.
-        result: the type of its only field, if it has one.
-        failure: the kind of the error where the skill can fail in one way only; else the robot must name it.
-    """
-
-    type: str
-    server: str
-    goal: tuple[str, ...] = ()
-    result: str | None = None
-    failure: str = ""
+    type: str  # in the package `robot_actions_pkg`
+    server: str  # the topic under which the robot offers it
+    goal: tuple[str, ...] = ()  # its fields, in the order of the skill's parameters
+    result: str | None = None  # the type of its only field, if it has one
+    failure: str = ""  # the kind of its only error; if it is empty, the robot names the kind
 
     @property
     def definition(self) -> str:

@@ -63,15 +63,10 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class RunError:
-    """Why a run did not finish.
+    """Why a run did not finish."""
 
-    Args:
-        kind: an exception's class, a kind of robot error, TimeoutError, MemoryError, Crash or ForbiddenCall.
-        message: one sentence.
-    """
-
-    kind: str
-    message: str
+    kind: str  # an exception's class, a robot error, TimeoutError, MemoryError, Crash or ForbiddenCall
+    message: str  # one sentence
 
 
 @dataclass(frozen=True)
@@ -100,14 +95,7 @@ def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
 
 
 def trace_from(data: Iterable[object]) -> Trace:
-    """The trace that data describe; its events have no place and no time.
-
-    Args:
-        data: the result of `trace_data`.
-
-    Raises:
-        UserError: an element is no event.
-    """
+    """The trace that `trace_data` gave as data, without places and times; a UserError if it is none."""
     return tuple(map(_event_from, data))
 
 
@@ -141,7 +129,7 @@ def _event_from(element: object) -> Event:
         case [str(kind), str(text), list(options), (str() | None) as answer]:
             return Event(kind, text, tuple(map(_option_from, options)), answer=answer)
     forms = "[kind, text], [kind, text, true or false] or [kind, question, options, answer or null]"
-    raise UserError(f"{element!r} is no event of a trace; write {forms}")
+    raise UserError(f"{element!r} is not an event of a trace; write {forms}")
 
 
 def _option_data(option: Option) -> object:
@@ -154,4 +142,4 @@ def _option_from(data: object) -> Option:
             return Option(text)
         case {"no text": str(text)}:
             return Option(text, is_text=False)
-    raise UserError(f'{data!r} is no option; write a text, or {{"no text": ...}} for anything else')
+    raise UserError(f'{data!r} is not an option; write a string, or {{"no text": ...}} for anything else')

@@ -34,21 +34,13 @@ Answer: TypeAlias = str | int
 
 @dataclass(frozen=True)
 class Person:
-    """A person in a room who answers questions.
+    """A person in a room who answers questions."""
 
-    Args:
-        name: a regex for the names they answer to.
-        answers: one per question, in order; the last one stays for ever. Without any, every question fails.
-        topics: regexes, and the answer to a question in which one is found, instead of the next answer.
-        after_looks: how often the robot looks for them in vain before they come; 0 if they are there.
-        leaves: whether they go when they have given their last answer.
-    """
-
-    name: str
-    answers: tuple[Answer, ...] = ()
-    topics: tuple[tuple[str, Answer], ...] = ()
-    after_looks: int = 0
-    leaves: bool = False
+    name: str  # a regex for the names they answer to
+    answers: tuple[Answer, ...] = ()  # one a question, and the last one again; without any, all fail
+    topics: tuple[tuple[str, Answer], ...] = ()  # regexes for questions, and their answers instead
+    after_looks: int = 0  # how often the robot looks in vain before they come
+    leaves: bool = False  # whether they go after their last answer
 
 
 @dataclass(frozen=True)
@@ -101,22 +93,15 @@ class World:
 
     def to_data(self) -> dict[str, object]:
         """The content of a world file for this world."""
-        data: dict[str, object] = {
+        data = {
             "about": self.about,
             "robot": self.robot,
             "rooms": [_room_data(room) for room in self.rooms],
+            "objects": {room.name: list(room.objects) for room in self.rooms if room.objects},
+            "people": {room.name: [*map(_person_data, room.people)] for room in self.rooms if room.people},
+            "may_wait_forever": self.may_wait_forever,
         }
-        if any(room.objects for room in self.rooms):
-            data["objects"] = {room.name: list(room.objects) for room in self.rooms if room.objects}
-        if any(room.people for room in self.rooms):
-            data["people"] = {
-                room.name: [_person_data(person) for person in room.people]
-                for room in self.rooms
-                if room.people
-            }
-        if self.may_wait_forever:
-            data["may_wait_forever"] = True
-        return data
+        return {key: value for key, value in data.items() if value or key == "about"}
 
 
 ROOM_WIDTH, ROOM_DEPTH, HALLWAY = 4.0, 3.0, 2.0
@@ -155,7 +140,7 @@ def check_regex(text: str) -> str:
     try:
         re.compile(text)
     except (re.error, RecursionError, OverflowError) as error:
-        raise ValueError(f"it is no valid regular expression: {error}") from None
+        raise ValueError(f"it is not a valid regular expression: {error}") from None
     return text
 
 
@@ -234,16 +219,11 @@ class WorldFile(_Form):
     may_wait_forever: Annotated[bool, Field(strict=True)] = False
 
     def world(self, file: YamlFile, at: Place = ()) -> World:
-        """The world that it describes, or a UserError about a room or a regex.
-
-        Args:
-            file: the file, for errors.
-            at: its place in the file.
-        """
+        """The world that it describes, or a UserError about a room or a regex."""
         names = [room.name for room in self.rooms]
         for index, room in enumerate(self.rooms):
             if room.name in names[:index]:
-                raise file.wrong(f'the room "{room.name}" is here twice; remove one', *at, "rooms", index)
+                raise file.wrong(f'the room "{room.name}" is listed twice; remove one', *at, "rooms", index)
             if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
                 point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
                 sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
@@ -298,14 +278,12 @@ def _distance(point: Point, start: Point, end: Point) -> float:
 
 
 def _person_data(person: Person) -> dict[str, object]:
-    data: dict[str, object] = {"name": person.name, "answers": list(map(_answer_data, person.answers))}
-    if person.topics:
-        data["topics"] = {topic: _answer_data(answer) for topic, answer in person.topics}
-    if person.after_looks:
-        data["after_looks"] = person.after_looks
-    if person.leaves:
-        data["leaves"] = True
-    return data
+    data: dict[str, object] = {
+        **vars(person),
+        "answers": [*map(_answer_data, person.answers)],
+        "topics": {topic: _answer_data(answer) for topic, answer in person.topics},
+    }
+    return {key: value for key, value in data.items() if value or key == "answers"}
 
 
 def _answer_data(answer: Answer) -> object:
@@ -313,11 +291,9 @@ def _answer_data(answer: Answer) -> object:
 
 
 def _room_data(room: Room) -> object:
-    if room.footprint is None and room.stand_at is None:
-        return room.name
     data: dict[str, object] = {"name": room.name}
     if room.footprint is not None:
         data["footprint"] = [list(corner) for corner in room.footprint]
     if room.stand_at is not None:
         data["stand_at"] = list(room.stand_at)
-    return data
+    return data if len(data) > 1 else room.name

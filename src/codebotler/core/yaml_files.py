@@ -11,7 +11,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, both_ends
 from codebotler.core.files import read_text
 
 Place: TypeAlias = tuple[str | int, ...]
@@ -24,8 +24,8 @@ MAX_DEPTH = 50
 MAX_PLACES = 100_000
 LONGEST_VALUE = 80  # characters of a value that a message quotes
 MENDS = {
-    "mapping values are not allowed in this context": 'put quotes around a text that contains ": "',
-    "found character that cannot start any token": "put quotes around a text, and indent with spaces",
+    "mapping values are not allowed in this context": 'put quotes around text that contains ": "',
+    "found character that cannot start any token": "put quotes around text, and indent with spaces",
 }
 
 
@@ -52,7 +52,7 @@ class _BoundedLoader(Loader):  # type: ignore[misc]  # one of two classes, chose
             return super().construct_object(node, deep)
         except (ValueError, LookupError, AttributeError):  # no such date, for example
             problem = f"{_quoted(node.value)} is no valid {node.tag.rpartition(':')[2]}"
-            raise _fault(f"{problem}; put quotes around a text", node) from None
+            raise _fault(f"{problem}; put quotes around the text", node) from None
 
 
 def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
@@ -60,21 +60,11 @@ def _fault(problem: str, node: yaml.Node | None) -> yaml.MarkedYAMLError:
 
 
 def _quoted(value: object) -> str:
-    text = f'"{value}"' if isinstance(value, str) else str(value)
-    half = LONGEST_VALUE // 2
-    return text if len(text) <= LONGEST_VALUE else f"{text[:half]}...{text[-half:]}"
+    return both_ends(f'"{value}"' if isinstance(value, str) else str(value), LONGEST_VALUE)
 
 
 class YamlFile:
-    """A parsed YAML file that knows the line of everything in it.
-
-    Args:
-        text: the file's content.
-        name: what error messages call the file.
-
-    Raises:
-        UserError: this is not valid YAML, or a key is repeated in one mapping.
-    """
+    """A parsed YAML file that knows the line of everything in it; a UserError if it is not valid."""
 
     def __init__(self, text: str, name: Path | str) -> None:
         self.name = name
@@ -109,13 +99,7 @@ class YamlFile:
         return UserError(sentence, file=self.name, line=self.line(place))
 
     def validate(self, model: type[Model], data: object = None, *, at: Place = ()) -> Model:
-        """The content as a model, or a UserError about the first fault.
-
-        Args:
-            model: what it must look like.
-            data: a part of the content; everything by default.
-            at: the place of that part.
-        """
+        """The content, or the part of it at a place, as a model; a UserError about the first fault."""
         try:
             return model.model_validate(self.data if data is None and not at else data)
         except ValidationError as error:
@@ -152,7 +136,7 @@ class YamlFile:
         elif isinstance(node, yaml.MappingNode):
             for key, value in node.value:
                 if not isinstance(key, yaml.ScalarNode):
-                    raise _fault("this key is no text; write one word or put quotes around it", key)
+                    raise _fault("this key is not text; write one word or put quotes around it", key)
                 inner = (*place, str(key.value))
                 if inner in self._lines:
                     raise _fault(f'the key "{key.value}" is repeated; keep one of them', key)
@@ -174,7 +158,7 @@ EXPECTED = {
 }
 FAULTS = {
     "extra_forbidden": "the key {name} is unknown; remove it or correct its spelling",
-    "invalid_key": "this key is no text; remove it or put quotes around it",
+    "invalid_key": "this key is not text; remove it or put quotes around it",
     "string_too_short": "{name} is empty; write a text",
     "too_short": "{name} has too few entries; it needs at least {min_length}",
     "too_long": "{name} has too many entries; it takes {max_length}",

@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.words import counted
 from codebotler.models.base import Heard, Model, Reply, SamplingSettings, unheard
 from codebotler.models.open import open_model
-from codebotler.models.recorded import RecordedModel
+from codebotler.models.rate_limit import RateLimited
 from codebotler.prompts import Prompt, prompt_for
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.sampled_robot import RoomMap
@@ -24,19 +24,12 @@ Checker: TypeAlias = Callable[[str], Sequence[str]]
 
 @dataclass(frozen=True)
 class Attempt:
-    """One reply of a model and the problems found in it.
+    """One reply of a model and the problems found in it."""
 
-    Args:
-        number: of the sample, from 0.
-        prompt: the request; for a repair, with the previous program and its problems.
-        reply: the model's whole reply.
-        problems: one sentence each; empty if it was accepted, or not checked.
-    """
-
-    number: int
-    prompt: Prompt = field(repr=False)
+    number: int  # of the sample, from 0
+    prompt: Prompt = field(repr=False)  # for a repair, with the previous program and its problems
     reply: Reply = field(repr=False)
-    problems: tuple[str, ...]
+    problems: tuple[str, ...]  # one sentence each; empty if it was accepted, or not checked
 
     def data(self, model: str) -> dict[str, Any]:
         """The attempt as a row of JSON."""
@@ -95,21 +88,10 @@ async def write_program(
 ) -> Generation:
     """Ask a model until the check accepts a program (rejection sampling; paper, section V); closes the model.
 
-    Args:
-        model: the model to ask.
-        prompt: the first request.
-        problems_of: accepts or rejects programs; without it, the first program is taken.
-        retries: how many times to ask again for a rejected program, at least 0.
-        repair: whether to ask again with the rejected program and its problems in the request.
-        heard: called with each piece of text as it arrives.
-        tried: called with each attempt before the next one begins.
-
-    Raises:
-        ModelError: a reply did not arrive, or not all of it.
-        BudgetSpentError: no further request may be made.
+    Each further request is another sample; as a repair, it holds the rejected program and its problems.
     """
     attempts: list[Attempt] = []
-    limited, request = _retrying(model), prompt
+    limited, request = RateLimited(model, concurrency=1), prompt
     try:
         for number in range(retries + 1):
             reply = await limited.reply(request, number=number, heard=heard)
@@ -127,15 +109,6 @@ async def write_program(
     return Generation(tuple(attempts))
 
 
-def _retrying(model: Model) -> Model:
-    """The model, asked again after errors of its server; a recorded one has none, and needs no extra."""
-    if isinstance(model, RecordedModel):
-        return model
-    from codebotler.models.rate_limit import RateLimited  # noqa: PLC0415 - of an extra
-
-    return RateLimited(model, concurrency=1)
-
-
 def write_checked_program(
     model: Model,
     prompt: Prompt,
@@ -146,21 +119,7 @@ def write_checked_program(
     repair: bool = False,
     tried: Callable[[Attempt], None] = ignore,
 ) -> Generation:
-    """Ask a model until a program passes the check in sampled worlds; also where an event loop runs already.
-
-    Args:
-        model: the model to ask; it is closed at the end.
-        prompt: the first request.
-        rooms: their names; without them and a map, the rooms are those that the program names.
-        room_map: the rooms and the start.
-        retries: how many times to ask again for a rejected program, at least 0.
-        repair: whether to ask again with the rejected program and its problems in the request.
-        tried: called with each attempt before the next one begins.
-
-    Raises:
-        ModelError: a reply did not arrive, or not all of it.
-        EngineError: no isolated process could be started.
-    """
+    """Ask a model until a program passes the check in sampled worlds; also inside of an event loop."""
     with WorkerPool(1) as pool:
 
         def problems_of(program: str) -> list[str]:
@@ -223,7 +182,7 @@ def generate(
     if tries < 0:
         raise UserError(f"the number of retries is {tries}, but must be at least 0")
     if not instruction.strip():
-        raise UserError("the instruction is empty; say what the robot is to do")
+        raise UserError("the instruction is empty; say what the robot should do")
     settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
     prompt = prompt_for(instruction, rooms=rooms or ())
     return write_checked_program(

@@ -33,14 +33,10 @@ class StoppedError(Exception):
 
 
 class LiveRobot:
-    """Answers what `Worker.run_live` asks of a robot, by a real or simulated one.
+    """Answers what `Worker.run_live` asks of a robot, by a connected real or simulated one.
 
-    Args:
-        robot: connected.
-        note: logs events.
-        place: the room it is in, if known.
-        clock_starts: the program's clock at its start; by default the time of day here, since programs speak
-            of the time to people.
+    The program's clock starts at `clock_starts`, by default the time of day here, since programs speak of the
+    time to people.
     """
 
     is_live = True
@@ -83,12 +79,7 @@ class LiveRobot:
             self.robot.clock.stop()
 
     def sleep_until(self, now: float) -> None:
-        """Let time pass by the robot's clock.
-
-        Raises:
-            StoppedError: the robot was stopped.
-            OSError: that cannot be taken down.
-        """
+        """Let time pass by the robot's clock, or raise StoppedError."""
         self._check_end()
         seconds = max(0.0, now - self.now)
         self._note("sleep", seconds=round(seconds, 3))
@@ -96,14 +87,7 @@ class LiveRobot:
         self._check_end()
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill.
-
-        Raises:
-            RobotError: the robot cannot.
-            StoppedError: it was stopped.
-            RobotLostError: it is gone, or its answer does not fit the skill.
-            OSError: an event cannot be logged.
-        """
+        """Execute one skill, or raise RobotError, StoppedError, RobotLostError, or OSError for its log."""
         self._check_end()
         row = self.skills[skill]
         event = _event(row, arguments)
@@ -174,7 +158,7 @@ def answered(skill: Skill, result: base.Result) -> base.Result:
     """A robot's answer; raises RobotLostError if it does not fit the skill."""
     is_one = isinstance(result, RETURNS.get(skill.returns, object))
     if not is_one or (isinstance(result, list) and not all(isinstance(text, str) for text in result)):
-        raise RobotLostError(f"the robot answers {skill.name} with {result!r:.100}, no {skill.returns}")
+        raise RobotLostError(f"the robot answers {skill.name} with {result!r:.100}, not {skill.returns}")
     return result
 
 
@@ -208,5 +192,5 @@ def _position(result: base.Result, event: Event) -> int:
                 return number
     offered = ", ".join(option.text for option in event.options)
     raise RobotError(
-        "AskInvalidOptions", f'the answer "{heard}" to "{event.text}" is none of the options ({offered})'
+        "AskInvalidOptions", f'the answer "{heard}" to "{event.text}" is not one of the options ({offered})'
     )

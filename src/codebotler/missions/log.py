@@ -4,159 +4,132 @@ from __future__ import annotations
 
 import json
 import math
-import threading
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from datetime import UTC, datetime
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import Appender, write_whole
+from codebotler.core.files import Appender, read_rows, to_line, write_whole
 
 EVENTS, SUMMARY = "events.jsonl", "mission.json"
-TEXTS = ("id", "state", "robot", "instruction", "model", "program", "reason", "if_tool_dies")
+
+Line: TypeAlias = dict[str, Any]
+"""An event: `time` (seconds since 1970), `clock` (the robot's, in seconds), `event` (what kind), and more."""
+
+TEXTS = ("id", "robot", "instruction", "model", "program", "reason", "if_tool_dies")  # of a summary
 HAS: Mapping[str, frozenset[str]] = {
     "state": frozenset({"state"}),
     "skill": frozenset({"number", "skill", "arguments"}),
     "feedback": frozenset({"number", "skill", "text"}),
     "result": frozenset({"number", "skill", "result"}),
     "error": frozenset({"number", "skill", "kind", "message"}),
-    "cancelled": frozenset({"number", "skill"}),
-    "picture": frozenset({"number", "skill"}),
-    "late": frozenset({"number", "skill"}),
+    **dict.fromkeys(("cancelled", "picture", "late"), frozenset({"number", "skill"})),
     "sleep": frozenset({"seconds"}),
     "stop": frozenset({"by"}),
     "log": frozenset({"text"}),
 }
 """What belongs to each kind of event."""
 
-Line: TypeAlias = dict[str, Any]
-"""An event: `time` (seconds since 1970), `clock` (the robot's, in seconds), `event` (what kind), and more."""
+
+class State(StrEnum):
+    """The states of a mission."""
+
+    DRAFTING = "drafting"
+    CHECKED = "checked"
+    APPROVED = "approved"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    STOPPING = "stopping"
+    STOPPED = "stopped"
+    INTERRUPTED = "interrupted"
+
+
+STEPS: dict[State, frozenset[State]] = {
+    State.DRAFTING: frozenset({State.DRAFTING, State.CHECKED, State.FAILED, State.STOPPED}),
+    State.CHECKED: frozenset(
+        {State.DRAFTING, State.CHECKED, State.APPROVED, State.FAILED, State.STOPPED},
+    ),
+    State.APPROVED: frozenset({State.DRAFTING, State.RUNNING, State.FAILED, State.STOPPED}),
+    State.RUNNING: frozenset({State.DONE, State.FAILED, State.STOPPING}),
+    State.STOPPING: frozenset({State.STOPPED, State.FAILED}),
+}
+"""The states that may follow each state; the others are final. A tool that dies leaves it interrupted."""
 
 
 @dataclass
 class Summary:
-    """A mission in short.
+    """A mission in short."""
 
-    Args:
-        id: its name, by which it is found.
-        state: as `codebotler.missions.mission` has them.
-        robot: the kind of robot.
-        created: seconds since 1970.
-        instruction: what somebody asked for, if the program came from an instruction.
-        model: who wrote the program, if a model did.
-        program: its source.
-        problems: what the check found, each in a sentence.
-        reason: why it came to its state, in a sentence.
-        line: of the program, at which it ended; None where there is none.
-        ended: seconds since 1970; None while it goes on.
-        if_tool_dies: what becomes of the robot then.
-    """
-
-    id: str
-    state: str
-    robot: str
-    created: float
-    instruction: str = ""
-    model: str = ""
+    id: str  # by which it is found
+    state: State
+    robot: str  # its kind
+    created: float  # seconds since 1970
+    instruction: str = ""  # empty if the program did not come from one
+    model: str = ""  # that wrote the program, if one did
     program: str = ""
-    problems: tuple[str, ...] = ()
-    reason: str = ""
-    line: int | None = None
-    ended: float | None = None
-    if_tool_dies: str = ""
+    problems: tuple[str, ...] = ()  # found by the check, in sentences
+    reason: str = ""  # for its state, in a sentence
+    line: int | None = None  # of the program, at which it ended
+    ended: float | None = None  # seconds since 1970
+    if_tool_dies: str = ""  # what becomes of the robot then
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether its state is final."""
+        return self.state not in STEPS
 
     @classmethod
     def read(cls, folder: Path) -> Summary:
-        """The summary of a mission.
-
-        Raises:
-            UserError: it is none.
-            OSError: it cannot be read.
-        """
+        """The summary of a mission, or a UserError."""
         path = folder / SUMMARY
         try:
             data = json.loads(path.read_bytes())
-            known = {field.name: data[field.name] for field in fields(cls) if field.name in data}
-            summary = cls(**{**known, "problems": tuple(known.get("problems", ()))})
+            summary = cls(**{field.name: data[field.name] for field in fields(cls) if field.name in data})
+            summary.state, summary.problems = State(summary.state), tuple(summary.problems)
             datetime.fromtimestamp(summary.created, UTC)
             "".join((*summary.problems, *(getattr(summary, name) for name in TEXTS)))
-        except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
-            raise UserError("this is no summary of a mission; remove its folder", file=path) from None
+        except (ValueError, TypeError, OverflowError, RecursionError):
+            raise UserError("this is not the summary of a mission; remove its folder", file=path) from None
         return summary
 
     def write(self, folder: Path) -> None:
-        """Write it whole, or leave what was there.
-
-        Raises:
-            OSError: it cannot be written.
-        """
+        """Write it whole, or leave what was there."""
         write_whole(folder / SUMMARY, json.dumps(asdict(self), indent=1).encode())
 
 
-class Log:
-    """The events of one mission; locked as long as this process has it open.
+def log_of(folder: Path) -> Appender:
+    """The log of a mission, locked until it is closed; BlockingIOError if another process has it open."""
+    return Appender(folder / EVENTS, exclusive=True)
 
-    Args:
-        folder: of the mission.
 
-    Raises:
-        BlockingIOError: another process has it open.
-        OSError: it cannot be opened.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._lock, self._lines = threading.Lock(), Appender(folder / EVENTS, exclusive=True)
-        self.is_open = True
-
-    def add(self, event: str, *, clock: float = 0.0, **data: object) -> Line:
-        """Write one event; nothing once the log is closed.
-
-        Args:
-            event: what kind it is.
-            clock: of the robot, in seconds since the start.
-            data: what belongs to it, as JSON has it.
-
-        Raises:
-            OSError: it cannot be written.
-        """
-        with self._lock:
-            line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
-            if self.is_open:
-                self._lines.append(json.dumps(line).encode() + b"\n")
-        return line
-
-    def close(self) -> None:
-        """Give the log back."""
-        with self._lock:
-            if self.is_open:
-                self.is_open = False
-                self._lines.close()
+def add_event(log: Appender, event: str, clock: float, **data: object) -> Line:
+    """Write an event at this moment, and return it."""
+    line = {"time": round(time.time(), 6), "clock": round(clock, 6), "event": event, **data}
+    log.append(to_line(line))
+    return line
 
 
 def events_of(folder: Path) -> list[Line]:
-    """The events of a mission, without a last line that was cut off.
-
-    Raises:
-        UserError: a line is no event.
-        OSError: they cannot be read.
-    """
-    path = folder / EVENTS
-    whole = path.read_bytes().split(b"\n")[:-1]
-    return [_event(text, path, number) for number, text in enumerate(whole, 1)]
+    """The events of a mission, without a torn last line; UserError if a line is something else."""
+    path, events = folder / EVENTS, []
+    for number, line in read_rows(path, growing=True):
+        if not _is_event(line):
+            raise UserError("this is not an event of a mission; remove the line", file=path, line=number)
+        events.append(line)
+    return events
 
 
-def _event(text: bytes, path: Path, number: int) -> Line:
+def _is_event(line: Line) -> bool:
     try:
-        line = json.loads(text)
-        has_all = HAS.get(line["event"], frozenset()) <= line.keys()
-        if has_all and isinstance(line["event"], str) and 0 <= line["time"] + line["clock"] < math.inf:
-            return dict(line)
-    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        pass
-    raise UserError("this is no event of a mission; remove the line", file=path, line=number)
+        kind, is_moment = line["event"], 0 <= line["time"] + line["clock"] < math.inf
+    except (KeyError, TypeError):
+        return False
+    return is_moment and isinstance(kind, str) and HAS.get(kind, frozenset()) <= line.keys()
 
 
 def doing(events: Iterable[Line]) -> Line | None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import base64
-import errno
 import io
 import json
-import os
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -44,12 +42,7 @@ IMAGE_SCHEMA: Mapping[str, Schema] = {
     "format": TEXT,
 }
 FORMATS = {"jpg": "jpeg", "png": "png"}
-GOES_ON: Mapping[str, Schema] = {
-    "number": {"type": "integer"},
-    "event": TEXT,
-    "text": TEXT,
-    "clock": NUMBER,
-}
+GOES_ON: Mapping[str, Schema] = {"number": WHOLE, "event": TEXT, "text": TEXT, "clock": NUMBER}
 
 
 def write_mcap(
@@ -63,63 +56,42 @@ def write_mcap(
 ) -> None:
     """Write a mission: a channel for each skill and its pictures, one for states, one for the rest.
 
-    The program is attached.
-
-    Args:
-        file: open for writing.
-        summary: of the mission.
-        events: in their order.
-        folder: of the mission, for its pictures; None to leave them out.
-        clock: by which the messages are timed: the wall's, or the robot's, put to start with the mission.
-        skills: what the robot could be asked to do.
-
-    Raises:
-        OSError: it cannot be written.
+    The program is attached. Messages are timed by the clock on the wall, or by the robot's, put to start with
+    the mission. Pictures lie in its `folder`; None leaves them out.
     """
     began = round(min(summary.created * SECOND, LATEST))
+    writer = Writer(file)
+    writer.start(profile="", library=f"codebotler {__version__}")
+    channels: dict[str, int] = {}
 
     def time(line: Line) -> int:
         seconds: float = line["time"] if clock == "wall" else summary.created + line["clock"]
         return round(min(seconds * SECOND, LATEST))
 
-    writer = Writer(file)
-    writer.start(profile="", library=f"codebotler {__version__}")
-    channels = Channels(writer)
-    for number, line in enumerate(events):
-        topic, properties, message = _message(line, skills)
-        channel = channels.channel(topic, properties)
+    def add(topic: str, properties: Mapping[str, Schema], message: object, at: int, name: str = "") -> None:
+        if topic not in channels:
+            named = name or "codebotler." + topic.strip("/").replace("/", ".")
+            schema = json.dumps({"type": "object", "properties": properties}).encode()
+            number = writer.register_schema(named, "jsonschema", schema)
+            channels[topic] = writer.register_channel(topic, "json", number)
+        writer.add_message(channels[topic], at, json.dumps(message).encode(), at)
+
+    for line in events:
         at = time(line)
-        writer.add_message(channel, at, json.dumps(message).encode(), at, sequence=number)
+        topic, properties, message = _message(line, skills)
+        add(topic, properties, message, at)
         if folder is not None and (picture := picture_of(folder, line)) is not None:
-            channel = channels.channel(f"{topic}/picture", IMAGE_SCHEMA, IMAGE)
-            writer.add_message(channel, at, json.dumps(_image(*picture, at)).encode(), at, sequence=number)
+            add(f"{topic}/picture", IMAGE_SCHEMA, _image(*picture, at), at, IMAGE)
     last = time(events[-1]) if events else began
-    name = "program.py"
-    writer.add_attachment(began, last, name, "text/x-python", summary.program.encode(errors="surrogatepass"))
+    program = summary.program.encode(errors="surrogatepass")
+    writer.add_attachment(began, last, "program.py", "text/x-python", program)
     writer.add_metadata("mission", _about(summary))
     writer.finish()  # type: ignore[no-untyped-call]  # theirs
 
 
-class Channels:
-    """The channels of a file, each with a schema of its own."""
-
-    def __init__(self, writer: Writer) -> None:
-        self._writer = writer
-        self._numbers: dict[str, int] = {}
-
-    def channel(self, topic: str, properties: Mapping[str, Schema], name: str = "") -> int:
-        """The channel of a topic such as `/skill/go_to`, made if it is new."""
-        if topic not in self._numbers:
-            name = name or "codebotler." + topic.strip("/").replace("/", ".")
-            schema = {"type": "object", "properties": properties}
-            number = self._writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
-            self._numbers[topic] = self._writer.register_channel(topic, "json", number)
-        return self._numbers[topic]
-
-
 def schema_of(skill: Skill) -> dict[str, Schema]:
     """The properties of messages about a skill: arguments, result and feedback."""
-    arguments = {f"{p.name}": TYPES[p.annotation] for p in skill.parameters}
+    arguments = {p.name: TYPES[p.annotation] for p in skill.parameters}
     result = {"result": TYPES[skill.returns]} if skill.returns in TYPES else {}
     return {**GOES_ON, **arguments, **result}
 
@@ -137,18 +109,10 @@ def _message(line: Line, skills: SkillTable) -> tuple[str, Mapping[str, Schema],
         if "seconds" in line:
             message["seconds"] = line["seconds"]
         return NOTES, {**GOES_ON, "seconds": NUMBER}, message
-    result = {"result": line["result"]} if line.get("result") is not None else {}
-    arguments = line.get("arguments", {})
-    return (
-        f"/skill/{name}",
-        schema_of(skills[name]),
-        {
-            **message,
-            "number": line["number"],
-            **arguments,
-            **result,
-        },
-    )
+    message |= {"number": line["number"], **line.get("arguments", {})}
+    if line.get("result") is not None:
+        message["result"] = line["result"]
+    return f"/skill/{name}", schema_of(skills[name]), message
 
 
 def _image(kind: str, data: bytes, at: int) -> dict[str, object]:
@@ -163,15 +127,9 @@ def _image(kind: str, data: bytes, at: int) -> dict[str, object]:
 
 def _about(summary: Summary) -> dict[str, str]:
     began = datetime.fromtimestamp(summary.created).astimezone()
-    about = {
-        "id": summary.id,
-        "state": summary.state,
-        "reason": summary.reason,
-        "robot": summary.robot,
-        "instruction": summary.instruction,
-        "model": summary.model,
-        "began": began.isoformat(timespec="seconds"),
-    }
+    names = ("id", "state", "reason", "robot", "instruction", "model")
+    about = {name: str(getattr(summary, name)) for name in names}
+    about["began"] = began.isoformat(timespec="seconds")
     return {name: text.encode(errors="backslashreplace").decode() for name, text in about.items()}
 
 
@@ -181,13 +139,12 @@ def export(
     """Write a mission as an MCAP file, whole or not at all; raises UserError if another file is there."""
     path = path.resolve()
     expect_replaceable(path, b"\x89MCAP")
-    if not path.parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+    path.parent.stat()  # no folder is created where a name is mistyped
+    whole = io.BytesIO()
+    write_mcap(whole, summary, events, folder=folder, clock=clock)
     if path.exists() and not path.is_file():
-        whole = io.BytesIO()
-        write_mcap(whole, summary, events, folder=folder, clock=clock)
         path.write_bytes(whole.getvalue())
         return
     temporary = path.with_name(f".{uuid4().hex}.mcap")  # no file of the user's, and no name that is too long
     with written_whole(path, temporary) as file:
-        write_mcap(file, summary, events, folder=folder, clock=clock)
+        file.write(whole.getvalue())

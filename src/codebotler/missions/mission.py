@@ -8,16 +8,15 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from datetime import datetime
-from enum import StrEnum
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeAlias
 
-from codebotler.core.files import make_folder
+from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
 from codebotler.core.trace import Outcome, RunError, Status, Trace
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.missions.log import Line, Log, Summary
+from codebotler.missions.log import STEPS, Line, State, Summary, add_event, log_of
 from codebotler.missions.pictures import Pictures
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
@@ -29,32 +28,6 @@ GRACE = 10.0
 UNCONFIRMED = (
     "the robot has not confirmed the stop; check it now, and press its emergency stop if it still moves"
 )
-
-
-class State(StrEnum):
-    """The states of a mission."""
-
-    DRAFTING = "drafting"
-    CHECKED = "checked"
-    APPROVED = "approved"
-    RUNNING = "running"
-    DONE = "done"
-    FAILED = "failed"
-    STOPPING = "stopping"
-    STOPPED = "stopped"
-    INTERRUPTED = "interrupted"
-
-
-STEPS: dict[State, frozenset[State]] = {
-    State.DRAFTING: frozenset({State.DRAFTING, State.CHECKED, State.FAILED, State.STOPPED}),
-    State.CHECKED: frozenset(
-        {State.DRAFTING, State.CHECKED, State.APPROVED, State.FAILED, State.STOPPED},
-    ),
-    State.APPROVED: frozenset({State.DRAFTING, State.RUNNING, State.FAILED, State.STOPPED}),
-    State.RUNNING: frozenset({State.DONE, State.FAILED, State.STOPPING}),
-    State.STOPPING: frozenset({State.STOPPED, State.FAILED}),
-}
-"""The states that may follow each state; the others are final. A tool that dies leaves it interrupted."""
 
 
 class MissionError(Exception):
@@ -70,10 +43,6 @@ Told: TypeAlias = Callable[[Line], None]
 """Called with each event after it was written, one at a time, from any thread."""
 
 
-def untold(_line: Line) -> None:
-    """Do nothing with an event."""
-
-
 class Mission:
     """One mission; leaving it as a context manager ends it.
 
@@ -87,17 +56,15 @@ class Mission:
         OSError: the folder cannot be written.
     """
 
-    def __init__(self, home: Path, robot: str, instruction: str = "", told: Told = untold) -> None:
+    def __init__(self, home: Path, robot: str, instruction: str = "", told: Told = lambda _: None) -> None:
         self.folder = _new_folder(home / "missions")
-        self._log, self._pictures = Log(self.folder), Pictures(self.folder)
+        self._log: Appender | None = log_of(self.folder)
+        self._pictures = Pictures(self.folder)
         self.told = told
         self._writing = threading.RLock()  # held while an event is written; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
         self._stopped_by: str | None = None
-        self._asked, self._passed_on = (
-            0.0,
-            math.inf,
-        )  # when a stop was first asked for, and when the robot knew
+        self._asked, self._passed_on = 0.0, math.inf  # when a stop was first asked for; when the robot knew
         self._live: LiveRobot | None = None
         self._worker: Worker | None = None
         self._over, self._wake = threading.Event(), threading.Event()
@@ -116,7 +83,7 @@ class Mission:
             if not self.has_ended:
                 self._leave(error)
         finally:
-            self._log.close()
+            self._close()
 
     @property
     def id(self) -> str:
@@ -126,12 +93,12 @@ class Mission:
     @property
     def state(self) -> State:
         """Its state."""
-        return State(self.summary.state)
+        return self.summary.state
 
     @property
     def has_ended(self) -> bool:
         """Whether its state is final."""
-        return self.state not in STEPS
+        return self.summary.has_ended
 
     def draft(self, program: str, model: str = "") -> None:
         """Take a program, the first one or another, which is not checked yet.
@@ -154,7 +121,7 @@ class Mission:
         """
         with self._writing:
             if not self.summary.program:
-                raise MissionError(f"mission {self.id} has no program that could be checked")
+                raise MissionError(f"mission {self.id} has no program to check")
             self._step(State.CHECKED, "be checked", problems=tuple(problems))
 
     def approve(self, *, despite_problems: bool = False) -> None:
@@ -331,17 +298,23 @@ class Mission:
         shown = {name: value for name, value in changes.items() if value not in ("", None, ())}
         self._write("state", state=to, **shown)
         if self.has_ended:
-            self._log.close()
+            self._close()
+
+    def _close(self) -> None:
+        with self._writing:
+            if self._log is not None:
+                self._log.close()
+            self._log = None
 
     def _write(self, event: str, /, **data: object) -> None:
         """Log an event and report it; events after the end are dropped."""
         clock = 0.0 if self._live is None else self._live.now
         with self._writing:
-            if not self._log.is_open:
+            if self._log is None:
                 return
             if isinstance(picture := data.pop("picture", None), bytes):
                 data |= self._pictures.keep(picture)
-            line = self._log.add(event, clock=clock, **data)
+            line = add_event(self._log, event, clock, **data)
             if event == "state":
                 self.summary.write(self.folder)
             self.told(line)

@@ -30,9 +30,9 @@ class Pictures:
         if kind is None:
             return _left_out(f"its {len(data):,} bytes are neither JPEG nor PNG")
         if len(data) > MOST_BYTES:
-            return _left_out(f"it has {len(data):,} bytes, and {MOST_BYTES:,} are the most")
+            return _left_out(f"it has {len(data):,} bytes; at most {MOST_BYTES:,} are allowed")
         if self._bytes + len(data) > MOST_IN_ALL:
-            return _left_out(f"a mission keeps {MOST_IN_ALL:,} bytes of them at most")
+            return _left_out(f"a mission keeps at most {MOST_IN_ALL:,} bytes of pictures")
         name = f"{FOLDER}/{self._count + 1}.{kind}"
         path = self._folder / name
         write_whole(path, data)

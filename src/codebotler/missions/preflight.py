@@ -35,12 +35,12 @@ def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
         try:
             return answered(robot.skills[skill], robot.perform(skill, ()))
         except RobotError as error:
-            note(f"the robot does not say {what}: {visible(str(error))}")
+            note(f"the robot did not report {what}: {visible(str(error))}")
             return None
         except RobotLostError as error:
-            raise NotReadyError(f"the robot does not say {what}: {error.sentence}") from None
+            raise NotReadyError(f"the robot did not report {what}: {error.sentence}") from None
         except CancelledError:
-            raise NotReadyError(f"the robot does not say {what}: somebody stopped it") from None
+            raise NotReadyError(f"the robot did not report {what}: somebody stopped it") from None
 
     rooms = told("get_all_rooms", "which rooms it knows")
     here = told("get_current_location", "where it is")
@@ -54,7 +54,7 @@ def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
         )
         return None, place
     if place and place not in rooms:
-        note(shortened(f'the robot says it is in "{place}", which is none of the rooms that it knows'))
+        note(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
     names = dict.fromkeys([*rooms, place] if place else rooms)
     return RoomMap(tuple(names), place or rooms[0], plain=robot.name not in WITH_PATTERNS), place
 

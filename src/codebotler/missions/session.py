@@ -17,8 +17,8 @@ from codebotler.checking.problems import Check
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import write_program
-from codebotler.missions.log import Line
-from codebotler.missions.mission import STEPS, Mission, MissionError, State
+from codebotler.missions.log import STEPS, Line, State
+from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
 from codebotler.missions.view import Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
@@ -32,22 +32,11 @@ LOG = logging.getLogger("codebotler.missions")
 EXPECTED = (UserError, ModelError, NotReadyError, EngineError, MissionError, OSError)
 
 
-def ignore(_line: Line) -> None:
-    """Do nothing with an event."""
-
-
 class MissionSession:
-    """Drives one mission on a thread of its own.
+    """Drives one mission on a thread of its own, with a robot that is connected while the session lasts.
 
-    Args:
-        robot: not connected; it is while the session lasts.
-        home: the folder of missions.
-        order: what is asked for.
-        open_model: gives a model by its name.
-        check: checks a program, given the robot's rooms.
-        changed: called at each change of the view; must return at once.
-        number: of the session, from 1.
-        before: the session to wait for.
+    `check` gets a program and the robot's rooms; `changed` is called at each change of the view and must
+    return at once; `before` is the session to wait for.
     """
 
     def __init__(
@@ -74,7 +63,7 @@ class MissionSession:
         self._stopped_by: str | None = None
         self._asking: tuple[asyncio.AbstractEventLoop, asyncio.Task[str]] | None = None
         self._thread = threading.Thread(target=self._run, name=f"session-{number}", daemon=True)
-        self.on_event: Callable[[Line], None] = ignore  # what it raises stops the robot
+        self.on_event: Callable[[Line], None] = lambda _: None  # what it raises stops the robot
         self.error: Exception | None = None  # that ended it, once it is over
 
     def start(self) -> None:
@@ -106,11 +95,7 @@ class MissionSession:
         return self._events[start:]
 
     def edit(self, program: str) -> None:
-        """Replace the program, and have it checked; does not wait for the check.
-
-        Raises:
-            MissionError: it is too late for that, or a model is writing.
-        """
+        """Replace the program, and have it checked; MissionError if it is too late, or a model is writing."""
         with self._editing, self._lock:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
@@ -118,32 +103,20 @@ class MissionSession:
             self._change(program=program, author="", busy="checking", **UNCHECKED)
 
     def ask_again(self, *, repair: bool) -> None:
-        """Have the model write another program; with `repair`, it is shown this one and its problems.
-
-        Raises:
-            MissionError: no model wrote it, or it is too late for that.
-        """
+        """Have the model write another program; with `repair`, it is shown this one and its problems."""
         with self._lock:
             view = self._view
             if not view.may_be_approved or not view.order.model:
-                raise MissionError("no model can be asked again now")
+                raise MissionError("the model cannot be asked again now")
             self._ask_again = (view.problems if repair else (),)
             self._change(busy=f"asking {view.order.model}", is_written=True)
 
     def approve(self, seen: str, *, despite_problems: bool = False) -> None:
-        """Let the robot run a program.
-
-        Args:
-            seen: the digest of the program that the person saw.
-            despite_problems: whether they approve it although the check found problems.
-
-        Raises:
-            MissionError: the program has changed, was not checked, or has problems.
-        """
+        """Let the robot run the program that the person saw, which is named by its digest."""
         with self._editing:
             view, mission = self._view, self._mission
             if mission is None or view.busy:
-                raise MissionError("the program is not checked yet")
+                raise MissionError("the program has not been checked yet")
             if seen != view.digest or seen != digest(mission.summary.program):
                 raise MissionError("the program has changed; look at it again")
             mission.approve(despite_problems=despite_problems)
@@ -154,11 +127,7 @@ class MissionSession:
         self._mission.fail(reason)
 
     def stop(self, by: str) -> None:
-        """Stop whatever goes on; returns when the robot has been told.
-
-        Args:
-            by: who stops it, in words such as `Ctrl-C`.
-        """
+        """Stop whatever goes on; returns when the robot has been told."""
         self._stopped_by = self._stopped_by or by
         mission, asking = self._mission, self._asking
         try:
@@ -186,7 +155,7 @@ class MissionSession:
             self._show(trouble=_sentence(error))
         except Exception as error:
             self.error = error
-            LOG.exception("a mission broke off")
+            LOG.exception("a mission failed unexpectedly")
             self._show(trouble=f"{type(error).__name__}: {visible(str(error))}")
         finally:
             self._show(is_over=True, busy="", is_written=False)
@@ -302,7 +271,7 @@ class MissionSession:
                 raise
             return
         for sentence in (*missing, *unknown):
-            mission.note(f"before it moves: {sentence}")
+            mission.note(f"before the robot moves: {sentence}")
         with self._lock:
             if self._edited is None:
                 names = (*UNCHECKED, "busy")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 from codebotler.core.errors import UserError
-from codebotler.missions.log import SUMMARY, Line, Log, Summary, doing, events_of
-from codebotler.missions.mission import STEPS, State
+from codebotler.core.terminal import note, system_sentence, visible
+from codebotler.missions.log import STEPS, SUMMARY, Line, State, Summary, add_event, doing, events_of, log_of
 from codebotler.missions.wording import call_text
 
 ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
@@ -18,7 +18,7 @@ ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
 
 def missions(home: Path) -> list[Summary]:
     """All missions, oldest first; raises UserError if one cannot be read."""
-    return sorted(map(summary_of, _folders(home)), key=lambda summary: (summary.created, summary.id))
+    return sorted(map(Summary.read, _folders(home)), key=lambda summary: (summary.created, summary.id))
 
 
 def find(home: Path, name: str) -> Path:
@@ -31,36 +31,19 @@ def find(home: Path, name: str) -> Path:
     return folder
 
 
-def summary_of(folder: Path) -> Summary:
-    """The summary of a mission; raises UserError if the file is something else."""
-    summary = Summary.read(folder)
-    if summary.state not in tuple(State):
-        raise UserError("this is no summary of a mission; remove its folder", file=folder / SUMMARY)
-    return summary
-
-
-def untold(_mission: str, _error: OSError) -> None:
-    """Do nothing with a mission that cannot be closed."""
-
-
-def recover(home: Path, unclosed: Callable[[str, OSError], None] = untold) -> list[Summary]:
-    """Close the missions that were interrupted because the tool died.
-
-    Args:
-        home: the folder of missions.
-        unclosed: called with each mission that cannot be closed, and why: a full disk stops no robot.
-
-    Returns:
-        the missions closed now; unreadable ones are left to `missions`.
-    """
-    found = []
+def recover(home: Path) -> list[Summary]:
+    """Close and note the missions that were interrupted because the tool died; unreadable ones are left."""
+    found: list[Summary] = []
     for folder in _folders(home):
         try:
             found += _interrupted(folder)
         except UserError:
             continue
-        except OSError as error:
-            unclosed(folder.name, error)
+        except OSError as error:  # such as a full disk, which stops no robot
+            why = system_sentence(error)
+            note(f"mission {folder.name} may have been interrupted, but cannot be closed: {why}")
+    for summary in found:
+        note(f"mission {summary.id} was interrupted: {visible(summary.reason)}")
     return found
 
 
@@ -80,38 +63,31 @@ def _folders(home: Path) -> list[Path]:
 
 def _interrupted(folder: Path) -> list[Summary]:
     """The mission, if it was interrupted and not closed."""
-    if State(summary_of(folder).state) not in STEPS:
+    if Summary.read(folder).has_ended:
         return []
     try:
-        log = Log(folder)
+        log = log_of(folder)
     except BlockingIOError:
         return []  # another tool is on it
-    try:
-        summary = summary_of(folder)
-        if State(summary.state) not in STEPS:
+    with closing(log):
+        summary, events = Summary.read(folder), events_of(folder)
+        if summary.has_ended:
             return []
-        events = events_of(folder)
-        told = _last_told(events)
-        if told is not None and State(told["state"]) not in STEPS:
-            summary.state, summary.reason, summary.ended = told["state"], told.get("reason", ""), told["time"]
+        last = next((line for line in reversed(events) if line["event"] == "state"), None)
+        if last is not None and last["state"] not in STEPS:
+            summary.state, summary.reason = State(last["state"]), last.get("reason", "")
+            summary.ended = last["time"]
             summary.write(folder)
             return []
         summary.reason, clock = _how(summary, events), events[-1]["clock"] if events else 0.0
         summary.state, summary.ended = State.INTERRUPTED, time.time()
-        log.add("state", clock=clock, state=summary.state, reason=summary.reason)
+        add_event(log, "state", clock, state=summary.state, reason=summary.reason)
         summary.write(folder)
         return [summary]
-    finally:
-        log.close()
-
-
-def _last_told(events: list[Line]) -> Line | None:
-    """The last event with a state."""
-    return next((line for line in reversed(events) if line["event"] == "state"), None)
 
 
 def _how(summary: Summary, events: list[Line]) -> str:
-    if State(summary.state) not in {State.RUNNING, State.STOPPING}:
+    if summary.state not in {State.RUNNING, State.STOPPING}:
         return f"CodeBotler ended unexpectedly while the mission was {summary.state}; nothing had moved"
     skill = doing(events)
     if skill is None:

@@ -6,7 +6,7 @@ import hashlib
 from dataclasses import dataclass, field
 
 from codebotler.checking.problems import Check
-from codebotler.missions.mission import State
+from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
 from codebotler.simulator.sampled_robot import RoomMap
 

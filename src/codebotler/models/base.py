@@ -60,8 +60,8 @@ def _check_url(url: str) -> None:
     # Nothing of the URL is quoted: where it is mistyped, any part of it may be a password.
     if any(mark in url for mark in "@?#"):
         raise UserError(
-            "the base URL has a user name, a password, a query or a fragment; leave them out, for the URL is "
-            "recorded with a run, and put the key into the environment"
+            "the base URL has a user name, a password, a query or a fragment; leave them out, since the URL "
+            "is recorded with a run, and put the key into the environment"
         )
     try:
         parts = urlsplit(url)
@@ -168,7 +168,7 @@ class BudgetSpentError(Exception):
 
     def __init__(self, budget: int, used: int) -> None:
         self.budget, self.used = budget, used
-        self.sentence = f"the token budget of {budget:,} is spent: {used:,} tokens are used"
+        self.sentence = f"the token budget of {budget:,} is spent: {used:,} tokens were used"
         super().__init__(self.sentence)
 
     def __reduce__(self) -> tuple[object, ...]:

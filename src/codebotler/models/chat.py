@@ -42,9 +42,6 @@ class ChatModel:
     """A chat model, named `provider:model` as in pydantic-ai.
 
     With a base URL `openai:` means `openai-chat:`, for hardly any other server has the Responses API.
-
-    Raises:
-        UserError: there is no such provider, its key is missing or cannot be sent, or its library is missing.
     """
 
     def __init__(self, name: str, settings: SamplingSettings) -> None:

@@ -7,6 +7,7 @@ import json
 import time
 
 import openai
+from pydantic_ai.exceptions import ModelHTTPError
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
@@ -17,7 +18,6 @@ from codebotler.models.server_errors import (
     failure,
     model_error_in,
     refused,
-    retry_after,
     timed_out,
     unreachable,
 )
@@ -30,11 +30,7 @@ NO_MONEY = "insufficient_quota"  # a 429 that no waiting mends
 
 
 class CompletionsModel:
-    """A base model on a server, which continues a text.
-
-    Raises:
-        UserError: there is neither a base URL nor a key, or the key cannot be sent.
-    """
+    """A base model on a server, which continues a text."""
 
     def __init__(self, model: str, settings: SamplingSettings) -> None:
         self.name = f"completions:{model}"
@@ -62,7 +58,7 @@ class CompletionsModel:
         except openai.OpenAIError as error:
             raise (model_error_in(error) or self._error(error)) from None
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            raise failure(self.name, f"the server sent no valid JSON ({error})", may_pass=True) from None
+            raise failure(self.name, f"the server sent invalid JSON ({error})", may_pass=True) from None
         if finish_reason is None:
             raise broken_off(self.name, begun=bool(text))
         text = without_keys(text)
@@ -110,7 +106,7 @@ class CompletionsModel:
                 self.name,
                 error.status_code,
                 error.body or error.response.text,
-                retry_after=retry_after(error.response.headers),
+                retry_after=ModelHTTPError(0, self.name, headers=error.response.headers).retry_after,
                 hopeless=error.code == NO_MONEY,
             )
         nobody = unreachable(self.name, error, self.settings.base_url)

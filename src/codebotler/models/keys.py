@@ -26,18 +26,14 @@ LOGGERS = (
 
 
 def key_in(variable: str) -> str | None:
-    """The key in a variable of the environment; None if it is not set, or blank.
-
-    Raises:
-        UserError: it cannot be sent in a header.
-    """
+    """The key in a variable of the environment, if there is one; a UserError if no header can hold it."""
     key = os.environ.get(variable, "")
     if not key.strip():
         return None
     if not (key.isascii() and key.isprintable() and key == key.strip()):
         raise UserError(
-            f"the key in {variable} cannot be sent: it has a line break, a space at an end, or a character "
-            "outside of printable ASCII; set it again"
+            f"the key in {variable} cannot be sent: it has a line break, a space at either end, or a "
+            "character outside printable ASCII; set it again"
         )
     return key
 

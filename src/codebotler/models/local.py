@@ -61,18 +61,12 @@ def _expect_wanted(batch: Sequence[_Job]) -> None:
 
 
 class LocalModel:
-    """A causal language model in this process, on a GPU where there is one.
+    """A causal language model in this process, on a GPU where there is one; a folder, or a name on the hub.
 
     It is a chat model if its tokenizer has a chat template, otherwise a base model. With a seed, replies are
     written in blocks whose bounds depend on nothing but the numbers of the replies, so that each number gets
     the same reply whether or not a run was interrupted. Without one, requests that wait together are a batch.
-
-    Args:
-        path: a folder, or a name on the Hugging Face hub.
-        settings: how it is asked; the timeout is ignored.
-
-    Raises:
-        UserError: it cannot be loaded, or a base URL is given.
+    The timeout is ignored.
     """
 
     def __init__(self, path: str, settings: SamplingSettings) -> None:
@@ -188,7 +182,7 @@ class LocalModel:
             return [failure(self.name, "the request was cancelled", may_pass=True)] * len(batch)
         except torch.cuda.OutOfMemoryError:
             if len(batch) == 1:
-                return [failure(self.name, "the memory is too small for this prompt", may_pass=False)]
+                return [failure(self.name, "there is not enough memory for this prompt", may_pass=False)]
         torch.cuda.empty_cache()
         half = len(batch) // 2
         later = None if seed is None else seed + half
@@ -258,14 +252,10 @@ class LocalModel:
 
 
 def source_of(path: str) -> str:
-    """A folder of a model, or the name of one on the hub, as transformers takes it.
-
-    Raises:
-        UserError: it is a path, but no folder.
-    """
+    """A folder of a model, or the name of one on the hub, as transformers takes it."""
     folder = Path(path).expanduser()
     if path.startswith((".", "/", "~")) and not folder.is_dir():
-        raise UserError("there is no such folder of a model", file=path)
+        raise UserError("there is no such model folder", file=path)
     return str(folder)
 
 

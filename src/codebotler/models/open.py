@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from codebotler.core.errors import UserError
 from codebotler.models.base import Model, SamplingSettings
 from codebotler.models.recorded import recorded_model
@@ -10,7 +13,6 @@ KINDS = (
     "recorded, recorded:hasty, PROVIDER:NAME such as openai-chat:gpt-5.1, "
     "completions:NAME with --base-url, or hf:PATH"
 )
-EXTRA = 'pip install "codebotler[transformers]"'
 
 
 def open_model(name: str, settings: SamplingSettings) -> Model:
@@ -32,31 +34,37 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
                 expect_server(name)
             return recorded_model(name)
         case "completions":
-            from codebotler.models.completions import CompletionsModel  # noqa: PLC0415 - see above
+            with from_extra("models", name):
+                from codebotler.models.completions import CompletionsModel  # noqa: PLC0415 - see above
 
             return CompletionsModel(rest, settings)
         case "hf":
-            try:
+            with from_extra("transformers", name):
                 from codebotler.models.local import LocalModel  # noqa: PLC0415 - see above
-            except ImportError:
-                raise UserError(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
             return LocalModel(rest, settings)
         case _:
-            from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
-
+            with from_extra("models", name):
+                from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
             return ChatModel(name, settings)
 
 
-def expect_server(*names: str) -> None:
-    """Refuse a base URL where none of the models runs on a server.
+@contextmanager
+def from_extra(extra: str, name: str) -> Iterator[None]:
+    """Refuse a model whose library is not installed, and name the extra that brings it."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").split(".")[0]
+        mend = f"`pip install 'codebotler[{extra}]'` brings it"
+        raise UserError(f"{name} needs {missing}, which is not installed; {mend}") from None
 
-    Raises:
-        UserError: none does.
-    """
+
+def expect_server(*names: str) -> None:
+    """Refuse a base URL where none of the models runs on a server."""
     if not any(map(runs_on_server, names)):
         raise UserError(
-            f"a base URL is given, but {' and '.join(names)} run{'s' * (len(names) == 1)} on no server; "
-            "use a model that does, such as openai-chat:NAME"
+            f"a base URL is given, but {' and '.join(names)} {'does' if len(names) == 1 else 'do'} not use "
+            "a server; use a model that does, such as openai-chat:NAME"
         )
 
 
@@ -66,14 +74,10 @@ def runs_on_server(name: str) -> bool:
 
 
 def kind_of(name: str) -> str:
-    """The part of a model's name before the colon, checked without importing a large library.
-
-    Raises:
-        UserError: it is the name of no model.
-    """
+    """The part of a model's name before the colon, checked without importing a large library."""
     kind, _, rest = name.partition(":")
     if kind == "recorded":
         recorded_model(name)
     elif not kind or not rest.strip():
-        raise UserError(f'"{name}" is no name of a model; write {KINDS}')
+        raise UserError(f'"{name}" is not the name of a model; write {KINDS}')
     return kind

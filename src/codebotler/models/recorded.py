@@ -110,11 +110,7 @@ def _short(text: str) -> str:
 
 
 def recorded_model(name: str) -> RecordedModel:
-    """A recorded model by its name; `recorded` means `recorded:careful`.
-
-    Raises:
-        UserError: there is no such model.
-    """
+    """A recorded model by its name; `recorded` means `recorded:careful`."""
     short = name.removeprefix("recorded").removeprefix(":") or NAMES[0]
     if short not in NAMES:
         known = ", ".join(f"recorded:{known}" for known in NAMES)

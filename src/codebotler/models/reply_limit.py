@@ -28,7 +28,7 @@ def bound(client: Client, name: str, limit: int) -> Client:
     async def bounded(response: Any) -> None:  # noqa: ANN401 - see Client
         coding = response.headers.get("content-encoding", "identity")
         if coding != "identity":
-            sentence = f"{name}: the server compressed its reply ({coding}), which was not asked for"
+            sentence = f"{name}: the server compressed its reply ({coding}), which was not requested"
             raise ModelError(sentence, may_pass=False)
         response.stream = _stream(response.stream, name, limit)
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
-from datetime import datetime
-from email.utils import parsedate_to_datetime
 
 from codebotler.models.base import ModelError
 from codebotler.models.keys import redacted
@@ -53,13 +50,13 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 def broken_off(name: str, *, begun: bool) -> ModelError:
     """The error for a stream that ends too early, before or after the reply has begun."""
-    nothing = "the server sent nothing that is a reply; is the base URL right?"
-    return failure(name, "the reply broke off before its end" if begun else nothing, may_pass=True)
+    nothing = "the server's response is not a reply; is the base URL right?"
+    return failure(name, "the reply was cut off" if begun else nothing, may_pass=True)
 
 
 def timed_out(name: str, seconds: float) -> ModelError:
     """The error for a reply that did not come in time."""
-    return ModelError(f"{name}: no whole reply came within {seconds:g} s", may_pass=True)
+    return ModelError(f"{name}: no complete reply arrived within {seconds:g} s", may_pass=True)
 
 
 def refused(
@@ -87,17 +84,3 @@ def _messages(said: object) -> Iterator[str]:
                 yield value
             else:
                 yield from _messages(value)
-
-
-def retry_after(headers: Mapping[str, str]) -> float | None:
-    """The seconds to wait that a `Retry-After` header asks for, by a number or a date."""
-    said = headers.get("retry-after", "")
-    try:
-        seconds = float(said)
-    except ValueError:
-        try:
-            until = parsedate_to_datetime(said)
-        except ValueError:
-            return None
-        seconds = (until - datetime.now(until.tzinfo)).total_seconds()
-    return max(0.0, seconds) if math.isfinite(seconds) else None

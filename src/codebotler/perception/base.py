@@ -78,11 +78,7 @@ class PerceptionError(Exception):
 
 
 def checked_label(label: str) -> str:
-    """The label on one line.
-
-    Raises:
-        UserError: it is empty, too long, or has characters that cannot be printed.
-    """
+    """The label on one line; a UserError if it is empty, too long, or cannot be printed."""
     words = " ".join(label.split())
     if not words:
         raise UserError("the label is empty; name an object to look for")

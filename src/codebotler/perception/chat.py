@@ -32,7 +32,7 @@ Answer with one JSON object and nothing else:
 - "box": where the clearest one is: left, top, right and bottom, each from 0 to 1, as shares of the picture's
   width and height, counted from its upper left corner; null if it was not found.
 """
-AGAIN = "That cannot be used: {fault}. Answer again, with the JSON object alone."
+AGAIN = "That cannot be used: {fault}. Answer again, with only the JSON object."
 TRIES = 3  # replies that are requested until one can be used
 RETRIES = 2  # of each request that finds no server, or a busy one
 LONGEST_REPLY = 20_000  # characters
@@ -86,11 +86,7 @@ class _Answer(BaseModel):
 
 
 def sighting_in(text: str) -> Sighting:
-    """The sighting in a reply, which is one JSON object, perhaps in a code fence.
-
-    Raises:
-        ValueError: it is none; the text is a sentence without its full stop.
-    """
+    """The sighting in a reply, one JSON object, perhaps in a code fence; a ValueError says why it is none."""
     if len(text) > LONGEST_REPLY:
         raise ValueError(f"it has {len(text):,} characters")
     fenced = FENCED.fullmatch(text.strip())
@@ -98,7 +94,7 @@ def sighting_in(text: str) -> Sighting:
         answer = _Answer.model_validate_json(fenced[1] if fenced else text)
     except ValidationError as error:
         first = error.errors()[0]
-        fault = f'"{first["loc"][0]}": {first["msg"]}' if first["loc"] else "it is no JSON object"
+        fault = f'"{first["loc"][0]}": {first["msg"]}' if first["loc"] else "it is not a JSON object"
         raise ValueError(fault) from None
     if not answer.found:
         return Sighting(found=False, box=None, score=answer.score)

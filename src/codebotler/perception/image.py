@@ -12,6 +12,7 @@ from pathlib import Path
 from PIL import Image, ImageDraw, ImageOps, UnidentifiedImageError
 
 from codebotler.core.errors import UserError
+from codebotler.core.files import read_bytes
 from codebotler.models.server_errors import brief
 from codebotler.perception.base import Sighting
 
@@ -56,7 +57,7 @@ def image_of(data: bytes, name: str = "the picture") -> Image.Image:
     except UserError:
         raise
     except UnidentifiedImageError:
-        raise UserError(f"{name} is no JPEG, PNG or WebP file") from None
+        raise UserError(f"{name} is not a JPEG, PNG or WebP file") from None
     except Image.DecompressionBombError:
         raise UserError(f"{name} has more than {MAX_PIXELS:,} pixels; use a smaller one") from None
     except Exception as error:  # noqa: BLE001 - decoders fail in many ways
@@ -69,12 +70,7 @@ def read_image(path: Path) -> Image.Image:
     Raises:
         UserError: the file is missing, cannot be read, or holds no picture.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise UserError(f"the file cannot be read: {error.strerror}", file=path) from None
-    return image_of(data, str(path))
+    return image_of(read_bytes(path, MAX_BYTES + 1), str(path))
 
 
 def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> Image.Image:
@@ -93,7 +89,7 @@ def image_from_ros(message: Mapping[str, object], name: str = "the picture") -> 
             return _raw(encoding, (width, height), step, data, is_big=is_big, name=name)
         case {"data": _}:
             return image_of(_bytes_in(message, name), name)
-    raise UserError(f"{name} is no message with a picture")
+    raise UserError(f"{name} is not a message with a picture")
 
 
 def _bytes_in(message: Mapping[str, object], name: str) -> bytes:
@@ -101,7 +97,7 @@ def _bytes_in(message: Mapping[str, object], name: str) -> bytes:
     with suppress(ValueError):  # it is no base64
         if isinstance(data, str):
             return base64.b64decode(data, validate=True)
-    raise UserError(f"{name} is no message with a picture")
+    raise UserError(f"{name} is not a message with a picture")
 
 
 def _raw(

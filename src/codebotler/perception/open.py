@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from codebotler.core.errors import UserError
 from codebotler.models.base import SamplingSettings
-from codebotler.models.open import EXTRA, kind_of
+from codebotler.models.open import from_extra, kind_of
 from codebotler.perception.base import Detector
 
 LOOKING = SamplingSettings(temperature=0.0, top_p=None, max_tokens=2000, timeout=30.0)
@@ -30,15 +30,14 @@ def open_detector(
     """
     kind = kind_of(name)
     if kind in {"recorded", "completions"}:
-        raise UserError(f"{name} sees no pictures; use a chat model that does, or hf:PATH")
+        raise UserError(f"{name} does not accept pictures; use a chat model that does, or hf:PATH")
     # Each of the modules imports a large library, and is imported only where it is used.
     if kind != "hf":
-        from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
+        with from_extra("models", name):
+            from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
         from codebotler.perception.chat import ChatDetector  # noqa: PLC0415 - see above
 
         return ChatDetector(ChatModel(name, settings))
-    try:
+    with from_extra("transformers", name):
         from codebotler.perception.zeroshot import ZeroShotDetector  # noqa: PLC0415 - see above
-    except ImportError:
-        raise UserError(f"{name} needs torch and transformers; install them with: {EXTRA}") from None
     return ZeroShotDetector(name.partition(":")[2], least_score=least_score)

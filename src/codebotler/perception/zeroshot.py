@@ -36,7 +36,7 @@ class ZeroShotDetector:
             raise UserError(f"{self.name} cannot be loaded as a zero-shot detector: {brief(error)}") from None
         guard_logs()
         if not all(bool(torch.isfinite(weight).all()) for weight in self._pipeline.model.parameters()):
-            raise UserError(f"{self.name} has weights that are no numbers, so it would find nothing")
+            raise UserError(f"{self.name} has weights that are not numbers, so it would find nothing")
 
     def look(self, image: Image, label: str) -> Sighting:
         """Look for the label; the clearest place counts."""

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
@@ -32,30 +31,15 @@ class Said:
 
 @dataclass(frozen=True)
 class Question:
-    """Something the robot asks; an answer refers to its number."""
+    """Something the robot asks or asked; an answer refers to its number."""
 
     number: int
     person: str
     text: str
     options: tuple[str, ...]
     until: float = math.inf  # deadline by the monotonic clock
-
-
-class Ending(StrEnum):
-    """How a question ended."""
-
-    ANSWERED = "answered"
-    WITHDRAWN = "withdrawn"
-    UNANSWERED = "unanswered"
-
-
-@dataclass(frozen=True)
-class Ended:
-    """A question that has ended, with the position of the chosen option if it was answered."""
-
-    question: Question
-    how: Ending
-    answer: int | None = None
+    how: str = ""  # it ended: answered, withdrawn or unanswered
+    answer: int | None = None  # the position of the chosen option, if it was answered
 
 
 @dataclass(frozen=True)
@@ -64,11 +48,11 @@ class FaceState:
 
     said: tuple[Said, ...] = ()
     question: Question | None = None
-    ended: Ended | None = None
+    ended: Question | None = None
 
 
 class AnswerError(Exception):
-    """An answer that comes too late or is none of the options."""
+    """An answer that comes too late or is not one of the options."""
 
     def __init__(self, sentence: str) -> None:
         super().__init__(sentence)
@@ -109,7 +93,7 @@ class Face:
         """Withdraw the question, and refuse to say or ask anything until the next `open`."""
         with self._lock:
             self._is_open = False
-            self._end(Ending.WITHDRAWN)
+            self._end("withdrawn")
 
     def say(self, text: str) -> None:
         """Show a sentence, or raise CancelledError if it was withdrawn."""
@@ -128,11 +112,11 @@ class Face:
             while self.shown.question is question:
                 left = question.until - time.monotonic()
                 if left <= 0:
-                    self._end(Ending.UNANSWERED)
+                    self._end("unanswered")
                 else:
                     self._lock.wait(min(left, threading.TIMEOUT_MAX))
             ended = self.shown.ended
-        if ended is None or ended.question is not question or ended.how is Ending.WITHDRAWN:
+        if ended is None or ended.number != question.number or ended.how == "withdrawn":
             raise CancelledError
         if ended.answer is None:
             raise RobotError(TIMED_OUT, f'nobody answered "{text}" within {self._seconds:g} s')
@@ -145,16 +129,16 @@ class Face:
             if question is None or question.number != number:
                 raise AnswerError(self._too_late(number))
             if not 0 <= option < len(question.options):
-                raise AnswerError("that is none of the options")
-            self._end(Ending.ANSWERED, option)
+                raise AnswerError("that is not one of the options")
+            self._end("answered", option)
 
     def _too_late(self, number: int) -> str:
         ended = self.shown.ended
-        if ended is None or ended.question.number != number:
+        if ended is None or ended.number != number:
             return "that question is closed"
         if ended.answer is not None:
-            return f'the question was already answered: "{ended.question.options[ended.answer]}"'
-        why = "it was withdrawn" if ended.how is Ending.WITHDRAWN else "its time ran out"
+            return f'the question was already answered: "{ended.options[ended.answer]}"'
+        why = "it was withdrawn" if ended.how == "withdrawn" else "its time is up"
         return f"that question is closed: {why}"
 
     def _next(self) -> int:
@@ -163,10 +147,10 @@ class Face:
         self._number += 1
         return self._number
 
-    def _end(self, how: Ending, answer: int | None = None) -> None:
+    def _end(self, how: str, answer: int | None = None) -> None:
         question = self.shown.question
         if question is not None:
-            self._show(replace(self.shown, question=None, ended=Ended(question, how, answer)))
+            self._show(replace(self.shown, question=None, ended=replace(question, how=how, answer=answer)))
 
     def _show(self, shown: FaceState) -> None:
         self.shown = shown

@@ -14,9 +14,9 @@ from codebotler.robots.face import Face, RobotWithFace, without_speech
 KINDS = {
     "sim": "simulated",
     "pyrobosim": "pyrobosim.robot",
-    "ros1": "ros1.robot",
-    "rosbridge": "rosbridge.robot",
-    "ros2": "ros2.robot",
+    "ros1": "ros.ros1",
+    "rosbridge": "ros.rosbridge",
+    "ros2": "ros.ros2",
 }
 """Kinds of robots as a user names them, with the module of each.
 

@@ -61,7 +61,7 @@ class Simulated:
         self.skills, self.clock = skills, Clock(speed)
         self._world, self._pace = world, metres_per_second
         self._stands_at = {room.name: room.stand_at or (0.0, 0.0) for room in laid_out(world).rooms}
-        self._robot: SimulatedRobot | None = None
+        self._robot = SimulatedRobot(world, ROBOT_RULES, skills)
         self._place = self._stands_at[world.robot]
 
     def connect(self) -> None:
@@ -77,10 +77,11 @@ class Simulated:
             RobotError: the robot cannot do it.
             CancelledError: the robot was stopped.
         """
-        assert self._robot is not None, "the robot is not connected"
         self._wait(0.0)
         if skill == "go_to":
-            self._drive(self._robot, str(arguments[0]), feedback)
+            room = resolve_room(self._robot.rooms, str(arguments[0]))
+            if room is not None:
+                self._drive(room, feedback)
         else:
             self._wait(SECONDS.get(skill, 0.0))
         return performed(self._robot, skill, arguments)
@@ -90,14 +91,10 @@ class Simulated:
         self.clock.stop()
 
     def disconnect(self) -> None:
-        """Stop, and forget the world as it is now."""
+        """Stop."""
         self.cancel()
-        self._robot = None
 
-    def _drive(self, robot: SimulatedRobot, request: str, feedback: Feedback) -> None:
-        room = resolve_room(robot.rooms, request)
-        if room is None:
-            return
+    def _drive(self, room: str, feedback: Feedback) -> None:
         start, end = self._place, self._stands_at[room]
         takes = math.dist(start, end) / self._pace
         step = takes if self.clock.speed is None else max(FEEDBACK_EVERY * self.clock.speed, 1e-3)
@@ -134,5 +131,5 @@ def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
 def robot(options: Options) -> Simulated:
     """The simulated robot of these options, which must name a world."""
     if options.world is None:
-        raise UserError("the simulated robot needs a world to be in; name one with --world FILE")
+        raise UserError("the simulated robot needs a world; name one with --world FILE")
     return Simulated(options.world, speed=options.speed, skills=options.skills)

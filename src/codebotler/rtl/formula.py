@@ -251,7 +251,8 @@ class Not:
         return f"not {_bracketed(self.part, And | Or)}"
 
 
-Test: TypeAlias = Exists | ActAtFirst | ActAtSome | Count | AtLeast
+Presence: TypeAlias = Exists | ActAtFirst | ActAtSome
+Test: TypeAlias = Presence | Count | AtLeast
 Formula: TypeAlias = Test | And | Or | Not
 
 

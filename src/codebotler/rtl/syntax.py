@@ -11,29 +11,11 @@ from typing import get_args
 
 from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.rtl.formula import (
-    ActAtFirst,
-    ActAtSome,
-    And,
-    AtLeast,
-    Count,
-    EventPattern,
-    Exists,
-    Formula,
-    Not,
-    Or,
-    Regex,
-    Scope,
-    ScopeName,
-    Test,
-    Text,
-    Without,
-    Words,
-)
+from codebotler.rtl import formula as rtl
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
-SCOPES: dict[str, ScopeName] = {name: name for name in get_args(ScopeName)}
+SCOPES: dict[str, rtl.ScopeName] = {name: name for name in get_args(rtl.ScopeName)}
 TESTS = ("Exists", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
 TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
 QUESTIONS = ("mention", "answered")
@@ -61,7 +43,7 @@ class RtlSyntaxError(ValueError):
         return type(self), (self.column, self.problem), vars(self)
 
 
-def parse(text: str, *, skills: SkillTable = SKILLS) -> Formula:
+def parse(text: str, *, skills: SkillTable = SKILLS) -> rtl.Formula:
     """The formula that a text writes.
 
     Args:
@@ -82,7 +64,7 @@ class _Parser:
         self.recordings = skills.recordings
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
 
-    def formula(self) -> Formula:
+    def formula(self) -> rtl.Formula:
         if not self.text:
             raise RtlSyntaxError(1, "expected a formula, found nothing")
         try:
@@ -96,23 +78,23 @@ class _Parser:
             raise RtlSyntaxError(self.indent + 1, f"this cannot be read ({error})") from None
         end = tree.end_col_offset or 0
         if b"#" in self.bytes[end:]:  # it would hide all lines that follow
-            raise self.error(end, "RTL has no comments, but one begins after this")
+            raise self.error(end, "RTL has no comments, but one starts after this")
         return self.constraint(tree, 0)
 
-    def constraint(self, node: ast.expr, depth: int) -> Formula:
+    def constraint(self, node: ast.expr, depth: int) -> rtl.Formula:
         if depth > DEEPEST:
             raise self.error(node, f"this is nested more than {DEEPEST} deep")
         match node:
             case ast.BoolOp(op, values):
                 parts = tuple(self.constraint(value, depth + 1) for value in values)
-                return And(parts) if isinstance(op, ast.And) else Or(parts)
+                return rtl.And(parts) if isinstance(op, ast.And) else rtl.Or(parts)
             case ast.UnaryOp(ast.Not(), operand):
-                return Not(self.constraint(operand, depth + 1))
+                return rtl.Not(self.constraint(operand, depth + 1))
             case ast.Call(ast.Attribute() as function):
                 return self.test(node, function)
         raise self.expected('a test such as tr.Exists(goto("lobby"))', node)
 
-    def test(self, node: ast.Call, function: ast.Attribute) -> Test:
+    def test(self, node: ast.Call, function: ast.Attribute) -> rtl.Test:
         name = function.attr
         if name in SCOPES:
             raise self.error(
@@ -123,19 +105,19 @@ class _Parser:
         scopes = self.scopes(function.value)
         if name == "Exists":
             (element,) = self.arguments(node, function, name, 1)
-            return Exists(self.element(element), scopes)
+            return rtl.Exists(self.element(element), scopes)
         one, other = self.arguments(node, function, name, 2)
         match name:
             case "ActAtFirst":
-                return ActAtFirst(self.word(one), self.element(other), scopes)
+                return rtl.ActAtFirst(self.word(one), self.element(other), scopes)
             case "ActAtSome":
-                return ActAtSome(self.word(one), self.element(other), scopes)
+                return rtl.ActAtSome(self.word(one), self.element(other), scopes)
             case "Count":
-                return Count(self.element(one), self.number(other), scopes)
-        return AtLeast(self.element(one), self.number(other), scopes)
+                return rtl.Count(self.element(one), self.number(other), scopes)
+        return rtl.AtLeast(self.element(one), self.number(other), scopes)
 
-    def scopes(self, node: ast.expr) -> tuple[Scope, ...]:
-        scopes: list[Scope] = []
+    def scopes(self, node: ast.expr) -> tuple[rtl.Scope, ...]:
+        scopes: list[rtl.Scope] = []
         while True:
             match node:
                 case ast.Name("tr"):
@@ -146,49 +128,49 @@ class _Parser:
                     if name not in SCOPES:
                         raise self.unknown(function, "scope", name, SCOPES)
                     (element,) = self.arguments(node, function, name, 1)
-                    scopes.append(Scope(SCOPES[name], self.element(element)))
+                    scopes.append(rtl.Scope(SCOPES[name], self.element(element)))
                     node = inner
                 case _:
                     raise self.expected("tr or a scope such as tr.AfterFirst(...)", node)
 
-    def element(self, node: ast.expr) -> EventPattern:
+    def element(self, node: ast.expr) -> rtl.EventPattern:
         match node:
             case ast.Call(ast.Name("at")):
                 place, inner = self.arguments(node, node, "at", 2)
                 element = self.element(inner)
                 if element.place is not None:
-                    raise self.error(inner, "at cannot stand in another at")
+                    raise self.error(inner, "at cannot be nested in another at")
                 return replace(element, place=self.word(place))
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
                     (text,) = self.arguments(node, node, kind, 1)
-                    return EventPattern(kind, self.matched(text))
+                    return rtl.EventPattern(kind, self.matched(text))
                 text, options = self.arguments(node, node, kind, 2)
-                return EventPattern(kind, self.matched(text), self.matched(options))
+                return rtl.EventPattern(kind, self.matched(text), self.matched(options))
             case ast.Call(ast.Name(kind)) if kind in QUESTIONS and self.question is not None:
                 (text,) = self.arguments(node, node, kind, 1)
                 if kind == "mention":
-                    return EventPattern(self.question, self.matched(text), mention=True)
-                return EventPattern(self.question, Regex(".*"), answer=self.matched(text))
+                    return rtl.EventPattern(self.question, self.matched(text), mention=True)
+                return rtl.EventPattern(self.question, rtl.Regex(".*"), answer=self.matched(text))
             case ast.Call(ast.Name(kind)):
                 raise self.unknown(node, "element", kind, [*self.recordings, *QUESTIONS, "at"])
         raise self.expected('an element such as goto("lobby")', node)
 
-    def matched(self, node: ast.expr) -> Text:
+    def matched(self, node: ast.expr) -> rtl.Text:
         match node:
             case ast.Constant(str()):
-                return Regex(self.regex(node))
+                return rtl.Regex(self.regex(node))
             case ast.Call(ast.Name(name)) if name not in TEXTS:
                 raise self.unknown(node, "text helper", name, TEXTS)
             case ast.Call(ast.Name("words")):
                 arguments = self.arguments(node, node, "words")
                 if not arguments:
                     raise self.error(node, "words needs at least one text")
-                return Words(tuple(map(self.matched, arguments)))
+                return rtl.Words(tuple(map(self.matched, arguments)))
             case ast.Call(ast.Name(name)) if name.endswith("number"):
                 arguments = self.arguments(node, node, name)
                 if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
-                    raise self.error(node, f"{name} takes a number, a thing and perhaps other things")
+                    raise self.error(node, f"{name} takes a number, a thing and optionally other things")
                 number, (thing, *others) = self.number(arguments[0]), map(self.word, arguments[1:])
                 return Number(number, thing, tuple(others), name == "othernumber")
             case ast.Call(ast.Name(name)) if name.endswith("time"):
@@ -197,7 +179,7 @@ class _Parser:
             case ast.Call(ast.Name(name)):
                 (argument,) = self.arguments(node, node, name, 1)
                 word = self.word(argument)
-                return Without(word) if name == "without" else Claim(word, name == "denies")
+                return rtl.Without(word) if name == "without" else Claim(word, name == "denies")
         raise self.expected("a string, words(...) or without(...)", node)
 
     def time(self, node: ast.expr) -> str:
@@ -218,9 +200,9 @@ class _Parser:
             case ast.Constant(str(pattern)):
                 if "\b" in pattern:
                     raise self.error(
-                        node, 'this string holds a backspace; write r"..." so that \\b is the edge of a word'
+                        node, 'this string contains a backspace; write r"..." so that \\b is a word boundary'
                     )
-                self.check_regex(node, pattern, compile_regex, "this is no valid regex")
+                self.check_regex(node, pattern, compile_regex, "this is not a valid regex")
                 return pattern
         raise self.expected("a string", node)
 

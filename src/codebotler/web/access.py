@@ -10,7 +10,7 @@ import secrets
 import socket
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -56,11 +56,7 @@ class Access:
     def asked_for(
         cls, operator: str | None, face: str | None, *, open_to_all: bool, is_loopback: bool
     ) -> Access:
-        """The tokens that a user chose, and new ones for None.
-
-        Raises:
-            UserError: they would let in more people than intended.
-        """
+        """The tokens that a user chose, and new ones for None; UserError if they let in too many people."""
         if open_to_all and (operator or face or not is_loopback):
             raise UserError("--no-token works on this machine only; leave out --host and all tokens")
         if any(token is not None and len(token) < SHORTEST_TOKEN for token in (operator, face)):
@@ -72,11 +68,7 @@ class Access:
         return cls(None if open_to_all else operator or new_token(), face or new_token(), unguessable)
 
     def of_token(self, token: str, address: str) -> Role | None:
-        """The role that a token gives; None for a wrong one, which counts against the address it came from.
-
-        Raises:
-            TooManyTriesError: too many wrong ones came from there.
-        """
+        """The role that a token gives; None for a wrong one, which counts against the address."""
         role = self._of(token, lambda known: known)
         if role in self.unguessable:
             return role
@@ -137,11 +129,7 @@ class Place:
             return self.host in LOOPBACK
 
     def listening(self) -> socket.socket:
-        """An open socket there.
-
-        Raises:
-            UserError: the port is in use, or the host is not this machine.
-        """
+        """An open socket there."""
         ports = PORTS if self.port is None else (self.port,)
         for port in ports:
             try:
@@ -175,29 +163,3 @@ class Place:
         named = {name.lower() for name in (self.host, *self.names)}
         hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
         return GuardRules(access, frozenset(hosts), not self.is_loopback, f"codebotler-{port}")
-
-
-def entrance(
-    host: str,
-    port: int | None,
-    names: Sequence[str],
-    token: str | None,
-    face: str | None = None,
-    *,
-    no_token: bool,
-) -> tuple[Place, Access]:
-    """The address and the tokens of a page, as the command line has them.
-
-    Args:
-        host: the address to listen on.
-        port: 0 takes any free one; None the first of `PORTS` that is free.
-        names: further names of the page.
-        token: of operators; a new one by default.
-        face: the token of the robot's face; a new one by default.
-        no_token: whether everybody on this machine may open the page.
-
-    Raises:
-        UserError: the tokens would let in more people than intended.
-    """
-    place = Place(host, port, tuple(names))
-    return place, Access.asked_for(token, face, open_to_all=no_token, is_loopback=place.is_loopback)

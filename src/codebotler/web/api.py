@@ -21,7 +21,7 @@ from codebotler.missions.log import EVENTS, Line, Summary, events_of
 from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
-from codebotler.missions.store import find, missions, summary_of
+from codebotler.missions.store import find, missions
 from codebotler.missions.view import Order, SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
 
@@ -45,12 +45,12 @@ class NewMission(_Form):
     """A new mission: an instruction, a program, or both."""
 
     instruction: Text = ""
-    model: Annotated[str, Field(max_length=200)] = Field("", description="By default the first one.")
+    model: Annotated[str, Field(max_length=200)] = Field("", description="By default, the first one.")
     program: Text = ""
 
 
 class NewProgram(_Form):
-    """A program that replaces the one at hand."""
+    """A program to check, alone or in the place of the one at hand."""
 
     program: Text
 
@@ -66,12 +66,6 @@ class Again(_Form):
     """A request for another program."""
 
     repair: bool = Field(default=False, description="Whether to send the model the program and its problems.")
-
-
-class ProgramToCheck(_Form):
-    """A program to check."""
-
-    program: Text
 
 
 class AnyText(JSONResponse):
@@ -114,7 +108,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
             session = console.begin(Order(new.instruction, model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
         if not session.view.id:
-            raise HTTPException(409, session.view.trouble or "the mission was stopped before it began")
+            raise HTTPException(409, session.view.trouble or "the mission was stopped before it started")
         return view_data(session.view)
 
     @api.get("/missions/{mission}")
@@ -191,7 +185,7 @@ def _add_events(api: APIRouter, console: Console) -> None:
 
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
-    def check(new: ProgramToCheck) -> dict[str, Any]:
+    def check(new: NewProgram) -> dict[str, Any]:
         """Check a program, in the rooms of the mission at hand if there is one."""
         with _refusing():
             return console.check(new.program, console.view.room_map).data()
@@ -264,8 +258,8 @@ def _at_hand(console: Console, mission: str) -> MissionSession:
 def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
     name = console.view.id if mission == HERE else mission
     if not name:
-        none = "there is no mission yet; POST /api/missions begins one"
-        raise HTTPException(404, none if console.session is None else "the mission at hand has not begun")
+        none = "there is no mission yet; POST /api/missions starts one"
+        raise HTTPException(404, none if console.session is None else "the current mission has not started")
     try:
         folder = find(console.home, name)
     except UserError:
@@ -273,7 +267,7 @@ def _past(console: Console, mission: str) -> tuple[Summary, list[Line]]:
             404, f"there is no mission {shortened(name, 100)}; GET /api/missions lists them"
         ) from None
     try:
-        return summary_of(folder), events_of(folder)
+        return Summary.read(folder), events_of(folder)
     except UserError as error:
         raise HTTPException(404, error.sentence) from None
 

@@ -13,7 +13,7 @@ from codebotler.checking.check import check
 from codebotler.checking.problems import Check
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
-from codebotler.missions.log import Line, Summary
+from codebotler.missions.log import Summary
 from codebotler.missions.mission import GRACE, MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.store import recover
@@ -29,15 +29,9 @@ MOST_PROGRAM = 200_000
 
 
 class Console:
-    """Holds a robot and the mission at hand, for any number of viewers on any threads.
+    """Holds a robot, connected by missions only, and the mission at hand, for viewers on any threads.
 
-    Args:
-        robot: not connected; a mission connects it.
-        home: the folder of missions.
-        open_model: gives a model by its name.
-        models: the names on offer, the default first.
-        world: the robot's surroundings, if known.
-        face: where the robot speaks, if it does.
+    `models` are the names on offer, the default first.
     """
 
     def __init__(
@@ -87,20 +81,11 @@ class Console:
         session = self._session
         return SessionView() if session is None else session.view
 
-    def events(self, start: int = 0) -> list[Line]:
-        """The events of the mission at hand, from one on."""
-        session = self._session
-        return [] if session is None else session.events(start)
-
     def begin(self, order: Order) -> MissionSession:
-        """Begin a mission; one that is not running yet makes room for it.
-
-        Raises:
-            MissionError: a mission is running, or nothing is asked for.
-        """
+        """Begin a mission; one that is not running yet makes room for it, another raises MissionError."""
         order = Order(order.instruction.strip(), order.model.strip(), order.program)
         if not order.program.strip() and not (order.instruction and order.model):
-            raise MissionError("nothing is asked for; say what the robot is to do")
+            raise MissionError("the instruction is empty; say what the robot should do")
         for text in (order.instruction, order.program):
             _check_length(text)
         with self._lock:
@@ -124,11 +109,7 @@ class Console:
         return session
 
     def edit(self, program: str) -> MissionSession:
-        """Replace the program at hand; after the end of a mission this begins another one.
-
-        Raises:
-            MissionError: the robot runs, or a model is writing.
-        """
+        """Replace the program at hand; after the end of a mission this begins another one."""
         _check_length(program)
         session = self._session
         if session is None or session.view.is_over:
@@ -143,15 +124,7 @@ class Console:
             session.stop(by)
 
     def stop_soon(self, by: str, *, only_moving: bool = False) -> bool:
-        """Stop the mission at hand on a thread of its own, so that nothing slow delays it.
-
-        Args:
-            by: who stops it, in words.
-            only_moving: whether to stop only a robot that runs.
-
-        Returns:
-            whether there is anything to stop.
-        """
+        """Stop the mission, or only a robot that runs, without waiting; whether there is anything to stop."""
         view = self.view
         if view.is_over or (only_moving and not view.is_running):
             return False
@@ -159,15 +132,7 @@ class Console:
         return True
 
     def check(self, program: str, room_map: RoomMap | None = None) -> Check:
-        """Check a program; one at a time.
-
-        Args:
-            program: its source.
-            room_map: the robot's rooms; without them they are taken from the program.
-
-        Raises:
-            EngineError: no isolated process could be started.
-        """
+        """Check a program, one at a time; without a map of the robot's rooms they are taken from it."""
         with self._checking:
             if self._pool is None:
                 self._pool = self._held.enter_context(WorkerPool(1))

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from codebotler.core.terminal import visible_lines
 from codebotler.missions.mission import UNCONFIRMED
-from codebotler.robots.face import AnswerError, Ended, Face, Question
+from codebotler.robots.face import AnswerError, Face, Question
 from codebotler.web.console import Console
 
 PAGE = Path(__file__).with_name("static") / "face.html"
@@ -136,6 +136,6 @@ def words(text: str, most: int = MOST_TEXT) -> str:
     return shown if left <= 0 else f"{shown}... {left:,} more characters"
 
 
-def _ended_data(ended: Ended) -> dict[str, Any]:
-    answer = None if ended.answer is None else words(ended.question.options[ended.answer], MOST_OPTION)
-    return {"number": ended.question.number, "how": ended.how, "answer": answer}
+def _ended_data(ended: Question) -> dict[str, Any]:
+    answer = None if ended.answer is None else words(ended.options[ended.answer], MOST_OPTION)
+    return {"number": ended.number, "how": ended.how, "answer": answer}

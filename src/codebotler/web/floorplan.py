@@ -18,13 +18,7 @@ MOST_LETTERS = 60
 
 
 def floorplan(world: World, at: Point | None = None, room: str = "") -> str:
-    """Draw a world as seen from above; rooms without a footprint are laid out along a hallway.
-
-    Args:
-        world: the rooms.
-        at: the robot's position in metres, if known.
-        room: the room that the robot is in, or drives to.
-    """
+    """Draw a world as seen from above, with the robot's position if known, and its room or destination."""
     rooms = laid_out(world).rooms[:MOST_ROOMS]
     corners = [corner for one in rooms for corner in one.footprint or ()] + ([at] if at else [])
     left, right = min(x for x, _ in corners) - MARGIN, max(x for x, _ in corners) + MARGIN
@@ -40,7 +34,7 @@ def floorplan(world: World, at: Point | None = None, room: str = "") -> str:
         x, y = at[0] - left, high - at[1]
         parts.append(f'<g class="robot"><circle class="halo" cx="{x:.2f}" cy="{y:.2f}" r=".62"/>')
         parts.append(f'<circle class="body" cx="{x:.2f}" cy="{y:.2f}" r=".34"/></g>')
-    where = f"The robot is in {room}." if room else "The position of the robot is unknown."
+    where = f"The robot is in {room}." if room else "The robot's position is unknown."
     return (
         f'<svg class="floorplan" viewBox="0 0 {right - left:.2f} {high - low:.2f}" role="img" '
         f'aria-label="{escape(shortened(f"Map of {len(rooms)} rooms. {where}", 200))}">{"".join(parts)}</svg>'

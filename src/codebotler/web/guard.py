@@ -49,10 +49,10 @@ MOST_PORT = 65_535
 CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 SCRIPT = re.compile(rb"<script(?=[\s>])")
 
-NO_CONTROL = "there is no such page: no address here has control characters"
+NO_CONTROL = "there is no such page: addresses here have no control characters"
 NO_PAGE = "there is no such page"
-WRONG = "this is not the token"
-OTHER_SITE = "this came from another page, which may not do that"
+WRONG = "this token is wrong"
+OTHER_SITE = "this request came from another site, which is not allowed"
 TOO_LARGE = f"at most {MOST_BYTES:,} bytes are accepted"
 
 REFUSAL = """<!doctype html><html lang="en"><meta charset="utf-8">
@@ -70,13 +70,7 @@ class RefusedError(Exception):
 
 
 class Guard:
-    """ASGI middleware that lets a request through or refuses it.
-
-    Args:
-        app: the page and its API.
-        rules: which requests are let through.
-        has_page: whether there is anything at a path.
-    """
+    """ASGI middleware that lets a request through or refuses it."""
 
     def __init__(self, app: ASGIApp, rules: GuardRules, has_page: Callable[[str], bool]) -> None:
         self._app, self._rules, self._has_page = app, rules, has_page
@@ -118,7 +112,7 @@ class Guard:
         if name not in self._rules.hosts and not (self._rules.any_address and _is_address(name)):
             raise RefusedError(
                 HTTPStatus.MISDIRECTED_REQUEST,
-                "this server does not answer to that host name; use the link that was printed at the start",
+                "this server does not use that host name; open the link that was printed at the start",
             )
 
     def _role(self, request: HTTPConnection) -> Role | None:
@@ -207,10 +201,10 @@ def _token_in_link(request: HTTPConnection) -> str | None:
 def _check_role(role: Role | None, path: str) -> None:
     if role is None:
         raise RefusedError(
-            HTTPStatus.UNAUTHORIZED, "open the link that was printed at the start; it holds the token"
+            HTTPStatus.UNAUTHORIZED, "open the link that was printed at the start; it contains the token"
         )
     if role is Role.FACE and not any(path == place or path.startswith(f"{place}/") for place in FOR_FACES):
-        raise RefusedError(HTTPStatus.FORBIDDEN, "this link opens the robot's face and nothing else")
+        raise RefusedError(HTTPStatus.FORBIDDEN, "this link opens only the robot's face")
 
 
 def _check_length(request: HTTPConnection) -> None:

@@ -53,19 +53,9 @@ def serve(
     *,
     alone_for: float | None = None,
 ) -> None:
-    """Serve the page until Ctrl-C, which stops a running robot.
+    """Serve the page, or without a console only further pages, until Ctrl-C, which stops a running robot.
 
-    Args:
-        console: not yet entered; None where there are only further pages, and no robot.
-        place: the address of the page.
-        access: its tokens.
-        further: pages of other packages.
-        runs: the folder of runs for those.
-        alone_for: stop a running robot so many seconds after the last operator left; None: never.
-
-    Raises:
-        UserError: the port is in use.
-        OSError: missions cannot be written.
+    `alone_for` seconds after the last operator left, a running robot is stopped, too; None means never.
     """
     with place.listening() as bound, console or nullcontext():
         port = bound.getsockname()[1]
@@ -84,8 +74,6 @@ def serve(
             ws_max_size=MOST_BYTES,
             timeout_graceful_shutdown=LINGER,
         )
-        for summary in console.interrupted if console else ():
-            note(f"mission {summary.id} was interrupted: {summary.reason}")
         note(_links(place, port, access, console))
         _Server(settings, console).run([bound])
 
@@ -175,12 +163,9 @@ def _is_taken(routes: Sequence[BaseRoute], method: str, path: str) -> bool:
 
 
 class Presence:
-    """ASGI middleware behind the guard that notices when no operator's page has been open for a while.
+    """ASGI middleware behind the guard that calls `alone` when no operator's page was open for some seconds.
 
-    Args:
-        app: the page and its API.
-        seconds: how long no page may be open, above 0; a page that is reloaded is away for a moment.
-        alone: called then; must return at once.
+    It must return at once. A page that is reloaded is away for a moment.
     """
 
     def __init__(self, app: ASGIApp, seconds: float, alone: Callable[[], object]) -> None:

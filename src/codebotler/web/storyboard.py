@@ -10,7 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from codebotler.checking.problems import Check, Sample
-from codebotler.checking.storyboard import FIRST_STEPS, LAST_STEPS, MOST_STEPS, steps_of
+from codebotler.checking.storyboard import cut, steps_of
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.core.words import listed
@@ -105,31 +105,21 @@ def _strip(sample: Sample, check: Check) -> Strip:
 
 
 def scenes(
-    steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int] = frozenset()
+    steps: Sequence[Mapping[str, Any]], start: str, needed: Container[int | None] = frozenset()
 ) -> tuple[Scene, ...]:
-    """The scenes of a trace; of a long one its ends, and the steps that are needed.
-
-    Args:
-        steps: of the trace, with the rooms to which drives lead.
-        start: the room where the robot starts.
-        needed: numbers of steps that are not left out.
-    """
+    """The scenes of a trace from its start on; of a long one its ends, and the steps that are needed."""
     found: list[Scene] = [Scene(shortened(start, MOST_TEXT))]
-    is_long = len(steps) > MOST_STEPS
-    hidden = 0
-    for number, step in enumerate(steps):
-        if is_long and FIRST_STEPS <= number < len(steps) - LAST_STEPS and step["step"] not in needed:
-            hidden += 1
+    for is_shown, some in cut(steps, needed):
+        if not is_shown:
+            found.append(Scene("…", (Deed("more", f"{len(some):,} more steps"),)))
             continue
-        if hidden:
-            found.append(Scene("…", (Deed("more", f"{hidden:,} more steps"),)))
-        hidden = 0
-        if step["kind"] == "goto":
-            to = step["to"]
-            room = shortened(to or step["text"], MOST_TEXT)
-            found.append(Scene(room, is_found=to is not None, step=step["step"]))
-        else:
-            found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_deeds(step)))
+        for step in some:
+            if step["kind"] == "goto":
+                to = step["to"]
+                room = shortened(to or step["text"], MOST_TEXT)
+                found.append(Scene(room, is_found=to is not None, step=step["step"]))
+            else:
+                found[-1] = replace(found[-1], deeds=(*found[-1].deeds, *_deeds(step)))
     return tuple(found)
 
 

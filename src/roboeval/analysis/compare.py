@@ -63,7 +63,7 @@ def compared(first: PromptScores, second: PromptScores) -> Comparison:
     """Compare two models prompt by prompt; raises UserError if they have none in common."""
     keys = [key for key in first if key in second]
     if not keys:
-        raise UserError("the runs have no prompt in common, so there is nothing to compare")
+        raise UserError("the runs have no prompt in common, so they cannot be compared")
     by_task: dict[str, list[tuple[float, float]]] = defaultdict(list)
     for key in keys:
         by_task[key[0]].append((first[key], second[key]))
@@ -101,13 +101,13 @@ def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
     better, other = (names[1], names[0]) if difference > 0 else names
     by = f"{100 * abs(difference):.1f} points"
     if comparison.p_tasks <= LEVEL:
-        return f"{better} is better than {other} by {by}; tasks drawn at random would hardly ever give that."
+        return f"{better} is better than {other} by {by} (p ≤ {LEVEL} over tasks)."
     if comparison.p_prompts <= LEVEL:
         return (
-            f"{better} is better than {other} by {by} on prompts of these tasks; whether it would be "
-            f"on other tasks, {len(comparison.tasks)} of them cannot tell."
+            f"{better} is better than {other} by {by} on prompts of these tasks; "
+            f"{len(comparison.tasks)} tasks are too few to tell for other tasks."
         )
-    return f"{better} passes more often than {other} by {by}, which chance alone may well give."
+    return f"{better} passes more often than {other} by {by}, which may well be chance."
 
 
 def told_of(about: Mapping[str, Any], head: Mapping[str, Any]) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def unlike(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
             told.append(f"{words} differ: {_said(a)} and {_said(b)}")
     settings = [found if isinstance(found := one.get("settings"), dict) else {} for one in (first, second)]
     if bool(settings[0]) != bool(settings[1]):
-        told.append("of one of them nobody recorded the settings")
+        told.append("the settings of one of them were not recorded")
     for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
         a, b = (one.get(name) for one in settings)
         if a != b:
@@ -152,8 +152,8 @@ def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, agai
     other = next(path for path, digest in digests.items() if digest != digests[stale])
     hashes = f"{digests[stale][:8]} and {digests[other][:8]}"
     raise UserError(
-        f"{stale} and {other} were judged by suites of other content ({hashes}); "
-        f"`{again[stale]} --redo` judges it by the suite as it is now"
+        f"{stale} and {other} were judged by different versions of a suite ({hashes}); "
+        f"`{again[stale]} --redo` judges it by the current suite"
     )
 
 
@@ -189,15 +189,15 @@ def to_tell(comparison: Comparison) -> list[str]:
     """How much it would take to tell the two apart, in sentences."""
     much = comparison.needed
     if much.completions is None:
-        return ["They do not differ, so no number of completions would tell them apart."]
+        return ["They do not differ, so no number of completions would show a difference."]
     each = f"{much.completions:,} completion{'s' * (much.completions != 1)}"
     here = (
-        f"A difference of this size on these very prompts is told, four times in five, by {each} of each "
+        f"Detecting a difference of this size on these prompts, four times in five, takes {each} of each "
         f"model for each prompt ({much.completions * comparison.prompts:,} of each in all)."
     )
     told = [here]
     if much.prompts is not None:
         told.append(
-            f"For prompts like these in general, it takes {much.prompts:,} of them, as many completions each."
+            f"For prompts like these, it takes {much.prompts:,} of them, with as many completions each."
         )
     return told

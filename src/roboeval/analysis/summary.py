@@ -66,7 +66,7 @@ def summary(
     """Count how completions did; raises UserError where there is none, or k is too large for a prompt."""
     tasks = task_scores(table, suite.tasks)
     if not tasks:
-        raise UserError(f"0 of {how_many(scope.total)} judged, so there is nothing to count")
+        raise UserError(f"0 of {how_many(scope.total)} judged, so there are no results yet")
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:

@@ -145,9 +145,9 @@ def said(found: VerdictChanges) -> str:
     passing = lost + sum(task.both for task in found.tasks)
     told = []
     if lost:
-        told.append(f"turns away {lost:,} of the {how_many(passing)} that pass under {first}")
+        told.append(f"rejects {lost:,} of the {how_many(passing)} that pass under {first}")
     if won:
-        told.append(f"lets {won:,} pass that {first} turns away")
+        told.append(f"passes {won:,} that {first} rejects")
     kinds = f"{found.programs:,} different program{'s' * (found.programs != 1)}"
     return f"{found.name}: {second} {' and '.join(told)} ({kinds})."
 
@@ -173,7 +173,7 @@ HOW_OFTEN = {1: "more often than", 0: "as often as", -1: "less often than"}
 def said_of_prompts(found: Sequence[VerdictChanges]) -> list[str]:
     """A warning where runs are about different prompts."""
     asked = {frozenset((task.task, task.prompts) for task in one.comparison.tasks) for one in found}
-    warning = "Not all runs are about the same prompts, on which their order may rest."
+    warning = "The runs have different prompts, which may affect their order."
     return [warning] if len(asked) > 1 else []
 
 

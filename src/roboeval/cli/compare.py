@@ -37,7 +37,7 @@ def compare(
     suite: SuiteOption = "paper",
     suites: Annotated[
         str | None,
-        typer.Option(help="Two suites, such as paper,plus: what the second changes, of each run."),
+        typer.Option(help="Two suites, such as paper,plus: show what the second changes for each run."),
     ] = None,
     most: Annotated[
         int, typer.Option("--groups", min=0, help="With --suites: how many groups of programs to show.")
@@ -45,9 +45,9 @@ def compare(
     ablation: AblationOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Say by how much one run is better, and how sure that is.
+    """Show by how much one run is better, and how sure that is.
 
-    That is: by how much the second run passes more often than the first.
+    It compares how often the second run passes with the first.
     """
     if suites is not None:
         compare_suites(runs, suites, most=most, ablated=ablation, as_json=json)
@@ -76,7 +76,7 @@ def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: b
     for warning in warnings:
         note(f"warning: {warning}")
     if result.left_out:
-        note(f"left out, since only one of them has them: {prompts(result.left_out)}")
+        note(f"left out, since only one of the runs has them: {prompts(result.left_out)}")
     names = str(paths[0]), str(paths[1])
     if as_json:
         print_json({**comparison_data(result, names), "warnings": warnings})
@@ -91,10 +91,10 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
     from roboeval.evaluation.runs.completions import how_many
 
     if len({path.resolve() for path in paths}) < len(paths):
-        fail("a run is named twice; name each once")
+        fail("a run is named twice; name each run once")
     names = [name.strip() for name in suites.split(",")]
     if len(names) != PAIR or len({*names}) != PAIR or not all(names):
-        fail(f'--suites takes two suites with a comma between them, such as paper,plus, and not "{suites}"')
+        fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
     found = []
     for path in paths:
         first, second = (open_current(path, name, ablated=ablated).results for name in names)
@@ -123,17 +123,17 @@ def resample(
         list[int] | None, typer.Option(min=0, help="A limit of retries; may be given several times.")
     ] = None,
     samples: Annotated[
-        int, typer.Option(min=1, max=10_000, help="Worlds that are imagined to check a program.")
+        int, typer.Option(min=1, max=10_000, help="How many worlds to imagine for each check.")
     ] = 5,
-    seed: Annotated[int, typer.Option(help="From which they are drawn.")] = 0,
+    seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     suite: SuiteOption = "paper",
     workers: WorkersOption = None,
     engine: EngineOption = "local",
     json: JsonOption = False,
 ) -> None:
-    """Say what checking programs before a run would have saved.
+    """Compute what checking programs before a run would have gained.
 
-    From a judged run: what asking again for those that a check rejects would have given.
+    It computes from a judged run what asking again for rejected programs would have given.
     """
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view

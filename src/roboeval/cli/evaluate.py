@@ -46,7 +46,7 @@ def evaluate(
     workers: WorkersOption = None,
     worlds: Annotated[
         int | None,
-        typer.Option(min=1, max=10_000, help="Draw so many worlds a task, where the suite draws them."),
+        typer.Option(min=1, max=10_000, help="Draw this many worlds a task, if the suite draws worlds."),
     ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
@@ -55,7 +55,7 @@ def evaluate(
     require_isolation: IsolationOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Say of every completion whether it does what is asked."""
+    """Judge whether each completion does what was asked."""
     from roboeval.analysis.summary import summary
     from roboeval.evaluation.runs.folder import Run, open_source, tasks_to_judge
     from roboeval.evaluation.runs.results import Scope
@@ -67,7 +67,7 @@ def evaluate(
         judged_by = judged_by.with_worlds(worlds, seed)
     wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
     if left:
-        note(f"without ablation, and so not judged: {', '.join(left)}")
+        note(f"not judged, since they have no ablation: {', '.join(left)}")
     tally = Tally()
     run = None if out is None else Run(out)
     try:
@@ -98,7 +98,7 @@ def _exit_if_left_out(left_out: int, total: int, *, is_kept: bool) -> None:
     from roboeval.evaluation.runs.completions import how_many
 
     if left_out > 0:
-        again = "the same command tries again" if is_kept else "the others are judged as always"
+        again = "the same command tries again" if is_kept else "the others are judged"
         note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; {again}")
         raise SystemExit(1)
 
@@ -133,7 +133,7 @@ def import_(
     out: Annotated[Path, typer.Option(help="The run to make.", parser=named("a run"))],
     suite: SuiteOption = "paper",
 ) -> None:
-    """Make a run of completions from elsewhere."""
+    """Make a run from completions written elsewhere."""
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, open_source
 
@@ -165,13 +165,13 @@ class Tally:
     def after_a_stop(self, *, is_kept: bool, redo: bool) -> str:
         """What Ctrl-C leaves behind, and how to go on."""
         if not is_kept:
-            return "stopped; nothing is kept (with --out RUN, what was judged would be)"
+            return "stopped; nothing is kept (add --out RUN to keep verdicts)"
         if self.count == 0:
-            return "stopped before judging; give the same command again"
-        return f"stopped; the same command {'without --redo ' * redo}goes on where it was"
+            return "stopped before judging; run the same command again"
+        return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
 
     def say_how_to_look(self, run: Path, suite: str, *, ablated: bool) -> None:
         """Note where the verdicts are, and the command that shows more of them."""
         again = command("show", run, *self.first_failed, suite=suite, ablated=ablated)
-        does = "says why that one fails" if self.first_failed else "prints these tables again"
+        does = "says why that program fails" if self.first_failed else "prints these tables again"
         note(f"verdicts are in {run}; `{again}` {does}")

@@ -29,24 +29,26 @@ def find(
     formula: Annotated[
         str | None, typer.Argument(help='An RTL formula, such as tr.Exists(goto("kitchen")); all by default.')
     ] = None,
-    negated: Annotated[bool, typer.Option("--not", help="Where the formula does not hold.")] = False,
+    negated: Annotated[
+        bool, typer.Option("--not", help="Find completions for which the formula does not hold.")
+    ] = False,
     task: Annotated[
         str | None, typer.Option(help="Only completions of this task.", autocompletion=task_names)
     ] = None,
     world: Annotated[
-        str | None, typer.Option(help="Only in this world: its number, from 1, or what it is about.")
+        str | None, typer.Option(help="Only in this world: its number, from 1, or its description.")
     ] = None,
     most: Annotated[int, typer.Option("--groups", min=0, help="How many groups of failures to show.")] = 10,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes that look; all cores by default.")
+        int | None, typer.Option(min=1, help="How many processes to use; all cores by default.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
     """Find completions by what they did, and group the failures.
 
-    Of those that did something in some world, those that fail are put together by the reason.
+    It takes the completions that did something in some world, and groups those that fail by reason.
     """
     from roboeval.analysis.cluster import cluster_data, clusters, groups
     from roboeval.analysis.search import Question, Search
@@ -55,7 +57,7 @@ def find(
     from roboeval.evaluation.runs.folder import Run, as_judged
 
     if negated and formula is None:
-        fail("--not is about a formula; name one, or leave --not out")
+        fail("--not needs a formula; add one, or leave --not out")
     known = as_judged(Run(run), load(suite), ablated=ablation)
     question = Question(formula, negated, None if task is None else known.task(task).name, world)
     expect_question(question, known, ablated=ablation)
@@ -71,7 +73,7 @@ def find(
     told = list(watched(telling, "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if undecided:
-        note(f"undecided, since their traces were too long to be kept: {how_many(len(undecided))}")
+        note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")
     if json:
         print_json(
             {
@@ -94,7 +96,7 @@ def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
         try:
             parse(question.formula)
         except RtlSyntaxError as error:
-            raise UserError(f"this is no formula: {error}") from None
+            raise UserError(f"this is not a formula: {error}") from None
     if question.world is None:
         return
     tasks = [suite.tasks[question.task]] if question.task else list(suite.tasks.values())

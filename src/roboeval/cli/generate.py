@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import ExitStack
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,7 +36,7 @@ from roboeval.cli.options import (
     command,
     load,
 )
-from roboeval.cli.output import metered, note
+from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def generate(
 ) -> None:
     """Have a model write programs for a suite.
 
-    The same command goes on after any interruption.
+    After an interruption, the same command continues.
     """
     from codebotler.models.base import SamplingSettings
     from roboeval.evaluation.generate import Pace
@@ -94,13 +95,15 @@ def run(
     ] = True,
     json: JsonOption = False,
 ) -> None:
-    """Have a model write programs, judge them, write the report.
+    """Have a model write programs, judge them, and write a report.
 
-    The tables are printed, and the same command goes on after any interruption.
+    It prints the tables. After an interruption, the same command continues.
     """
     from codebotler.models.base import SamplingSettings
     from roboeval.evaluation.generate import Pace
 
+    if with_report and find_spec("matplotlib") is None:  # before anything is paid for
+        fail("the report needs matplotlib; `pip install 'codebotler[report]'` brings it, or add --no-report")
     settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
     pace = Pace(concurrency, requests_per_minute, token_budget)
     path = complete(model, out, suite, tasks, num_completions, settings, pace)
@@ -145,7 +148,7 @@ def complete(
         note(f"roboeval: {meter.after_a_stop()}")
         raise SystemExit(STOPPED) from None
     if progress.missing is not None:
-        note(f"roboeval: {progress.missing}; the same command goes on where it was")
+        note(f"roboeval: {progress.missing}; the same command continues where it stopped")
         raise SystemExit(1)
     return run.path
 
@@ -160,7 +163,7 @@ class Meter(ExitStack):
         if self.progress is None:
             self.progress = progress
             if progress.found:
-                note(f"{progress.found:,} of {counted(progress.total, 'completion')} are there already")
+                note(f"{progress.found:,} of {counted(progress.total, 'completion')} were there already")
             if progress.interrupted:
                 note(f"{under_way(progress.interrupted)} when this was interrupted, which may be paid twice")
             self._draw = self.enter_context(metered("generating", progress.total, progress.found))
@@ -172,11 +175,11 @@ class Meter(ExitStack):
     def after_a_stop(self) -> str:
         """What Ctrl-C leaves behind, and how to go on."""
         if self.progress is None:
-            return "stopped before the first request; give the same command again"
+            return "stopped before the first request; run the same command again"
         kept = f"{self.progress.done:,} of {counted(self.progress.total, 'completion')} are kept"
         open_requests = self.progress.under_way
         paid = f"; {under_way(open_requests)}, which may be paid twice" if open_requests else ""
-        return f"stopped; {kept}{paid}; the same command goes on where it was"
+        return f"stopped; {kept}{paid}; the same command continues where it stopped"
 
 
 def under_way(requests: int) -> str:

@@ -16,7 +16,7 @@ from roboeval.cli.output import note, print_rich, watched
 if TYPE_CHECKING:
     from roboeval.mutation.mutants import Original
     from roboeval.mutation.score import MutationScore
-    from roboeval.suites.load import Suite
+    from roboeval.suites.load import Suite, Task
 
 
 def mutate(
@@ -36,13 +36,18 @@ def mutate(
     ] = None,
     worlds: Annotated[
         int | None,
-        typer.Option(min=1, max=10_000, help="Try them in so many generated worlds, if the suite makes any."),
+        typer.Option(
+            min=1, max=10_000, help="Try mutants in this many drawn worlds, if the suite draws worlds."
+        ),
     ] = None,
-    seed: Annotated[
-        int, typer.Option(min=0, help="From which mutants are drawn, and worlds are generated.")
-    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="The random seed of mutants and worlds.")] = 1,
     most: Annotated[
-        int, typer.Option("--mutants", min=1, help="Try at most so many of each task, drawn evenly.")
+        int,
+        typer.Option(
+            "--mutants",
+            min=1,
+            help="Try at most this many mutants of each task, drawn evenly over operators.",
+        ),
     ] = 400,
     out: Annotated[
         Path | None,
@@ -54,18 +59,16 @@ def mutate(
     ] = None,
     workers: WorkersOption = None,
 ) -> None:
-    """Say which wrong programs the checks of a suite let through.
+    """Measure which wrong programs a suite's checks let through.
 
-    Mutants of right programs, wrong as models get them wrong, are run and judged.
+    It runs and judges mutants: right programs with mistakes that models make.
     """
     from codebotler.simulator.pool import WorkerPool
     from roboeval.mutation.report import keep
     from roboeval.mutation.trials import mutation_score
 
     known = load(suite)
-    # As other commands take them after --tasks, too.
-    names = [name for word in tasks or known.tasks for name in word.split(",")]
-    wanted = [known.task(name) for name in dict.fromkeys(names)]
+    wanted = wanted_tasks(known, tasks)
     further = named_programs(also or [], known)
     score = partial(mutation_score, worlds=worlds, most=most, seed=seed, watched=watched)
     with WorkerPool(workers or cores()) as pool:
@@ -76,6 +79,12 @@ def mutate(
         note(f"scores, mutants and survivors are in {out}")
     if at_least is not None and any(score.score is None or score.score < at_least for score in scores):
         raise SystemExit(1)
+
+
+def wanted_tasks(suite: Suite, words: Sequence[str] | None) -> list[Task]:
+    """The tasks that a user names, also with commas, as other commands take them after --tasks."""
+    names = [name for word in words or suite.tasks for name in word.split(",")]
+    return [suite.task(name) for name in dict.fromkeys(names)]
 
 
 def named_programs(sources: Sequence[str], suite: Suite) -> Mapping[str, list[Original]]:
@@ -107,4 +116,4 @@ def show_scores(scores: Sequence[MutationScore], suite: str, *, brief: bool) -> 
         for original, fault in score.wrong:
             if original.claimed:
                 where = f"{fault.world}: {fault.why}"
-                note(f"not right, and so not mutated: {score.task}, {original.name} ({where})")
+                note(f"not mutated, since they are not right: {score.task}, {original.name} ({where})")

@@ -61,7 +61,7 @@ def named(what: str) -> Callable[[str], Path]:
     """A reader of paths that refuses the empty one, which would be the current folder."""
 
     def path(text: str) -> Path:
-        return Path(text) if text else fail(f"nothing is named; name {what}")
+        return Path(text) if text else fail(f"the argument is empty; name {what}")
 
     return path
 
@@ -70,7 +70,7 @@ RunArgument = Annotated[Path, typer.Argument(help="A run.", parser=named("a run"
 SuiteOption = Annotated[
     str,
     typer.Option(
-        help="A suite that ships with RoboEval or is installed, by its name; or a folder.",
+        help="The name of a built-in or installed suite, or a folder.",
         autocompletion=suite_names,
     ),
 ]
@@ -78,19 +78,19 @@ TasksOption = Annotated[
     str | None,
     typer.Option(help="Only these tasks, separated by commas.", autocompletion=listed_task_names),
 ]
-AblationOption = Annotated[bool, typer.Option("--ablation", help="Require common sense only.")]
+AblationOption = Annotated[bool, typer.Option("--ablation", help="Require only common sense.")]
 EngineOption = Annotated[
     str,
     typer.Option(
-        help="Where programs are run: local, on this machine, or ray, on a Ray cluster.",
+        help="Where to run programs: local (this machine) or ray (a Ray cluster).",
         autocompletion=engine_names,
     ),
 ]
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, help="Programs that run at the same time; all cores by default.")
+    int | None, typer.Option(min=1, help="How many programs to run at the same time; all cores by default.")
 ]
 IsolationOption = Annotated[
-    bool, typer.Option("--require-isolation", help="Refuse where programs are not fully isolated.")
+    bool, typer.Option("--require-isolation", help="Refuse to run programs without full isolation.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
@@ -98,9 +98,11 @@ OutOption = Annotated[
 ]
 NumOption = Annotated[int, typer.Option(min=1, max=10_000, help="Completions for each prompt.")]
 ConcurrencyOption = Annotated[int, typer.Option(min=1, help="Requests under way at the same time.")]
-RateOption = Annotated[float | None, typer.Option(min=0.001, help="Send no more requests in a minute.")]
+RateOption = Annotated[
+    float | None, typer.Option(min=0.001, help="Send at most this many requests a minute.")
+]
 BudgetOption = Annotated[
-    int | None, typer.Option(min=1, help="Stop when this command has used so many tokens.")
+    int | None, typer.Option(min=1, help="Stop when this command has used this many tokens.")
 ]
 
 
@@ -142,7 +144,7 @@ def open_run(
     suite = as_judged(folder, load(suite_name), ablated=ablated)
     key = evaluation_key(suite, ablated=ablated)
     if not folder.completions.is_file():
-        raise UserError("is no run: it holds no completions.jsonl", file=run)
+        raise UserError("is not a run: it has no completions.jsonl", file=run)
     if not folder.rows(key).is_file():
         others = folder.judged_by()
         if others and suite.name not in others:
@@ -151,7 +153,7 @@ def open_run(
                 f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run
             )
         again = command("evaluate", run, suite=suite_name, ablated=ablated)
-        raise UserError(f"has not been judged; `{again}` does it", file=run)
+        raise UserError(f"has not been judged; run `{again}`", file=run)
     results = read_results(
         folder, key, suite, see=see, watch=lambda lines, total: watched(lines, "reading", total)
     )
@@ -172,11 +174,11 @@ def open_current(
 
     opened = open_run(run, suite_name, ablated=ablated, see=see)
     if (complaint := complaint_of(opened.results)) is not None:
-        raise UserError(f"{complaint}; `{opened.again} --redo` judges what stands there")
+        raise UserError(f"{complaint}; `{opened.again} --redo` judges the current programs")
     if opened.results.table.is_empty():
-        raise UserError(f"no completion has been judged; `{opened.again}` goes on", file=run)
+        raise UserError(f"no completion has been judged; `{opened.again}` continues", file=run)
     if (unfinished := unfinished_of(opened.results)) is not None:
-        note(f"{unfinished}, and only these count; `{opened.again}` goes on")
+        note(f"{unfinished}, and only those count; `{opened.again}` continues")
     return opened
 
 
@@ -224,7 +226,7 @@ def engine_named(name: str, workers: int | None, *, require_isolation: bool = Fa
     if name == "local":
         return Local(workers or cores(), require_isolation=require_isolation)
     if name != "ray":
-        fail(f'there is no engine "{name}"; there are local and ray')
+        fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
     return RayCluster(workers, require_isolation=require_isolation)

@@ -21,23 +21,23 @@ def report(
     out: Annotated[Path, typer.Option(help="The folder to write to.", parser=named("a folder"))],
     suite: SuiteOption = "paper",
     published: Annotated[
-        bool, typer.Option("--published", help="Set the paper's causes of failures beside ours.")
+        bool, typer.Option("--published", help="Add the paper's published causes of failures.")
     ] = False,
     price: Annotated[
         list[str] | None,
-        typer.Option(help="MODEL=INPUT/OUTPUT, of a million tokens each; may be given several times."),
+        typer.Option(help="MODEL=INPUT/OUTPUT, the prices of a million tokens; may be given several times."),
     ] = None,
     beside: Annotated[
-        str | None, typer.Option(help="Another suite that judged the runs: what its checks change.")
+        str | None, typer.Option(help="Another suite that judged the runs, to compare verdicts.")
     ] = None,
     check: Annotated[
         bool, typer.Option(help="Check programs that were not checked, for rejection sampling.")
     ] = True,
     workers: WorkersOption = None,
 ) -> None:
-    """Draw the paper's figures, and one page about how models do.
+    """Write a report: the paper's figures, tables and one page.
 
-    The page also says why, and how sure that is.
+    The page also shows why programs fail, and how sure the numbers are.
     """
     import atexit
     import gc
@@ -53,7 +53,7 @@ def report(
     expect_no_others(out)
     prices = read_prices(price or ())
     if beside == suite:
-        fail(f'--beside takes another suite than "{suite}", by which the report judges')
+        fail(f'--beside needs another suite than "{suite}", which the report itself uses')
     opened = [open_current(run, suite, ablated=False) for run in runs]
     expect_alike(runs, opened)
     engine = Local(workers or cores()) if check else None

@@ -53,15 +53,15 @@ def show(
         print_summary(counted, title=str(run), as_json=json, stale=results.stale)
     else:
         if k:
-            fail(f"--k is about a whole run; leave {selection} out, or --k")
+            fail(f"--k applies to a whole run; leave out {selection} or --k")
         if ablation:
             note("ablation: only common sense was required")
         selection.expect_judged(results)
         show_part(results, selection.task, selection.prompt, selection.index, as_json=json)
     if (complaint := complaint_of(results)) is not None:
-        note(f"{complaint}; `{again} --redo` judges what stands there")
+        note(f"{complaint}; `{again} --redo` judges the current programs")
     if (unfinished := unfinished_of(results)) is not None:
-        note(f"{unfinished}; `{again}` goes on")
+        note(f"{unfinished}; `{again}` continues")
 
 
 def print_summary(counted: Summary, *, title: str, as_json: bool, stale: Iterable[Key] = ()) -> None:
@@ -101,7 +101,7 @@ def show_part(results: Results, task: str, prompt: int | None, index: int | None
 def export(
     run: RunArgument,
     format: Annotated[  # noqa: A002 - the option's name
-        str | None, typer.Option(help="csv or parquet; by default what --out ends in, or else csv.")
+        str | None, typer.Option(help="csv or parquet; by default the ending of --out, or csv.")
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="The file; by default beside the verdicts.", parser=named("a file"))
@@ -130,23 +130,24 @@ def serve(
     no_token: NoTokenOption = False,
     suite: Annotated[
         list[str] | None,
-        typer.Option(help="The folder of a suite by which runs were judged; more than one may be named."),
+        typer.Option(help="The folder of a suite that judged the runs; may be given several times."),
     ] = None,
 ) -> None:
     """Show runs in a browser.
 
-    They are shown side by side, and each completion by itself, until Ctrl-C. It needs no robot.
+    Compare runs, and look into each completion; Ctrl-C ends it. No robot is needed.
     """
     from codebotler.core.errors import UserError
-    from codebotler.web.access import entrance
+    from codebotler.web.access import Access, Place
     from codebotler.web.server import serve as serve_page
     from roboeval.web.pages import pages
     from roboeval.web.run_store import RunStore
 
-    place, access = entrance(host, port, name or (), token, no_token=no_token)
+    place = Place(host, port, tuple(name or ()))
+    access = Access.asked_for(token, None, open_to_all=no_token, is_loopback=place.is_loopback)
     if not runs.is_dir():
         raise UserError("there is no such folder; `roboeval run` makes the first run in runs/", file=runs)
     suites = [load(each) for each in suite or ()]
     if not RunStore(runs).names():
-        note(f"{runs} holds no run yet; those that come are shown, too")
+        note(f"{runs} has no runs yet; new ones will be shown")
     serve_page(None, place, access, (pages(suites),), runs)

@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 def tasks(
     task: Annotated[str | None, typer.Argument(help="Show this task.", autocompletion=task_names)] = None,
     suite: SuiteOption = "paper",
-    lint: Annotated[bool, typer.Option("--lint", help="Look for faults; status 1 if there are any.")] = False,
+    lint: Annotated[
+        bool, typer.Option("--lint", help="Look for mistakes; the status is 1 if there are any.")
+    ] = False,
     accepted: Annotated[
         bool, typer.Option("--accepted", help="With --lint: also what the task files accept, and why.")
     ] = False,
     new: Annotated[
         str | None,
-        typer.Option(help="Start a task of this name in the folder of --suite, which is made if need be."),
+        typer.Option(help="Start a task of this name in the folder --suite, which is created if needed."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
@@ -33,15 +35,15 @@ def tasks(
 
     if new is not None:
         if task is not None or lint or accepted or json:
-            fail("--new only starts a task; leave the rest out")
+            fail("--new takes no other option but --suite; leave the rest out")
         start(new, suite)
         return
     if accepted and not lint:
-        fail("--accepted is about what --lint finds; add --lint")
+        fail("--accepted needs --lint; add it")
     known = load(suite)
     if lint:
         if json:
-            fail("--lint prints for people only; leave --json out")
+            fail("--lint has no JSON output; leave out --json")
         lint_tasks(known, task, accepted=accepted)
     elif json:
         print_json(suite_data(known, None if task is None else known.task(task).name))
@@ -65,7 +67,7 @@ def start(task: str, suite: str) -> None:
         fail(f'the suite "{suite}" {whose} and stays as it is; name a folder of your own with --suite')
     path = new_task(Path(suite), task)
     lint = command("tasks", "--lint", suite=suite)
-    note(f"{path} is a whole task; make it yours, and let `{lint}` look at it")
+    note(f"{path} is a complete task; edit it, and check it with `{lint}`")
 
 
 def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:

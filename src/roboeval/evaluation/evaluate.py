@@ -126,7 +126,7 @@ def _go_on_or_refuse(path: Path, about: dict[str, Any], rows: Path) -> dict[str,
     if not path.exists():
         if rows.exists() and rows.stat().st_size:
             raise UserError(
-                "is missing, so that nobody knows by what the rows were judged; --redo starts over", file=path
+                "is missing, so it is unknown how the rows were judged; --redo starts over", file=path
             )
         write_whole(path, to_text(about))
         return about

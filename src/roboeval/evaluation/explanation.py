@@ -15,10 +15,10 @@ from roboeval.evaluation.runs.completions import Completion
 from roboeval.suites.load import Scenario, Suite
 
 NOT_RECORDED = "instruction not recorded"
-GONE = "the program that was judged no longer stands in this run"
+GONE = "the judged program is no longer in this run"
 CHANGED = "the suite has changed since this was judged"
-CUT = "the trace that was judged is too long to be kept, so this cannot be explained"
-TOO_LONG = "the traces of this program are too long for this to be explained as well"
+CUT = "the trace was too long to keep, so this cannot be explained"
+TOO_LONG = "the traces of this program are too long to explain this as well"
 
 MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
 EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one

@@ -70,7 +70,7 @@ class Progress:
     def missing(self) -> str | None:
         """What is missing at the end, and why; None if nothing is."""
         left = self.total - self.done
-        reason = self.stopped or next(iter(self.failures.values()), "they were not asked for")
+        reason = self.stopped or next(iter(self.failures.values()), "they were not requested")
         return f"{how_many(left)} {'is' if left == 1 else 'are'} missing: {reason}" if left else None
 
 
@@ -206,7 +206,7 @@ class _Generation:
         }
         line = to_line(row)
         if len(line) > MAX_ROW:
-            raise ModelError(f"the reply is too long to be kept: {len(line):,} bytes", may_pass=True)
+            raise ModelError(f"the reply is too long to keep: {len(line):,} bytes", may_pass=True)
         self.file.append(line)
         self.log.kept(key)
         try:

@@ -112,7 +112,7 @@ class RayCluster:
         """Wait until some shards have ended, and get their results."""
         ended, _ = self._ray.wait(list(shards), timeout=PATIENCE_S)
         if not ended and not self._cores():
-            raise EngineError("the Ray cluster has no core left; start another node, and go on")
+            raise EngineError("the Ray cluster has no free core; start another node and try again")
         for shard in ended:
             try:
                 values, warning = self._ray.get(shard)

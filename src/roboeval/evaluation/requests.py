@@ -178,6 +178,6 @@ class RequestLog:
                     noted.discard((task, prompt, index))
                 case _:
                     raise UserError(
-                        "this line notes no request; delete the file", file=self.path, line=number
+                        "this line is not a request; delete the file", file=self.path, line=number
                     )
         return lost, noted

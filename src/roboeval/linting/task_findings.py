@@ -48,9 +48,9 @@ def _unsaid(task: Task) -> Iterator[Finding]:
         for prompt, text in enumerate(task.prompts):
             word = next((word for word in fact.words if re.search(word, text, re.IGNORECASE)), None)
             if word is None and not fact.commonsense:
-                wrong = f'does not say "{fact.fact}", by none of its words; say it'
+                wrong = f'does not say "{fact.fact}", in any of its words; add it'
             elif word is not None and fact.commonsense:
-                wrong = f'says "{fact.fact}" by "{word}", but that is to be common sense; leave it out'
+                wrong = f'says "{fact.fact}" by "{word}", but that is marked as common sense; leave it out'
             else:
                 continue
             line = file.line(("facts", number))
@@ -72,7 +72,7 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
         where = "" if failed is None else f' by {failed.kind} in the world "{judged[failed.world].world}"'
         message = (
             f'the solution "{solution.about}" is said to {said}, but it '
-            f"{'passes' if failed is None else 'fails'}{where}; mend it, what it is said to do, or a check"
+            f"{'passes' if failed is None else 'fails'}{where}; correct the program, its `fails`, or a check"
         )
         yield Finding("misjudged", solution.about, message, task.path, 1)
 
@@ -81,7 +81,7 @@ def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     """Checks, with or without `not`, by which no solution fails."""
     wrong = [one for one in verdicts if not all(verdict.satisfied for verdict in one)]
     if not wrong:
-        message = f'no wrong program is at hand to show that the checks of "{task.name}" can fail'
+        message = f'there is no wrong program to show that the checks of "{task.name}" can fail'
         yield Finding("untripped", task.name, message, task.path, 1)
         return
     tripped = {_side(requirement) for one in wrong for verdict in one for requirement in verdict.failed}

@@ -97,7 +97,7 @@ class JudgedWorld:
             unless = f" without breaking {'one of ' * (len(reasons) > 1)}{listed(reasons)}" if reasons else ""
             message = (
                 f'no sequence of the texts that were tried breaks "{subject}" in {self.name}{unless}'
-                f"{condition}; it may never be the only one to fail"
+                f"{condition}; it may never fail alone"
             )
             fault = line if reasons or condition else self._line_of_fault(requirement)
             yield self.finding("implied", subject, message, fault)

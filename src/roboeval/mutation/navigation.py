@@ -147,12 +147,12 @@ def _looks_in_loops(program: ProgramTree) -> Iterator[tuple[ast.For | ast.While,
 
 
 def drop_the_look(program: ProgramTree, _: Context) -> Edits:
-    """Does not look, and takes it that somebody or something is there."""
+    """Does not look, and assumes that somebody or something is there."""
     return ({call: expression("True")} for call in _looks(program))
 
 
 def see_nothing(program: ProgramTree, _: Context) -> Edits:
-    """Does not look, and takes it that nobody and nothing is there."""
+    """Does not look, and assumes that nobody and nothing is there."""
     return ({call: expression("False")} for call in _looks(program))
 
 

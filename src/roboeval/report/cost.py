@@ -88,7 +88,7 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
         except (ValueError, TypeError):
             price = Price(-1.0, -1.0)
         if not model or not all(0 <= number < MILLION for number in price):
-            raise UserError(f'"{text}" is no price; write MODEL=INPUT/OUTPUT, of a million tokens each')
+            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, each for a million tokens')
         if model in prices:
             raise UserError(f'--price names "{model}" twice; give one price')
         prices[model] = price

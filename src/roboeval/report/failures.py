@@ -59,7 +59,7 @@ def beside_notes(runs: Sequence[JudgedRun]) -> list[str]:
     """Caveats where published causes stand beside ours."""
     known = [run for run in runs if paper.model_of(run) is not None]
     if not known:
-        return ["None of these runs names a model of the paper, so no published causes stand beside them."]
+        return ["None of these runs names a model of the paper, so no published causes are shown."]
     tasks = {*paper.published()["pass_at_1"]}
     parts = ", ".join(run.name for run in known if {score.task for score in run.scores} != tasks)
     more = f"Published causes are of all {len(tasks)} tasks of the paper, which is more than {parts} did."

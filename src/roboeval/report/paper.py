@@ -36,7 +36,7 @@ def taken_for(runs: Iterable[JudgedRun]) -> list[str]:
     """A sentence about which models of the paper runs are taken for."""
     named = [(run.name, model) for run in runs if (model := model_of(run)) is not None]
     those = ", ".join(f"{name} for {model}" for name, model in named)
-    return [f"By their names, these are taken for models of the paper: {those}."] if named else []
+    return [f"Recognised as models of the paper, by name: {those}."] if named else []
 
 
 def is_of_authors_prompts(run: JudgedRun) -> bool:

@@ -115,7 +115,7 @@ def prompts(runs: Sequence[JudgedRun]) -> Section:
     """pass@1 of each prompt, and the published numbers."""
     unknown = ", ".join(run.name for run in runs if paper.model_of(run) is None)
     published = paper.published_sheet(runs)
-    nothing = f"No published numbers of {unknown}: no model of the paper is called so."
+    nothing = f"No published numbers for {unknown}: the paper has no model of that name."
     prose = Prose([nothing] if unknown and published.rows else [])
     return section("prompts", prompt_sheet(runs), published, prose)
 

@@ -30,7 +30,7 @@ from roboeval.report.sheets import (
 
 FORMATS = ("png", "pdf")
 PAGE = "index.html"
-UNFINISHED = ("This report is not finished; give the command again that writes it.",)
+UNFINISHED = ("This report is not finished; run its command again.",)
 HEAD = 4_000  # characters at the beginning of a page, among which is its generator
 
 
@@ -136,7 +136,7 @@ def expect_no_others(out: Path) -> None:
     others = sorted(one.name for one in out.iterdir() if not one.name.startswith("."))
     if others and not _is_report(out / PAGE):
         raise UserError(
-            f'is no report, but holds other files, such as "{others[0]}"; name a new folder', file=out
+            f'is not a report but contains other files such as "{others[0]}"; name a new folder', file=out
         )
 
 

@@ -70,7 +70,7 @@ def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911,
             return constant
         case ast.Name(name):
             if name not in names:
-                raise ExpressionError(f'nothing is called "{name}"; there is {", ".join(names)}')
+                raise ExpressionError(f'there is no name "{name}"; known are {", ".join(names)}')
             return names[name]
         case ast.Attribute(inner, name):
             return _part(_value(inner, names), name)
@@ -98,24 +98,22 @@ def _value(node: ast.expr, names: Names) -> Any:  # noqa: ANN401, C901, PLR0911,
             return [_value(element, each) for each in each_of(loop, names)]
         case ast.Call(ast.Name(name), [argument], []) if name in _FUNCTIONS:
             return _FUNCTIONS[name](_value(argument, names))
-    raise ExpressionError(f'"{ast.unparse(node)}" is more than an expression may be here')
+    raise ExpressionError(f'"{ast.unparse(node)}" is not allowed in an expression here')
 
 
 def _part(whole: Any, name: str) -> Any:  # noqa: ANN401 - of a fact
     if isinstance(whole, SimpleNamespace) and name in vars(whole):
         return getattr(whole, name)
-    raise ExpressionError(
-        f'".{name}" is nothing that can be known; of people and things it is their name or room'
-    )
+    raise ExpressionError(f'".{name}" is not an attribute; people and things have a name and a room')
 
 
 def each_of(loop: ast.comprehension, names: Names) -> Iterator[Names]:
     """The names in each turn of a loop such as `for person in people if person.room`."""
     if not isinstance(loop.target, ast.Name) or loop.is_async:
-        raise ExpressionError(f'"{ast.unparse(loop.target)}" is no single name; write for NAME in ...')
+        raise ExpressionError(f'"{ast.unparse(loop.target)}" is not a single name; write for NAME in ...')
     items = _value(loop.iter, names)
     if isinstance(items, str) or not isinstance(items, Iterable):
-        raise ExpressionError(f'"{ast.unparse(loop.iter)}" is no list')
+        raise ExpressionError(f'"{ast.unparse(loop.iter)}" is not a list')
     for item in items:
         each = {**names, loop.target.id: item}
         if all(_value(test, each) for test in loop.ifs):

@@ -61,6 +61,6 @@ def installed_folder(name: str) -> Path | None:
     if (Path(name) / "suite.yaml").is_file():
         raise UserError(
             f'"{name}" is a suite of the package {suites[0].package} and a folder here; '
-            f"write ./{name} for the folder, or go elsewhere for the package"
+            f"write ./{name} for the folder, or change the directory for the package"
         )
     return suites[0].folder()

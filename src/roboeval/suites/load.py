@@ -86,7 +86,7 @@ class Suite:
             UserError: its worlds are written by hand, or the number of worlds is out of its range.
         """
         if self.worlds is None or self.folder is None:
-            raise UserError(f'the worlds of the suite "{self.name}" are written by hand; it has no others')
+            raise UserError(f'the worlds of the suite "{self.name}" are written by hand; it draws none')
         if count is not None and not 1 <= count <= MOST_WORLDS:
             raise UserError(f"the number of worlds is {count}, but it must be from 1 to {MOST_WORLDS:,}")
         return _read_suite(
@@ -125,7 +125,7 @@ def load_suite(name: str | PathLike[str] = "paper", *, skills: SkillTable = SKIL
     folder = suite_folder(name)
     suite = _read_suite(folder, skills)
     if suite.name != name and not (Path(name) / "suite.yaml").is_file():
-        sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"; name both alike'
+        sentence = f'the suite is named "{suite.name}", but its package calls it "{name}"; use the same name'
         raise YamlFile.read(folder / "suite.yaml").wrong(sentence, "name")
     return suite
 
@@ -175,11 +175,11 @@ def _suite_of(
     file = YamlFile.read(folder / "suite.yaml")
     head = file.validate(SuiteFile)
     if head.name.endswith(ABLATED):
-        sentence = f'"{head.name}" ends as the files of an ablation do; choose a name without "{ABLATED}"'
+        sentence = f'"{head.name}" ends like the files of an ablation; choose a name without "{ABLATED}"'
         raise file.wrong(sentence, "name")
     paths = task_files(folder)
     if not paths:
-        raise UserError("the suite has no tasks; put one file a task there", file=folder / "tasks")
+        raise UserError("the suite has no tasks; add one file for each task", file=folder / "tasks")
     count, seed = count or head.worlds, head.seed if seed is None else seed
     documents = [YamlFile.read(path) for path in paths]
     words = head.rules.words_for_people

@@ -16,13 +16,13 @@ def new_task(folder: Path, name: str) -> Path:
     """Write the files of a new task, and of the suite if there is none; existing solutions stay."""
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", name):
         raise UserError(
-            f'"{name}" is no name for a task; write words together, each with a capital, such as WaterPlants'
+            f'"{name}" is not a task name; write it in capitalised words without spaces, such as WaterPlants'
         )
     if (folder.resolve().parent / "suite.yaml").exists():
         raise UserError("lies within a suite; name the folder around it", file=folder)
     path = folder / "tasks" / f"{name}.yaml"
     if path.exists():
-        raise UserError("is there already; choose another name, or edit it", file=path)
+        raise UserError("already exists; choose another name, or edit it", file=path)
     files = {
         folder / "suite.yaml": ("new-suite.yaml", _suite_name(folder)),
         folder / "solutions" / path.name: ("new-solutions.yaml", ""),

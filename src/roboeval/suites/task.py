@@ -110,7 +110,7 @@ def describe_person(person: Person) -> str:
     parts = [f"answers {', then '.join(map(_answer, person.answers)) or 'nothing'}"]
     parts += [f"{topic}: {_answer(answer)}" for topic, answer in person.topics]
     if person.after_looks:
-        parts.append(f"comes after {person.after_looks} looks in vain")
+        parts.append(f"comes after {person.after_looks} looks without success")
     if person.leaves:
         parts.append("then goes")
     return f"{person.name} ({'; '.join(parts)})"

@@ -108,7 +108,7 @@ def _phrases(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[
         if not any(f"{{{name}}}" in check.rtl for check in form.checks.values()):
             raise file.wrong(f'no check uses the phrases "{name}"; write {{{name}}} in one', "phrases", name)
         if quoted := next((regex for regex in regexes if '"' in regex), None):
-            raise file.wrong(f"{quoted} has a quotation mark; phrases are put between two", "phrases", name)
+            raise file.wrong(f"{quoted} has a quotation mark, which phrases cannot have", "phrases", name)
         phrases[name] = f"(?:{'|'.join(regexes)})"
     return phrases
 
@@ -132,11 +132,11 @@ class _Reader:
 
         match, body = _HEAD.fullmatch(head), self.form.checks[head]
         if match is None:
-            raise wrong(f'"{head}" is no head of a check; write name or name(p1, p2)')
+            raise wrong(f'"{head}" is not the head of a check; write name or name(p1, p2)')
         name = match[1]
         parameters = tuple(p.strip() for p in match[2].split(",")) if match[2] else ()
         if again := next((p for n, p in enumerate(parameters) if p in parameters[:n]), None):
-            raise wrong(f'the check "{name}" has two parameters "{again}"; name them apart')
+            raise wrong(f'the check "{name}" has two parameters "{again}"; rename one')
         for used in re.findall(r"\{([^\W\d]\w*)\}", body.rtl):
             if used not in parameters and used not in self.phrases:
                 known = f"its parameters are: {', '.join(parameters)}" if parameters else "it takes none"
@@ -194,7 +194,7 @@ class _Reader:
         try:
             formula = parse(f"not ({rtl})" if bare != text.strip() else rtl, skills=self.skills)
         except RtlSyntaxError as error:
-            sentence = f'the check "{name}" is no valid formula ({error})'
+            sentence = f'the check "{name}" is not a valid formula ({error})'
             raise UserError(sentence, file=self.file.name, line=check.line) from None
         return Requirement(text, name, formula, check.category, self.file.line(at))
 
@@ -210,5 +210,5 @@ class _Reader:
                 values = [a.value for a in arguments if isinstance(a, ast.Constant)]
                 if len(values) == len(arguments) and all(isinstance(value, str | int) for value in values):
                     return name, [*map(str, values)]
-        sentence = f'"{text}" is no requirement; write check, check("x", 2) or not check(...)'
+        sentence = f'"{text}" is not a requirement; write check, check("x", 2) or not check(...)'
         raise self.file.wrong(sentence, *at)

@@ -235,10 +235,10 @@ def _called(node: ast.expr, names: Names) -> str:
             return name
         case ast.Call(ast.Name(name), arguments, []):
             return f"{name}({', '.join(_written(value(argument, names)) for argument in arguments)})"
-    raise ExpressionError(f'"{ast.unparse(node)}" is no requirement; write check, check(x) or not check(x)')
+    raise ExpressionError(f'"{ast.unparse(node)}" is not a requirement; write check(x) or not check(x)')
 
 
 def _written(argument: object) -> str:
     if isinstance(argument, str | int) and not isinstance(argument, bool):
         return json.dumps(argument, ensure_ascii=False)
-    raise ExpressionError(f"an argument of a check is a text or a number, not {argument}")
+    raise ExpressionError(f"an argument of a check is a string or a number, not {argument}")

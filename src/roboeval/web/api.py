@@ -22,7 +22,7 @@ MOST = 1_000
 Chosen: TypeAlias = Annotated[Filter, Depends()]
 Evaluation: TypeAlias = Annotated[
     str | None,
-    Query(max_length=200, description="Which evaluation; by default the first that requires everything."),
+    Query(max_length=200, description="The evaluation; by default, the first that requires everything."),
 ]
 
 
@@ -47,8 +47,8 @@ def router(store: RunStore, all_runs: RunList) -> APIRouter:
         run: str,
         chosen: Chosen,
         evaluation: Evaluation = None,
-        offset: Annotated[int, Query(ge=0, description="How many are passed over.")] = 0,
-        limit: Annotated[int, Query(ge=1, le=MOST, description="How many are given.")] = 100,
+        offset: Annotated[int, Query(ge=0, description="How many to skip.")] = 0,
+        limit: Annotated[int, Query(ge=1, le=MOST, description="How many to return.")] = 100,
     ) -> Response:
         """Completions of a run, of a prompt, or those that failed in some way; in order, a part of them."""
         with _refusing():

@@ -28,7 +28,7 @@ from roboeval.web.snapshot import Filter, Snapshot
 from roboeval.web.widgets import ProgramView
 
 MOST_NAME, MOST_SENTENCE, MOST_INSTRUCTION = 80, 2_000, 5_000
-CHANGED = "The program was changed or removed after it was judged; the verdicts are on the earlier one."
+CHANGED = "The program was changed or removed after it was judged; the verdicts are about the earlier one."
 
 
 async def draw_completion(
@@ -174,4 +174,4 @@ def _draw_rooms(world: World) -> None:
         for room in world.rooms:
             inside = ", ".join([*map(describe_person, room.people), *room.objects])
             PlainText("dt", shortened(room.name, 200))
-            PlainText("dd", shortened(inside, 500) if inside else "nobody and nothing")
+            PlainText("dd", shortened(inside, 500) if inside else "empty")

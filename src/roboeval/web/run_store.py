@@ -21,7 +21,7 @@ from roboeval.web.snapshot import Snapshot
 
 MOST_HELD = 16  # evaluations that stay in memory
 REST = 10  # a run is not read again before this many times as long as reading it took
-OUTSIDE = "leads out of the folder of runs, so it is not read"
+OUTSIDE = "leads outside the folder of runs, so it is not read"
 
 Stamps: TypeAlias = tuple[tuple[int, ...] | None, ...]
 

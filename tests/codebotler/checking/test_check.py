@@ -3,11 +3,12 @@
 import json
 import re
 from collections.abc import Iterator
+from unittest.mock import Mock
 
 import pytest
 
 from codebotler.checking.check import check, check_on
-from codebotler.checking.problems import Check, Sample
+from codebotler.checking.problems import Check
 from codebotler.checking.sampled import MORE, CheckSettings
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Status
@@ -245,15 +246,15 @@ def test_waiting_at_several_lines_is_one_problem(checks: Checks) -> None:
     assert len(found.problems) == 1
 
 
-def test_what_waits_for_ever_without_a_look_is_run_once() -> None:
-    known: dict[RoomMap, list[Sample]] = {}
-    room_map = RoomMap(ROOMS, ROOMS[0])
+def test_what_waits_for_ever_without_a_look_is_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
     worker = Worker()
+    run = Mock(side_effect=worker.run)
+    monkeypatch.setattr(worker, "run", run)
     try:
-        found = check_on(worker, START + "while True:\n        time.sleep(1)\n", room_map, known=known)
+        found = check_on(worker, START + "while True:\n        time.sleep(1)\n", RoomMap(ROOMS, ROOMS[0]))
     finally:
         worker.close()
-    assert len(known[room_map]) == 1
+    assert run.call_count == 1
     assert len(found.samples) == 5
     assert "imagined worlds" not in found.problems[0].message
 
@@ -359,20 +360,6 @@ def test_other_seeds_draw_other_worlds_and_the_same_seed_the_same(checks: Checks
     first, again, other = (checks(*LOOKS, seed=seed).data()["samples"] for seed in (1, 1, 2))
     assert first == again
     assert first != other
-
-
-def test_runs_that_are_known_change_nothing() -> None:
-    source = START + "\n    ".join(WAITS) + "\n"
-    known: dict[RoomMap, list[Sample]] = {}
-    room_map = RoomMap(ROOMS, ROOMS[0])
-    worker = Worker()
-    try:
-        for seed in range(6):
-            alone = check_on(worker, source, room_map, CheckSettings(seed=seed))
-            assert check_on(worker, source, room_map, CheckSettings(seed=seed), known) == alone
-    finally:
-        worker.close()
-    assert len(known[room_map]) == 2
 
 
 def test_data_is_what_json_can_hold(checks: Checks) -> None:

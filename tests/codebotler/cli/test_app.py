@@ -104,7 +104,7 @@ def test_what_takes_long_says_that_it_goes_on(
 def test_guessed_rooms_are_said_to_be_guessed(files: Path) -> None:
     status, out, _ = codebotler("check", files / "bad.py")
     assert status == 1
-    guessed = re.search(r'^rooms, (.+): "kitchn", "start_loc"$', out, re.MULTILINE)
+    guessed = re.search(r'^rooms (.+): "kitchn", "start_loc"$', out, re.MULTILINE)
     assert guessed is not None
     assert "--world FILE" in out
     assert guessed[1] not in codebotler("check", files / "good.py", "--world", files / "world.yaml")[1]

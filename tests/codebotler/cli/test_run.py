@@ -141,7 +141,7 @@ def test_rooms_that_the_robot_does_not_know_are_told_before_it_moves(folder: Pat
     )
     status, out, err = run(folder, "careful.py", "--yes")
     assert status == 0
-    assert re.search('before it moves: .*"kitchn".*"kitchen"', err)
+    assert re.search('before the robot moves: .*"kitchn".*"kitchen"', err)
     assert shown(out)[0] == 'drives to "kitchn"'
 
 
@@ -169,7 +169,7 @@ def test_program_on_standard_input(folder: Path) -> None:
     [
         (["none.py", "--yes"], ["none.py: ", "no such file"]),
         (["-"], ["--yes"]),
-        (["", "--yes"], ["nothing", "asked"]),
+        (["", "--yes"], ["empty"]),
         (["good.py", "--robot", "simm"], ['"simm"', "sim, pyrobosim"]),
         (["no such thing", "--yes"], ["recorded:careful", '"no such thing"']),
     ],
@@ -427,7 +427,7 @@ def test_mission_is_written_as_mcap(folder: Path) -> None:
 def test_mcap_that_cannot_be_written_is_named(folder: Path) -> None:
     run(folder, "good.py", "--yes")
     status, _, err = ended(folder, "missions", "last", "--mcap", "/nowhere/one.mcap")
-    assert (status, err) == (2, "codebotler: /nowhere/one.mcap: No such file or directory\n")
+    assert (status, err) == (2, "codebotler: /nowhere: No such file or directory\n")
     program = (folder / "good.py").read_bytes()
     status, _, err = ended(folder, "missions", "last", "--mcap", "good.py")
     assert status == 2

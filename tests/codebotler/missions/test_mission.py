@@ -18,8 +18,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Room, World
 from codebotler.missions import mission as module
-from codebotler.missions.log import EVENTS, SUMMARY, Line, Summary, events_of
-from codebotler.missions.mission import STEPS, UNCONFIRMED, Mission, MissionError, State
+from codebotler.missions.log import EVENTS, STEPS, SUMMARY, Line, State, Summary, events_of
+from codebotler.missions.mission import UNCONFIRMED, Mission, MissionError
 from codebotler.missions.store import find, missions, recover
 from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation

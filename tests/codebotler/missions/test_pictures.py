@@ -13,9 +13,9 @@ from mcap.reader import make_reader
 
 from codebotler.missions import pictures as module
 from codebotler.missions.live import LiveRobot
-from codebotler.missions.log import Line, events_of
+from codebotler.missions.log import Line, State, events_of
 from codebotler.missions.mcap import write_mcap
-from codebotler.missions.mission import Mission, State
+from codebotler.missions.mission import Mission
 from codebotler.missions.pictures import Pictures, picture_of
 from codebotler.missions.wording import event_text
 from codebotler.robots.base import Argument, Feedback, Picture, Result, no_feedback

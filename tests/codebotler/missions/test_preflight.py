@@ -16,7 +16,8 @@ from codebotler.checking.check import check
 from codebotler.cli.run import Request
 from codebotler.cli.run import run as run_mission
 from codebotler.core.world import Room, World
-from codebotler.missions.mission import Mission, State
+from codebotler.missions.log import State
+from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight, unknown_rooms
 from codebotler.models.base import Heard, Reply, Usage, unheard
 from codebotler.prompts import Prompt

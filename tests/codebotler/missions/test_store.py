@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.missions.log import EVENTS, SUMMARY, Log, Summary, events_of
-from codebotler.missions.mission import Mission, State
+from codebotler.core.files import Appender
+from codebotler.missions.log import EVENTS, SUMMARY, State, Summary, events_of, log_of
+from codebotler.missions.mission import Mission
 from codebotler.missions.store import missions, recover
 
 IF_TOOL_DIES = "its worker cancelled the goal"
@@ -78,27 +79,29 @@ def test_mission_of_a_living_tool_is_left_alone(tmp_path: Path) -> None:
         assert recover(tmp_path) == []
         assert mission.state is State.DRAFTING
         with pytest.raises(BlockingIOError):
-            Log(mission.folder)
+            log_of(mission.folder)
     assert recover(tmp_path) == []
 
 
 @pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOSPC])
 def test_mission_that_cannot_be_closed_is_told_and_others_are(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], number: int
 ) -> None:
     for name in ("20260101-000001", "20260101-000002"):
         left(tmp_path, State.RUNNING, RUNNING, DRIVE).rename(tmp_path / "missions" / name)
 
-    def open_log(folder: Path) -> Log:
+    def open_log(folder: Path) -> Appender:
         if folder.name.endswith("1"):
             raise OSError(number, os.strerror(number), str(folder / EVENTS))
-        return Log(folder)
+        return log_of(folder)
 
-    monkeypatch.setattr("codebotler.missions.store.Log", open_log)
-    told: list[tuple[str, int | None]] = []
-    (summary,) = recover(tmp_path, lambda mission, error: told.append((mission, error.errno)))
+    monkeypatch.setattr("codebotler.missions.store.log_of", open_log)
+    (summary,) = recover(tmp_path)
     assert summary.state == "interrupted"
-    assert told == [("20260101-000001", number)]
+    unclosed, closed = capsys.readouterr().err.splitlines()
+    assert "20260101-000001" in unclosed
+    assert os.strerror(number) in unclosed
+    assert " was interrupted: " in closed
     assert [summary.state for summary in missions(tmp_path)] == ["running", "interrupted"]
 
 
@@ -124,7 +127,7 @@ WHOLE = {"id": "x", "state": "done", "robot": "sim", "created": 1.0}
 def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, State.DONE)
     (folder / SUMMARY).write_text(text)
-    with pytest.raises(UserError, match="no summary") as error:
+    with pytest.raises(UserError, match="not the summary") as error:
         missions(tmp_path)
     assert error.value.file == folder / SUMMARY
     assert recover(tmp_path) == [], "a robot can work nevertheless"
@@ -133,7 +136,8 @@ def test_summary_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None
 @pytest.mark.parametrize(
     "text",
     [
-        *("", "[]", "{}", '{"event": "skill"}', "nonsense", '{"event": 1, "time": 0}', "[" * 100_000),
+        *("[]", "{}", '{"event": "skill"}', "nonsense", '{"event": 1, "time": 0}', "[" * 100_000),
+        *('{"event": [], "time": 1, "clock": 1}', '{"event": "log", "time": 1, "clock": 1}'),
         *('{"event": "skill", "time": 1, "clock": 1}', '{"event": "log", "time": NaN, "clock": 1}'),
     ],
 )
@@ -141,7 +145,7 @@ def test_event_that_cannot_be_read_is_named(tmp_path: Path, text: str) -> None:
     folder = left(tmp_path, State.DONE, RUNNING)
     with (folder / EVENTS).open("a") as file:
         file.write(f"{text}\n")
-    with pytest.raises(UserError, match="no event") as error:
+    with pytest.raises(UserError, match=r"JSON|not an event") as error:
         events_of(folder)
     assert (error.value.file, error.value.line) == (folder / EVENTS, 2)
 

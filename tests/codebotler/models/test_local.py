@@ -248,7 +248,7 @@ def test_requests_that_wait_together_are_one_batch_and_fewer_where_memory_is_sma
     sizes, apart = run(ask(2))
     assert sizes == [6, 3, 1, 2, 3, 1, 2]
     assert [reply.text for reply in apart] == [reply.text for reply in together]
-    with pytest.raises(ModelError, match="memory is too small") as caught:
+    with pytest.raises(ModelError, match="not enough memory") as caught:
         run(ask(0))
     assert not caught.value.may_pass
 
@@ -299,7 +299,7 @@ def test_prompt_that_is_too_long_is_told(babbler: str) -> None:
 @pytest.mark.parametrize(
     ("path", "named"),
     [
-        ("./nowhere", ["./nowhere", "no such folder"]),
+        ("./nowhere", ["./nowhere", "no such model folder"]),
         ("{empty}", ["hf:{empty}", "loaded"]),
     ],
 )

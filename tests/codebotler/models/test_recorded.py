@@ -151,7 +151,7 @@ def test_unknown_instruction_is_told_with_the_closest_that_are_known_and_how_to_
 
 @pytest.mark.parametrize("name", ["", "gpt-5.1", ":a", "hf:", "completions: ", "openai-chat:"])
 def test_what_names_no_model_is_told_how_models_are_named(name: str) -> None:
-    with pytest.raises(UserError, match=r"no name of a model.* recorded"):
+    with pytest.raises(UserError, match=r"not the name of a model.* recorded"):
         open_model(name, SamplingSettings())
 
 

@@ -121,7 +121,7 @@ PASSING = {
     Fault.SERVER_ERROR: "status 500 (Something went wrong)",
     Fault.HUNG_UP: "(Server disconnected without sending a response)",
     Fault.CUT: "(peer closed connection without sending complete message body",
-    Fault.CUT_IN_ORDER: "broke off",
+    Fault.CUT_IN_ORDER: "cut off",
     Fault.ERROR_IN_STREAM: "The engine died",
     Fault.INVALID_JSON: "Unterminated string starting at",
     Fault.NOTHING: "base URL",

@@ -123,13 +123,13 @@ def boxed(*numbers: object) -> str:
 @pytest.mark.parametrize(
     ("reply", "fault"),
     [
-        ("", "no JSON"),
-        ("Yes, I see a mug.", "no JSON"),
-        (f"Here it is: {FOUND}", "no JSON"),
-        (FOUND + FOUND, "no JSON"),
-        ("[" * 5_000, "no JSON"),
-        ("1" * 6_000, "no JSON"),
-        ("true", "no JSON object"),
+        ("", "not a JSON object"),
+        ("Yes, I see a mug.", "not a JSON object"),
+        (f"Here it is: {FOUND}", "not a JSON object"),
+        (FOUND + FOUND, "not a JSON object"),
+        ("[" * 5_000, "not a JSON object"),
+        ("1" * 6_000, "not a JSON object"),
+        ("true", "not a JSON object"),
         ("{}", '"found"'),
         ('{"found": "true", "score": 1, "box": [0, 0, 1, 1]}', '"found"'),
         ('{"found": true, "score": "high", "box": [0, 0, 1, 1]}', '"score"'),
@@ -163,7 +163,7 @@ def test_model_is_told_what_was_wrong_and_asked_again(server: Server, detector: 
     _, _, said, again = second.body["messages"]
     assert said["content"] == boxed(12, 40, 300, 200)
     assert "[12.0, 40.0, 300.0, 200.0]" in again["content"]
-    assert "no JSON" in json.dumps(third.body["messages"][2:])
+    assert "not a JSON object" in json.dumps(third.body["messages"][2:])
 
 
 def test_model_that_never_answers_as_asked_is_an_error_in_a_sentence(
@@ -210,9 +210,9 @@ def test_server_that_is_busy_is_asked_again(server: Server, detector: Detector) 
 @pytest.mark.parametrize(
     ("name", "sentence"),
     [
-        ("recorded", "recorded sees no pictures"),
-        ("completions:m", "completions:m sees no pictures"),
-        ("", "no name of a model"),
+        ("recorded", "recorded does not accept pictures"),
+        ("completions:m", "completions:m does not accept pictures"),
+        ("", "not the name of a model"),
         ("nobody:m", '"nobody"'),
     ],
 )
@@ -225,5 +225,5 @@ def test_detector_without_its_libraries_says_what_to_install() -> None:
     try:
         import transformers  # noqa: F401, PLC0415 - whether it can be
     except ImportError:
-        with pytest.raises(UserError, match=r'pip install "codebotler\[transformers\]"'):
+        with pytest.raises(UserError, match=r"codebotler\[transformers\]"):
             open_detector("hf:owl")

@@ -90,8 +90,8 @@ def test_other_modes_become_colour(mode: str) -> None:
     ("data", "sentence"),
     [
         (b"", "empty"),
-        (b"no picture at all", "no JPEG, PNG or WebP file"),
-        (file_of(halves(), "GIF"), "no JPEG, PNG or WebP file"),
+        (b"no picture at all", "not a JPEG, PNG or WebP file"),
+        (file_of(halves(), "GIF"), "not a JPEG, PNG or WebP file"),
         (file_of(halves(), "JPEG")[:300], "broken or cut off"),
         (file_of(Image.effect_noise((200, 200), 50), "PNG")[:5_000], "broken or cut off"),
         (file_of(Image.new("RGB", (1, 1))), "1 x 1 pixels, too few"),
@@ -118,10 +118,10 @@ def test_every_cut_of_a_picture_is_refused_or_read() -> None:
 
 
 def test_missing_file_and_folder_are_said(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="No such file") as error:
+    with pytest.raises(UserError, match="no such file") as error:
         read_image(tmp_path / "none.jpg")
     assert error.value.file == tmp_path / "none.jpg"
-    with pytest.raises(UserError, match="cannot be read"):
+    with pytest.raises(UserError, match="is a folder"):
         read_image(tmp_path)
 
 
@@ -176,10 +176,10 @@ def test_compressed_picture_of_a_camera() -> None:
         (message("rgb8", b"\0\0\0", width=0), "too few"),
         (message("rgb8", b"\0\0\0", step=2**31), "is cut off"),
         ({"format": "jpeg", "data": ""}, "is empty"),
-        ({"format": "jpeg", "data": "AAAA"}, "no JPEG, PNG or WebP file"),
-        *(({"data": data}, "no message") for data in ("a", "!!", "é", None, 5)),
-        (message("rgb8", b"\0\0\0", data="AAAAA"), "no message"),
-        ({"ranges": []}, "no message"),
+        ({"format": "jpeg", "data": "AAAA"}, "not a JPEG, PNG or WebP file"),
+        *(({"data": data}, "not a message") for data in ("a", "!!", "é", None, 5)),
+        (message("rgb8", b"\0\0\0", data="AAAAA"), "not a message"),
+        ({"ranges": []}, "not a message"),
     ],
 )
 def test_bad_message_is_said_in_a_sentence(said: dict[str, object], sentence: str) -> None:

@@ -103,7 +103,7 @@ def test_model_that_fails_says_so(folder: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_what_is_no_detector_is_refused(tmp_path: Path, folder: Path) -> None:
-    with pytest.raises(UserError, match="no such folder"):
+    with pytest.raises(UserError, match="no such model folder"):
         open_detector(f"hf:{tmp_path / 'none'}")
     with pytest.raises(UserError, match="detector"):
         open_detector(f"hf:{tmp_path}")

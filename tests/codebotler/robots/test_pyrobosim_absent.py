@@ -8,12 +8,11 @@ import pytest
 
 from codebotler.core.errors import UserError
 from codebotler.core.world import Room, World
-from codebotler.robots.base import NotReadyError, Options, Robot
+from codebotler.robots.base import Options, Robot
 from codebotler.robots.open import all_readiness, open_robot
-from codebotler.robots.pyrobosim.robot import Pyrobosim
 
 WORLD = World((Room("hall"), Room("kitchen", ("mug",))), "hall")
-MEND = 'pip install "codebotler[pyrobosim]"'
+MEND = "pip install 'codebotler[pyrobosim]'"
 
 
 def test_what_is_missing_is_said_with_the_mend(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -21,16 +20,13 @@ def test_what_is_missing_is_said_with_the_mend(monkeypatch: pytest.MonkeyPatch) 
     (kind,) = (kind for kind in all_readiness() if kind.name == "pyrobosim")
     assert (kind.works, kind.mend) == (False, MEND)
     assert "pyrobosim" in kind.missing
-    robot = Pyrobosim(WORLD)
-    with pytest.raises(NotReadyError) as error:
-        robot.connect()
-    assert "pyrobosim" in error.value.sentence
+    with pytest.raises(UserError, match="pyrobosim") as error:
+        open_robot("pyrobosim", Options(world=WORLD))
     assert MEND in error.value.sentence
-    robot.cancel()
-    robot.disconnect()
 
 
-def test_it_is_opened_by_its_name_and_needs_a_world() -> None:
+def test_it_is_opened_by_its_name_and_needs_a_world(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _name: object())
     robot: Robot = open_robot("pyrobosim", Options(world=WORLD, speed=3))
     assert (robot.name, robot.address, robot.clock.speed) == ("pyrobosim", "", 3)
     with pytest.raises(UserError, match="--world FILE"):

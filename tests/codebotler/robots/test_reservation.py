@@ -8,10 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.robots.base import NotReadyError
+from codebotler.robots.base import NotReadyError, Options
+from codebotler.robots.open import open_robot
 from codebotler.robots.reservation import Reservation, endpoint, lock_folder
-from codebotler.robots.ros1.robot import Ros1
-from codebotler.robots.rosbridge.robot import Rosbridge
 from doubles import Answering
 
 
@@ -40,9 +39,12 @@ def test_addresses_of_one_robot_are_one(address: str) -> None:
     ],
 )
 def test_names_of_this_machine_are_one(host: str) -> None:
-    assert endpoint(Ros1(f"http://{host}:11311/").address) == "http://127.0.0.1:11311"
-    assert endpoint(Rosbridge(f"ws://{host}").address) == "ws://127.0.0.1:80"
-    assert endpoint(Rosbridge().address) == "ws://127.0.0.1:9090"
+    assert (
+        endpoint(open_robot("ros1", Options(address=f"http://{host}:11311/")).address)
+        == "http://127.0.0.1:11311"
+    )
+    assert endpoint(open_robot("rosbridge", Options(address=f"ws://{host}")).address) == "ws://127.0.0.1:80"
+    assert endpoint(open_robot("rosbridge").address) == "ws://127.0.0.1:9090"
 
 
 @pytest.mark.parametrize("address", ["nonsense", "", "ws://", "ws://robot:a", "ws://[::1", "ftp://robot"])

@@ -14,8 +14,8 @@ from codebotler.core.errors import UserError
 from codebotler.core.world import Person, Room, World
 from codebotler.robots.base import CancelledError, Options, Picture, Robot
 from codebotler.robots.open import all_readiness, open_robot
-from codebotler.robots.ros1.robot import MEND
-from codebotler.robots.ros2.robot import mend_of
+from codebotler.robots.ros.ros1 import MEND
+from codebotler.robots.ros.ros2 import mend_of
 from codebotler.robots.simulated import METRES_PER_SECOND, Simulated
 from codebotler.simulator.robot import RobotError
 

@@ -87,7 +87,7 @@ def test_an_option_that_is_no_text() -> None:
     trace = (Event("ask", "how many?", (Option("one"), Option("[2,\n 3]", is_text=False))),)
     why = explain(parse('tr.Exists(ask("many", "x"))'), trace)
     assert why is not None
-    assert why.sentence.startswith("option 2 of the question at step 1 is no text but [2, 3], so")
+    assert why.sentence.startswith("option 2 of the question at step 1 is not a string but [2, 3], so")
     assert why.event == 0
 
 

@@ -389,4 +389,4 @@ def test_the_example_of_the_paper(events: list[Event], when_yes: bool, when_no: 
 def test_what_cannot_be_judged_travels_between_processes() -> None:
     error = pickle.loads(pickle.dumps(Inconclusive(4, 1, THREE)))
     assert (error.event, error.number, error.option) == (4, 1, THREE)
-    assert str(error) == "option 2 of the question at step 5 is no text: 3"
+    assert str(error) == "option 2 of the question at step 5 is not a string: 3"

@@ -208,7 +208,7 @@ def test_world_files_say_so_and_are_written_so(tmp_path: Path) -> None:
     ("good", "bad", "problem"),
     [
         ("option: 2", "option: 0", "there is no option 0"),
-        ("tea:", "'(':", "no valid regular expression"),
+        ("tea:", "'(':", "not a valid regular expression"),
         ("after_looks: 3", "after_looks: -3", "line 9"),
     ],
 )

@@ -12,8 +12,9 @@ import pytest
 
 from codebotler.checking.problems import Check
 from codebotler.core.world import Room, World
-from codebotler.missions.mission import Mission, MissionError, State
-from codebotler.missions.store import missions, summary_of
+from codebotler.missions.log import State, Summary
+from codebotler.missions.mission import Mission, MissionError
+from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
@@ -101,7 +102,7 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
         view = until(console, lambda view: view.is_over)
         assert view.state is State.DONE
         assert [m.text for m in view.progress.moments if m.kind == "says"] == ["hello"]
-        assert [line["event"] for line in console.events()][-1] == "state"
+        assert [line["event"] for line in session.events()][-1] == "state"
     (summary,) = missions(tmp_path)
     assert (summary.state, summary.model, summary.instruction) == (
         "done",
@@ -154,7 +155,7 @@ def test_an_edited_program_is_checked_again_and_the_last_one_counts(console: Con
     view = until(console, lambda view: view.check is not None)
     assert view.program.endswith("say('4')\n")
     assert not view.busy
-    assert summary_of(console.home / "missions" / view.id).program == view.program
+    assert Summary.read(console.home / "missions" / view.id).program == view.program
 
 
 def test_a_program_can_be_edited_while_the_robot_is_connected(
@@ -174,7 +175,7 @@ def test_a_program_can_be_edited_while_the_robot_is_connected(
         go_on.set()
         view = until(console, lambda view: view.check is not None)
         assert (view.program, view.problems) == (HELLO, ())
-        assert summary_of(console.home / "missions" / view.id).program == HELLO
+        assert Summary.read(console.home / "missions" / view.id).program == HELLO
 
 
 def test_a_stop_while_the_robot_is_connected_ends_all_before_it_moves(
@@ -288,7 +289,7 @@ def test_a_stop_waits_for_no_check(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 def test_missions_that_a_dead_tool_left_are_told_of(tmp_path: Path) -> None:
     mission = Mission(tmp_path, "simulated")
     mission.draft(HELLO)
-    mission._log.close()
+    mission._close()
     with desk_of(tmp_path) as console:
         assert [summary.id for summary in console.interrupted] == [mission.id]
         assert "ended unexpectedly" in console.interrupted[0].reason
@@ -304,8 +305,8 @@ def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("order", "told"),
     [
-        (Order("   ", "author"), "nothing"),
-        (Order("say hello"), "nothing"),
+        (Order("   ", "author"), "instruction is empty"),
+        (Order("say hello"), "instruction is empty"),
         (Order(program="#" * (MOST_PROGRAM + 1)), "too many"),
     ],
 )
@@ -342,7 +343,8 @@ def test_one_robot_answers_while_another_viewer_sleeps(tmp_path: Path) -> None:
         view = until(console, lambda view: view.is_over)
         assert view.state is State.DONE
         assert len(view.progress.moments) == 200
-        assert len(console.events()) > 900
+        assert console.session is not None
+        assert len(console.session.events()) > 900
 
 
 def test_a_digest_tells_programs_apart() -> None:

@@ -16,8 +16,8 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from codebotler.core.world import Room, World
-from codebotler.missions.log import events_of
-from codebotler.missions.mission import UNCONFIRMED, State
+from codebotler.missions.log import State, events_of
+from codebotler.missions.mission import UNCONFIRMED
 from codebotler.missions.store import missions
 from codebotler.missions.view import SessionView
 from codebotler.robots.face import Face, Question

@@ -103,7 +103,7 @@ def test_programs_that_are_gone() -> None:
     (one,) = clusters([group], results)
     assert one.program is None
     assert one.fix is None
-    assert "no longer stands" in printed(cluster_view(one), width=200)
+    assert "no longer in this run" in printed(cluster_view(one), width=200)
 
 
 def test_only_the_world_that_decides_keeps_its_trace() -> None:

@@ -54,7 +54,7 @@ def test_verdicts() -> None:
         return verdict(compared(a, b), ("one", "two"))
 
     assert "equally" in said([0.0] * 4, 4)
-    assert "two is better than one by 10.0 points; tasks" in said([0.1] * 10, 10)
+    assert "two is better than one by 10.0 points (p ≤" in said([0.1] * 10, 10)
     assert "one is better than two by 10.0 points on prompts of these tasks" in said([-0.1] * 10, 2)
     assert "chance" in said([0.3, -0.2], 2)
     assert said([0.1, 0.2, -0.3], 3) == said([0.0] * 4, 4)  # but for the last digit

@@ -152,7 +152,7 @@ def test_runs_about_different_prompts_are_warned_of() -> None:
     more = changed({"Visit": (1, 1)}, {"Visit": (1, 1)}, name="c")
     assert said_of_prompts([one, other]) == []
     (warning,) = said_of_prompts([one, more])
-    assert "same prompts" in warning
+    assert "different prompts" in warning
 
 
 def test_what_a_model_wrote_and_is_called_does_no_harm() -> None:

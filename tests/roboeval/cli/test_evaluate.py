@@ -53,7 +53,7 @@ def test_a_line_that_is_no_json(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + "{oops\n" + row(1))
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
-    assert "no JSON;" in refusal.sentence
+    assert "not JSON;" in refusal.sentence
     example = json.loads(refusal.sentence[refusal.sentence.index("{") :])
     assert example.keys() == {"task", "prompt", "index", "program"}
 
@@ -62,7 +62,7 @@ def test_a_last_line_that_is_no_json_and_has_no_end(tmp_path: Path) -> None:
     (tmp_path / "a.jsonl").write_text(row() + '{"task": "SayGoodDay", "program": "x')
     refusal = refused("evaluate", "a.jsonl", cwd=tmp_path)
     assert refusal.at == ("a.jsonl", 2)
-    assert "no JSON;" in refusal.sentence
+    assert "not JSON;" in refusal.sentence
 
 
 def test_a_program_is_no_file_of_completions(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_a_zip_with_a_damaged_member(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_bytes(data)
     refusal = refused("evaluate", "a.zip", cwd=tmp_path)
     assert refusal.at == ("a.zip", None)
-    assert "no readable zip" in refusal.sentence
+    assert "not a readable zip" in refusal.sentence
 
 
 def test_a_line_that_is_no_object(tmp_path: Path) -> None:
@@ -204,7 +204,7 @@ def test_a_zip_that_is_none(tmp_path: Path) -> None:
     (tmp_path / "a.zip").write_text("hello")
     refusal = refused("evaluate", "a.zip", cwd=tmp_path)
     assert refusal.at == ("a.zip", None)
-    assert "no readable zip" in refusal.sentence
+    assert "not a readable zip" in refusal.sentence
 
 
 def test_a_file_that_swells_in_a_zip(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def test_other_settings_are_refused_in_a_sentence(tmp_path: Path) -> None:
         (("--temperature", "-1"), ["temperature", "-1", "0 and 100"]),
         (("--num-completions", "0"), ["invalid value", "'--num-completions'"]),
         (("--concurrency", "0"), ["invalid value", "'--concurrency'"]),
-        (("--out", ""), ["nothing", "a run"]),
+        (("--out", ""), ["empty", "a run"]),
         (("--base-url", "http://me:secret@localhost/v1"), ["base URL", "password"]),
     ],
 )

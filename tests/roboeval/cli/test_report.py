@@ -105,7 +105,7 @@ def test_runs_of_different_suites_are_not_set_side_by_side(runs: Path) -> None:
     ended = roboeval("report", "hasty", "careful", "--out", "mixed", cwd=runs)
     head.write_text(kept)
     assert ended.status == 2
-    assert re.search(r"other content \(ffffffff and [0-9a-f]{8}\)", ended.err), ended
+    assert re.search(r"versions of a suite \(ffffffff and [0-9a-f]{8}\)", ended.err), ended
     assert "`roboeval evaluate careful --tasks LunchTime,SayGoodDay --redo`" in ended.err
     assert not (runs / "mixed").exists()
 

@@ -190,11 +190,11 @@ def test_what_was_not_recorded_is_said_and_not_taken_from_the_suite(written: Com
     text = printed(completion_view(row(completion(), FINE), written, SUITE))
     assert ("instruction not recorded" in text) == (written is not None)
     assert "Visit Amy." not in text
-    assert ("no longer stands" in text) == (written is None)
+    assert ("no longer in this run" in text) == (written is None)
 
 
 def test_of_a_prompt_it_is_said_what_is_gone_and_what_was_not_recorded() -> None:
-    gone, unknown = "no longer stand in this run", "instruction not recorded"
+    gone, unknown = "programs are no longer in this run", "instruction not recorded"
     for written, told, untold in ([], gone, unknown), (THREE[:1], unknown, gone):
         for text in (
             printed(task_view(task_data(results(ROWS, written), "Visit"))),

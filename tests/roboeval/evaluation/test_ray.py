@@ -284,5 +284,5 @@ def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
     assert there == here
     nodes.kill()
     monkeypatch.setattr(rayengine, "PATIENCE_S", 1)
-    with pytest.raises(EngineError, match="no core"):
+    with pytest.raises(EngineError, match="no free core"):
         list(cluster.map_distinct(lambda _, work: work[1], numbered(range(2)), int))

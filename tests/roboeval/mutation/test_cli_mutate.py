@@ -129,7 +129,7 @@ def test_programs_that_a_user_names(tmp_path: Path) -> None:
 def test_a_right_program_that_the_suite_finds_wrong(small: Path) -> None:
     ended = mutate("--suite", small, "--brief", cwd=small)
     assert ended.status == 0, ended
-    assert re.findall(r"^not right, .*: (T, .*)$", ended.err, re.MULTILINE) == [
+    assert re.findall(r"^not mutated, .*: (T, .*)$", ended.err, re.MULTILINE) == [
         "T, broken (one: SyntaxError)",
         "T, idle (one: goes)",
     ]
@@ -163,7 +163,7 @@ def test_an_equivalent_mutant_is_not_shown_again(small: Path) -> None:
         (("SayGoodNight",), ['"paper"', '"SayGoodNight"']),
         (("SayGoodDay", "--worlds", "200"), ["worlds", '"paper"', "written out"]),
         (("SayGoodDay", "--suite", "plus", "--worlds", "1000000000"), ["invalid value", "'--worlds'"]),
-        (("SayGoodDay", "--out", ""), ["nothing", "a folder"]),
+        (("SayGoodDay", "--out", ""), ["empty", "a folder"]),
         (("SayGoodDay", "--suite", "nowhere"), ['"nowhere"']),
     ],
 )

@@ -38,12 +38,12 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
         ("goes:", "2 goes:", 5, '"2 goes"'),
         ("says(what)", '"says(what, )"', 6, '"says(what, )"'),
         ("says(what)", '"says(what, what)"', 6, 'two parameters "what"'),
-        ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is no valid formula'),
-        ("goto(", "gote(", 5, 'the check "goes" is no valid formula'),
+        ('"kitchen"))', '"kitchen")', 5, 'the check "goes" is not a valid formula'),
+        ("goto(", "gote(", 5, 'the check "goes" is not a valid formula'),
         ("[goes,", "[gose,", 11, 'no check "gose"'),
         ("[goes,", '[goes("x"),', 11, 'the check "goes" takes no argument'),
-        ('says("bye")', "says(bye)", 11, "no requirement"),
-        ('says("bye")', 'says(what="bye")', 11, "no requirement"),
+        ('says("bye")', "says(bye)", 11, "not a requirement"),
+        ('says("bye")', 'says(what="bye")', 11, "not a requirement"),
         (
             'says("bye")]\n',
             'says("bye")]\n    ablation: []\n  - {about: b, robot: r, rooms: [r], require: [goes]}\n',
@@ -71,7 +71,7 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
             "prompts: [p]",
             'prompts: [p]\nfacts:\n  - {fact: f, words: ["("]}',
             5,
-            '"(", but it is no valid regular expression',
+            '"(", but it is not a valid regular expression',
         ),
         ("summary: s", "summary: s\nsummary: t", 3, '"summary"'),
         ("summary: s", "summary: [s", 3, "YAML"),
@@ -178,7 +178,7 @@ def test_a_new_task_is_whole_and_stays_when_it_is_started_again(tmp_path: Path) 
 
 @pytest.mark.parametrize("name", ["../x", "", "makeTea", "Make Tea", "Make-Tea", "Tee\n", "T\u00e4ufer"])
 def test_a_bad_name_for_a_task(tmp_path: Path, name: str) -> None:
-    with pytest.raises(UserError, match="name for a task"):
+    with pytest.raises(UserError, match="not a task name"):
         new_task(tmp_path, name)
     assert not [*tmp_path.iterdir()]
 

@@ -155,7 +155,7 @@ def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list
         ('"*.in": nowhere', '"kim.in": hall', 14, '"kim.in" names can be "hall"'),
         ("counts(cups) if cups", "counts(cup) if cups", 31, '"cup"'),
         ("not counts(3)", "not counts(here)", 32, "argument"),
-        ("not counts(3)", "not 3", 32, "no requirement"),
+        ("not counts(3)", "not 3", 32, "not a requirement"),
         ("not counts(3)", "counts(3", 32, "cannot be read"),
         ("not counts(3)", "missing(3)", 32, '"missing"'),
         ('p.topics["tea"]', 'p.topics["milk"]', 18, "cannot be computed"),

@@ -335,5 +335,5 @@ def test_a_folder_without_runs_is_said(tmp_path: Path, server: PageServer) -> No
     empty = tmp_path / "runs"
     empty.mkdir()
     with serving(empty) as without:
-        assert re.match(rf"{empty} .*\bno run\b.*\n", without.said)
-    assert "no run" not in server.said
+        assert re.match(rf"{empty} .*\bno runs\b.*\n", without.said)
+    assert "no runs yet" not in server.said

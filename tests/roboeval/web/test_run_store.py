@@ -140,7 +140,7 @@ def test_a_row_that_was_written_anew_is_not_shown_for_another(runs: Path) -> Non
     run, rows = RunStore(runs).open("hasty"), Run(runs / "hasty").rows("paper")
     assert run.results.row(("LunchBreak", 2, 1))["index"] == 1
     rows.write_bytes(b"".join(rows.read_bytes().splitlines(keepends=True)[1:]))
-    with pytest.raises(UserError, match="anew"):
+    with pytest.raises(UserError, match="replaced"):
         run.results.row(("LunchBreak", 2, 1))
 
 

@@ -8,25 +8,13 @@ from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias, assert_never
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.rtl.formula import (
-    ActAtFirst,
-    ActAtSome,
-    And,
-    AtLeast,
-    Count,
-    EventPattern,
-    Exists,
-    Formula,
-    Not,
-    Or,
-    Scope,
-)
+from codebotler.rtl import formula as rtl
 
 MOST_STATES = 1_000
 """States that an automaton may have before it is minimized."""
 
 State: TypeAlias = Hashable
-Letter: TypeAlias = frozenset[EventPattern]
+Letter: TypeAlias = frozenset[rtl.EventPattern]
 """The elements of a formula that match an event."""
 
 
@@ -43,7 +31,7 @@ class Automaton:
 
     @classmethod
     @lru_cache(maxsize=1_000)  # worlds of a task have most requirements in common
-    def of(cls, formula: Formula, letters: tuple[Letter, ...]) -> Automaton:
+    def of(cls, formula: rtl.Formula, letters: tuple[Letter, ...]) -> Automaton:
         """The automaton of a formula, reading these letters."""
         machine = _machine(formula)
         number: dict[State, int] = {machine.start: 0}
@@ -93,24 +81,28 @@ class _Machine(NamedTuple):
     accepts: Callable[[Any], bool]
 
 
-def _machine(formula: Formula) -> _Machine:
+def _machine(formula: rtl.Formula) -> _Machine:
     match formula:
-        case And(parts) | Or(parts):
-            return _together([*map(_machine, parts)], all if isinstance(formula, And) else any)
-        case Not(part):
+        case rtl.And(parts) | rtl.Or(parts):
+            return _together([*map(_machine, parts)], all if isinstance(formula, rtl.And) else any)
+        case rtl.Not(part):
             start, step, accepts = _machine(part)
             return _Machine(start, step, lambda state: not accepts(state))
-        case ActAtFirst():
+        case rtl.ActAtFirst():
             arrival = formula.arrival
-            stay = (*formula.scopes, Scope("AfterFirst", arrival), Scope("BeforeFirst", formula.departure))
-            return _machine(And((Exists(arrival, formula.scopes), Exists(formula.element, stay))))
-        case ActAtSome():
+            stay = (
+                *formula.scopes,
+                rtl.Scope("AfterFirst", arrival),
+                rtl.Scope("BeforeFirst", formula.departure),
+            )
+            return _machine(rtl.And((rtl.Exists(arrival, formula.scopes), rtl.Exists(formula.element, stay))))
+        case rtl.ActAtSome():
             machine = _during_stays(formula)
-        case Exists(element):
+        case rtl.Exists(element):
             machine = _counter(element, 1, 1)
-        case AtLeast(element, number):
+        case rtl.AtLeast(element, number):
             machine = _counter(element, number, number)
-        case Count(element, number):
+        case rtl.Count(element, number):
             machine = _counter(element, number, number + 1)
         case _:
             assert_never(formula)
@@ -127,11 +119,11 @@ def _together(machines: Sequence[_Machine], join: Callable[[list[bool]], bool]) 
     )
 
 
-def _counter(element: EventPattern, number: int, most: int) -> _Machine:
+def _counter(element: rtl.EventPattern, number: int, most: int) -> _Machine:
     return _Machine(0, lambda n, letter: min(n + (element in letter), most), lambda n: n == number)
 
 
-def _during_stays(test: ActAtSome) -> _Machine:
+def _during_stays(test: rtl.ActAtSome) -> _Machine:
     def step(state: str, letter: Letter) -> State:
         stays = state == "there" and test.departure not in letter
         if state == "done" or (stays and test.element in letter):
@@ -141,7 +133,7 @@ def _during_stays(test: ActAtSome) -> _Machine:
     return _Machine("away", step, lambda state: state == "done")
 
 
-def _within(scope: Scope, inner: _Machine) -> _Machine:
+def _within(scope: rtl.Scope, inner: _Machine) -> _Machine:
     """The machine that lets an inner one read only the events in a scope."""
     at, (start, step, accepts) = scope.element, inner
     match scope.name:

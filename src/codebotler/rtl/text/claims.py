@@ -150,7 +150,7 @@ def minutes(time: str) -> TimeOfDay:
     """A time such as `11:30` in minutes since midnight; a ValueError if it is none."""
     match = re.fullmatch(r"(\d\d?):(\d\d)", time)
     if match is None or int(match[1]) > 24 or int(match[2]) > 59:  # noqa: PLR2004 - hours and minutes
-        raise ValueError(f'"{time}" is no time of day such as "11:30"')
+        raise ValueError(f'"{time}" is not a time of day such as "11:30"')
     return int(match[1]) * 60 + int(match[2])
 
 

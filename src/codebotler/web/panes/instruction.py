@@ -38,7 +38,7 @@ class InstructionPane:
         with ui.element("section").classes("pane instruct").props('aria-labelledby="h-instruct"'):
             PlainText("h2", "Instruct").props("id=h-instruct")
             self._text = (
-                ui.textarea("What is the robot to do?")
+                ui.textarea("What should the robot do?")
                 .props('outlined autogrow input-class="words" maxlength=200000 dir=auto')
                 .on("keydown.ctrl.enter", self._ask)
             )

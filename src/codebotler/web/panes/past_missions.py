@@ -11,26 +11,15 @@ from nicegui import html, ui
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened, visible
 from codebotler.core.words import counted
-from codebotler.missions.log import Line, Summary, events_of
-from codebotler.missions.mission import State
-from codebotler.missions.store import find, missions, summary_of
+from codebotler.missions.log import Line, State, Summary, events_of
+from codebotler.missions.store import find, missions
 from codebotler.missions.wording import event_text
 from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText
 
 MOST, MOST_EVENTS = 200, 1_000
-STEPS: Mapping[str, str] = {
-    State.DRAFTING: "Program written",
-    State.CHECKED: "Checked",
-    State.APPROVED: "Approved",
-    State.RUNNING: "Started",
-    State.DONE: "Done",
-    State.FAILED: "Failed",
-    State.STOPPING: "Stopping",
-    State.STOPPED: "Stopped",
-    State.INTERRUPTED: "Interrupted",
-}
-"""How the timeline names the states of a mission."""
+STEPS: Mapping[str, str] = {State.DRAFTING: "Program written", State.RUNNING: "Started"}
+"""How the timeline names states of a mission, but for those that speak for themselves."""
 
 
 def add(console: Console, frame: Frame) -> None:
@@ -69,7 +58,7 @@ def in_words(line: Line, *, is_first: bool) -> str:
     event = line["event"]
     if event == "state":
         state, reason = line["state"], shortened(line.get("reason", ""))
-        step = "Mission created" if is_first else STEPS.get(state, visible(state))
+        step = "Mission created" if is_first else STEPS.get(state, visible(state).capitalize())
         if state == State.CHECKED:
             problems = len(line.get("problems", ()))
             step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"
@@ -80,7 +69,7 @@ def in_words(line: Line, *, is_first: bool) -> str:
 
 def _read(console: Console, mission: str) -> tuple[Summary, list[Line]]:
     folder = find(console.home, mission)
-    return summary_of(folder), events_of(folder)
+    return Summary.read(folder), events_of(folder)
 
 
 def _row(summary: Summary) -> None:
@@ -114,6 +103,6 @@ def _show(summary: Summary, events: list[Line]) -> None:
                     PlainText("small", f"{line['clock']:.1f} s" if line["clock"] else "")
                     PlainText("span", words, "text")
     if len(events) > MOST_EVENTS:
-        PlainText("p", f"{len(events) - MOST_EVENTS:,} more are in the files.", "quiet")
+        PlainText("p", f"{len(events) - MOST_EVENTS:,} more events are in the files.", "quiet")
     PlainText("h2", "Program")
     PlainText("pre", summary.program, "source").props("tabindex=0")

@@ -15,7 +15,8 @@ from nicegui.events import GenericEventArguments
 from codebotler.checking.problems import Check
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
-from codebotler.missions.mission import MissionError, State
+from codebotler.missions.log import State
+from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
 from codebotler.web.frame import Button, PlainText, scroll_up, warn

@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from codebotler.core.world import Room, World, laid_out
-from codebotler.missions.mission import State
+from codebotler.missions.log import State
 from codebotler.missions.progress import Moment
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
@@ -18,12 +18,6 @@ HEADLINES = {
     State.DRAFTING: "The program is being written",
     State.CHECKED: "Ready: waiting for your approval",
     State.APPROVED: "Starting",
-    State.RUNNING: "Running",
-    State.DONE: "Done",
-    State.FAILED: "Failed",
-    State.STOPPING: "Stopping",
-    State.STOPPED: "Stopped",
-    State.INTERRUPTED: "Interrupted",
 }
 SPOKEN = {"says": "said", "asks": "asked", "hears": "heard"}
 MOST_MOMENTS = 60
@@ -54,7 +48,7 @@ class RobotPane:
         """Show a view."""
         progress = view.progress
         state = view.state
-        headline = HEADLINES[state]
+        headline = HEADLINES.get(state) or str(state).capitalize()
         if state is None and view.busy and not view.is_over:
             headline = "Starting"
         self._state.say(headline)

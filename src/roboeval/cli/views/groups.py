@@ -86,12 +86,12 @@ def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, ti
     of = "prompt" if hopeless == 1 else "prompts"
     return Group(
         Text(visible(title), style="bold"),
-        Text("a program that the check rejects is asked for again, so many times at most; that gives:"),
+        Text("results if each program that the check rejects is requested again:"),
         Text(),
         table,
         Text(),
         Text("pass@1 ≥ x: the share of prompts whose pass@1 is x or better", style="dim"),
-        Text("accepted: the share of programs, at the end, that the check accepts", style="dim"),
-        Text("run at all: the share that runs without an error in all the worlds of its task", style="dim"),
+        Text("accepted: the share of final programs that the check accepts", style="dim"),
+        Text("run at all: the share that runs without an error in all worlds of its task", style="dim"),
         *([Text(f"no completion of {hopeless} {of} is accepted")] if hopeless else []),
     )

@@ -20,7 +20,7 @@ from roboeval.evaluation.explanation import NOT_RECORDED
 from roboeval.evaluation.failures import label_of, plural_of
 from roboeval.evaluation.runs.completions import how_many
 
-ALL_GONE = "the programs that were judged no longer stand in this run"
+ALL_GONE = "the judged programs are no longer in this run"
 
 
 def summary_view(summary: Summary, *, title: str) -> RenderableType:
@@ -33,7 +33,7 @@ def summary_view(summary: Summary, *, title: str) -> RenderableType:
     if n < (total := summary.scope.total):
         parts.append(Text(f"{n:,} of {how_many(total)} judged", style="yellow"))
     elif n > total:
-        parts.append(Text(f"{how_many(n)} judged, but only {total:,} there now", style="yellow"))
+        parts.append(Text(f"{how_many(n)} judged, but only {total:,} are there now", style="yellow"))
     parts += [Text(), _TaskTable(summary), Text(), *_overall(summary), *_missed(summary.missing)]
     if failed:
         told = f"{failed:,} of {how_many(n)} failed ({failed / n:.1%}); shares are of all completions:"

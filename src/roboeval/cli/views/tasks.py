@@ -60,7 +60,7 @@ def _world_lines(scenario: Scenario) -> Iterator[RenderableType]:
     for room in world.rooms:
         there = [*room.objects, *map(describe_person, room.people)]
         there += ["the robot"] if room.name == world.robot else []
-        yield Text(f"{room.name}: {', '.join(there) or 'nobody and nothing'}")
+        yield Text(f"{room.name}: {', '.join(there) or 'empty'}")
     if world.may_wait_forever:
         yield Text("a program may wait here for ever", "italic")
     yield from (_Formula(f"requires {requirement.text}") for requirement in scenario.require)

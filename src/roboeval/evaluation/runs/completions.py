@@ -138,7 +138,7 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
     if row is None:
         if growing and not line.endswith(b"\n"):
             return None
-        raise UserError(f"this line is no JSON; a row looks like {EXAMPLE}")
+        raise UserError(f"this line is not JSON; a row looks like {EXAMPLE}")
     completion = Completion.of(row)
     if 2 * len(line) > MAX_ROW:  # else it stays short enough, however it is written
         check_length(row, None)
@@ -151,13 +151,13 @@ def _expect_new(key: Key, seen: dict[tuple[str, int], dict[int, int]], number: i
     task, prompt, index = key
     first_line = seen[sys.intern(task), prompt].setdefault(index, number)
     if first_line != number:
-        raise UserError(f"{name_of(key)} stands here again; it stood in line {first_line} already")
+        raise UserError(f"{name_of(key)} is here again; it was already in line {first_line} already")
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
     """Raise UserError if a row would be too long to be read again once it is copied into a run."""
     if len(to_line(row)) > MAX_ROW:
-        sentence = f"as a row this is longer than {MAX_ROW:,} bytes; shorten the program"
+        sentence = f"this row is longer than {MAX_ROW:,} bytes; shorten the program"
         raise UserError(sentence, file=str(file), line=line)
 
 

@@ -42,7 +42,7 @@ class Source:
 def open_source(text: str, suite: Suite) -> Source:
     """Read a run folder, a .jsonl file or pipe, a folder or zip of published .py, or `recorded:NAME`."""
     if not text:
-        raise UserError("nothing is named; name a run, a .jsonl, or a folder or zip of .py")
+        raise UserError("the argument is empty; name a run, a .jsonl, or a folder or zip of .py")
     path = Path(text)
     if text.partition(":")[0] == "recorded" and not path.exists():
         return Source([*recorded_completions(text, suite)])
@@ -120,7 +120,7 @@ class Run:
             raise UserError(f"cannot be written ({error.strerror})", file=self.path) from None
         if not _locked(descriptor):
             os.close(descriptor)
-            raise UserError("another process is writing this run; wait until it has ended", file=self.path)
+            raise UserError("another process is writing this run; wait until it has finished", file=self.path)
         try:
             for folder in made:
                 sync_folder(folder.parent)
@@ -158,7 +158,8 @@ class Run:
         others = sorted(one.name for one in self.path.iterdir() if not one.name.startswith("."))
         if others:
             raise UserError(
-                f'is no run, but holds other files, such as "{others[0]}"; name a new folder', file=self.path
+                f'is not a run but contains other files such as "{others[0]}"; name a new folder',
+                file=self.path,
             )
 
     def keep(self, completions: Sequence[Completion]) -> None:
@@ -207,7 +208,7 @@ def load_head(path: Path) -> dict[str, Any]:
     except (ValueError, RecursionError):
         data = None
     if not isinstance(data, dict):
-        raise UserError("is no JSON object", file=path)
+        raise UserError("is not a JSON object", file=path)
     return data
 
 

@@ -65,7 +65,7 @@ def _by_key(files: Iterator[File], path: Path) -> dict[Key, File]:
         if match := _match(file[0]):
             key = match["task"], int(match["prompt"]), int(match["index"])
             if key in by_key:
-                sentence = f"{name_of(key)} stands here again; {by_key[key][0]} holds it already"
+                sentence = f"{name_of(key)} is here again; it was already in {by_key[key][0]}"
                 raise UserError(sentence, file=file[0])
             by_key[key] = file
     if not by_key:
@@ -82,7 +82,7 @@ def _files(path: Path) -> Iterator[Iterator[File]]:
     try:
         archive = zipfile.ZipFile(path)
     except UNREADABLE as error:
-        raise UserError(f"is no readable zip ({error})", file=path) from None
+        raise UserError(f"is not a readable zip ({error})", file=path) from None
     with archive:
         yield _members(path, archive)
 
@@ -100,7 +100,7 @@ def _members(path: Path, archive: zipfile.ZipFile) -> Iterator[File]:
             with archive.open(member) as file:
                 data = file.read(MAX_ROW + 1)
         except UNREADABLE as error:
-            raise UserError(f"is no readable zip ({error})", file=path) from None
+            raise UserError(f"is not a readable zip ({error})", file=path) from None
         unpacked += len(data)
         if unpacked > MAX_UNPACKED:
             raise UserError(f"unpacks to more than {MAX_UNPACKED:,} bytes", file=path)
@@ -117,9 +117,9 @@ def _assigned(text: str, name: str) -> dict[str, str]:
     try:
         statements = parse(text).body
     except SyntaxError as error:
-        raise UserError(f"is no Python ({error.msg})", file=name, line=error.lineno) from None
+        raise UserError(f"is not Python ({error.msg})", file=name, line=error.lineno) from None
     except (ValueError, RecursionError, MemoryError):
-        raise UserError("is no readable Python; write plain assignments", file=name) from None
+        raise UserError("is not readable Python; write plain assignments", file=name) from None
     values = {
         target.id: _value(statement.value, target.id, name)
         for statement in statements
@@ -142,5 +142,5 @@ def _value(written: ast.expr, what: str, name: str) -> object:
     try:
         return ast.literal_eval(written)
     except (ValueError, TypeError, RecursionError, MemoryError):
-        sentence = f"`{what}` is no plain text; write the text out"
+        sentence = f"`{what}` is not a plain string; write the text out"
         raise UserError(sentence, file=name, line=written.lineno) from None

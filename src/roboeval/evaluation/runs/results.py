@@ -73,7 +73,7 @@ def load_results(
 def expect_judged(run: Run, key: str) -> None:
     """Raise UserError if a folder is no run, or lacks an evaluation."""
     if not run.completions.is_file():
-        raise UserError("is no run: it holds no completions.jsonl", file=run.path)
+        raise UserError("is not a run: it has no completions.jsonl", file=run.path)
     if not run.rows(key).is_file():
         there = ", ".join(run.judged_by()) or "nothing"
         raise UserError(
@@ -172,14 +172,14 @@ class Results:
                 return row
         except (OSError, ValueError, LookupError, TypeError, RecursionError):
             pass
-        raise UserError("was written anew meanwhile; look again", file=path)
+        raise UserError("was replaced meanwhile; try again", file=path)
 
 
 def selected_tasks(head: Mapping[str, Any], path: Path) -> frozenset[str] | None:
     """The tasks that a KEY.json names; None for all. Raises UserError if somebody wrote something else."""
     tasks = head.get("tasks")
     if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) for task in tasks)):
-        raise UserError('"tasks" is no list of names; --redo starts over', file=path)
+        raise UserError('"tasks" is not a list of names; --redo starts over', file=path)
     return None if tasks is None else frozenset(tasks)
 
 

@@ -23,7 +23,7 @@ NAMES = 2_000  # of a row's bytes are left for its completion: the task's name i
 BETWEEN = 2  # bytes between two events
 HASH = "0" * 64
 KINDS = frozenset(SKILLS.recordings)
-NO_ROW = "this line is no row of an evaluation"
+NO_ROW = "this line is not a row of an evaluation"
 BROKEN = "was damaged or changed after the evaluation was finished"
 # The group is an escape of half a surrogate pair; the rest is what looks like one.
 ESCAPES = re.compile(rb"\\\\|\\u[dD][89abAB]..\\u[dD][c-fC-F]..|(\\u[dD][89a-fA-F]..)")
@@ -176,7 +176,7 @@ def _expect_known_kinds(row: JudgedRow) -> None:
         for event in verdict.trace:
             kind = msgspec.json.decode(event)[0]
             if kind not in KINDS:
-                raise ValueError(f'"{kind}" is no kind of event')
+                raise ValueError(f'"{kind}" is not a kind of event')
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def read_checks(path: Path) -> Iterator[tuple[tuple[str, str], list[str]]]:
             case {"task": str(task), "program_sha256": str(program), "problems": list(problems)}:
                 yield (task, program), problems
             case _:
-                raise UserError("this line is no check; delete the file", file=path, line=number)
+                raise UserError("this line is not a check; delete the file", file=path, line=number)
 
 
 # --- the seal of a finished file

@@ -241,8 +241,8 @@ def test_what_happens_at_a_place_happens_where_the_robot_is() -> None:
     [
         ('tr.Exists(say(number("2", "mug")))', "expected a whole number"),
         ("tr.Exists(say(number(2)))", "number takes"),
-        ('tr.Exists(say(time("noon", "14:00")))', '"noon" is no time of day such as "11:30"'),
-        ('tr.Exists(at("a", at("b", say("c"))))', "at cannot stand in another at"),
+        ('tr.Exists(say(time("noon", "14:00")))', '"noon" is not a time of day such as "11:30"'),
+        ('tr.Exists(at("a", at("b", say("c"))))', "at cannot be nested in another at"),
         ('tr.Exists(say(affirm("a")))', "did you mean affirms?"),
         ('tr.Exists(mention("a", "b"))', "mention takes 1 argument, not 2"),
     ],

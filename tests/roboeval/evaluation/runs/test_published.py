@@ -59,11 +59,11 @@ def test_only_files_of_the_name_are_read_in_the_order_of_their_numbers(tmp_path:
         ("prompt = 'p'\n", None, "`completion`"),
         ("completion = 3\n", None, "`completion`"),
         ("a = 1\ncompletion = 'x\n", 2, "(unterminated string literal (detected"),
-        ("a = 1\ncompletion = f'{x}'\n", 2, "`completion` is no plain text"),
-        ("completion = " + "-" * 100_000 + "1\n", None, "no readable Python"),
+        ("a = 1\ncompletion = f'{x}'\n", 2, "`completion` is not a plain string"),
+        ("completion = " + "-" * 100_000 + "1\n", None, "not readable Python"),
         (b"a = 1\ncompletion = '\xff'\n", 2, "UTF-8"),
         (b"#" * 5_000_001, None, "is larger than 5,000,000 bytes"),
-        ("completion = '" + "\x01" * 1_000_000 + "'\n", None, "row this is longer than 5,000,000 bytes"),
+        ("completion = '" + "\x01" * 1_000_000 + "'\n", None, "this row is longer than 5,000,000 bytes"),
     ],
 )
 def test_a_wrong_file_gets_a_sentence(

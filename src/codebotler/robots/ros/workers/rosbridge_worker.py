@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import time
 import uuid
-from pathlib import Path
 from typing import Any
 
-from codebotler.robots.rosbridge.connection import FAULTS, INSISTS, SETTLES, Connection
-from codebotler.robots.rosbridge.protocol import GoalUpdate, Message
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "ros1" / "worker"))
-
-from channel import SetupError, serve
+from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
+from rosbridge_connection import FAULTS, INSISTS, SETTLES, Connection
+from rosbridge_protocol import GoalUpdate
 
 AGAIN = 0.5  # seconds after which a message without any effect is sent again
 
@@ -81,20 +76,16 @@ class RosbridgeWorker(SkillWorker):
         return not self.graph.is_lost
 
     def send(self, goal: Goal, arguments: list[Any]) -> None:
-        """Send a goal, unless it is cancelled."""
+        """Send a goal."""
         server, protocol = goal.server, self.graph.protocol
         name = goal.handle = str(uuid.uuid4())
         fields = dict(zip(server.fields, arguments, strict=True))
-        with goal.lock:
-            if goal.cancelled is not None:
-                self.end(goal, "cancelled")
-                return
-            self._message = protocol.goal(server.name, server.type, name, fields)
-            goal.is_acknowledged = not protocol.has_status
-            goal.sent = time.monotonic()
-            self._again = goal.sent + AGAIN
-            self.graph.send(self._message)
-            goal.stop = lambda: server.cancel(name)
+        self._message = protocol.goal(server.name, server.type, name, fields)
+        goal.is_acknowledged = not protocol.has_status
+        goal.sent = time.monotonic()
+        self._again = goal.sent + AGAIN
+        self.graph.send(self._message)
+        goal.stop = lambda: server.cancel(name)
 
     def look_after(self, goal: Goal, sent: float, now: float) -> None:
         """Send again what has no effect."""

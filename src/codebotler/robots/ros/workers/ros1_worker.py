@@ -1,4 +1,4 @@
-"""Skills performed as goals of actionlib, on ROS 1."""
+"""The worker for ROS 1, run by a Python (3.8 or later) that has rospy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from channel import Message
+from channel import Message, serve
 from goals import Goal, SkillWorker
 from graph import Ros1Graph
 from message_types import BUFFER, COMPRESSED, in_base64, message_types, picture_types
@@ -92,7 +92,7 @@ class Ros1Worker(SkillWorker):
         return left_behind
 
     def send(self, goal: Goal, arguments: list[Any]) -> None:
-        """Send a goal, unless it is cancelled or no message can hold it."""
+        """Send a goal, unless no message can hold it."""
         import genpy
 
         try:  # an error within rospy would leave half a message on the line and spoil the next one
@@ -101,18 +101,14 @@ class Ros1Worker(SkillWorker):
         except (genpy.SerializationError, TypeError, ValueError) as error:
             self.end(goal, "unsent", text=f"the goal of {goal.server.name} cannot be sent: {error}")
             return
-        with goal.lock:
-            if goal.cancelled is not None:
-                self.end(goal, "cancelled")
-                return
-            goal.sent = time.monotonic()
-            goal.handle = goal.server.client.send_goal(
-                message,
-                lambda handle: self._changed(goal, handle),
-                lambda _, feedback: self.pass_on(goal, _fields(feedback)),
-            )
-            goal_id = goal.handle.comm_state_machine.action_goal.goal_id.id
-            goal.stop = lambda: goal.server.cancel(goal_id)
+        goal.sent = time.monotonic()
+        goal.handle = goal.server.client.send_goal(
+            message,
+            lambda handle: self._changed(goal, handle),
+            lambda _, feedback: self.pass_on(goal, _fields(feedback)),
+        )
+        goal_id = goal.handle.comm_state_machine.action_goal.goal_id.id
+        goal.stop = lambda: goal.server.cancel(goal_id)
 
     def _changed(self, goal: Goal, handle: Any) -> None:
         """Follow the state of a goal, in one of rospy's threads."""
@@ -164,3 +160,7 @@ class Ros1Worker(SkillWorker):
 
 def _fields(message: Any) -> dict[str, Any]:
     return {name: getattr(message, name) for name in message.__slots__}
+
+
+if __name__ == "__main__":
+    serve(Ros1Worker)

@@ -5,24 +5,26 @@ from __future__ import annotations
 import base64
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from codebotler.core.skills import SKILLS, RosAction, SkillTable
+from codebotler.core.skills import RosAction, SkillTable
 from codebotler.robots.base import (
     ROS_PYTHON,
     Argument,
     CancelledError,
     Feedback,
     NotReadyError,
+    Options,
     Picture,
+    Readiness,
     Result,
     RobotLostError,
     no_feedback,
 )
 from codebotler.robots.clock import Clock
-from codebotler.robots.worker import Message, RosWorker
+from codebotler.robots.ros.worker import Message, RosWorker, lacks
 from codebotler.simulator.robot import RobotError
 
 OTHER_PYTHON = f"codebotler robots --ros-python {ROS_PYTHON}"
@@ -52,11 +54,9 @@ class RosRobot:
     Args:
         name: the kind of robot.
         address: of the robot.
-        script: what the worker runs.
-        python: the interpreter of the worker.
+        script: what the worker runs, a file of `workers/` or a path.
+        options: a user's; a speed other than 1 is for a virtual robot with that speed.
         environment: variables for the worker.
-        skills: the skills it may be asked to perform; those without an action cannot be.
-        speed: of its clock; other than 1 only for a virtual robot with that speed.
         waits: time limits.
         node: the worker's name on the graph, which only one node can have.
     """
@@ -67,19 +67,18 @@ class RosRobot:
         self,
         name: str,
         address: str,
-        script: Path,
-        python: Path,
+        script: str,
+        options: Options,
         environment: Mapping[str, str],
         *,
-        skills: SkillTable = SKILLS,
-        speed: float | None = 1.0,
         waits: Waits | None = None,
         node: str = "codebotler",
     ) -> None:
-        self.name, self.address, self.skills = name, address, skills
-        self.clock = Clock(speed)
+        self.name, self.address, self.skills = name, address, options.skills
+        self.clock = Clock(options.speed)
         self.missing: Mapping[str, str] = {}
-        self._script, self._python, self._environment, self._node = script, python, environment, node
+        self._script, self._python, self._environment = script, options.ros_python, environment
+        self._node = node
         self._waits = waits or Waits()
         self._worker: RosWorker | None = None
         self._in_doubt = False  # whether an unwatched goal may still be going on
@@ -98,7 +97,7 @@ class RosRobot:
         self.missing = worker.about["missing"]
         if self.missing and self.missing.keys() == actions_of(self.skills).keys():
             worker.leave()
-            raise NotReadyError(f"the robot has no action server at all: {next(iter(self.missing.values()))}")
+            raise NotReadyError(f"the robot has no action servers: {next(iter(self.missing.values()))}")
         self._worker, self._stopped, self._in_doubt = worker, False, False
         self.clock.restart()
 
@@ -112,7 +111,7 @@ class RosRobot:
         """
         action = self.skills[skill].ros
         if action is None:
-            raise RobotError("SkillWithoutAction", f"no ROS action is known for the skill {skill}")
+            raise RobotError("SkillWithoutAction", f"there is no ROS action for the skill {skill}")
         with self._order:
             if self._stopped:
                 raise CancelledError
@@ -138,7 +137,7 @@ class RosRobot:
                 case {"id": int(goal), "is": "picture", "data": str(data)} if goal == number:
                     feedback(Picture(base64.b64decode(data)))
                 case {"id": int(goal)} as message if goal == number:
-                    return self._result(skill, action, message)
+                    return self._result(action, message)
 
     def cancel(self) -> None:
         """Have the worker cancel the goal; if it hangs, have another one cancel all goals."""
@@ -175,14 +174,11 @@ class RosRobot:
         }
         return RosWorker(self._python, self._script, start, self._environment)
 
-    def _result(self, skill: str, action: RosAction, message: Message) -> Result:
+    def _result(self, action: RosAction, message: Message) -> Result:
         match message:
-            case {"is": "result", "value": bool() | str() | list() | None as value}:
-                return value
             case {"is": "result", "value": value}:
-                raise RobotLostError(
-                    f"the robot's {skill} returned {value!r:.100}, which no skill can return"
-                )
+                result: Result = value  # a mission looks whether it fits the skill
+                return result
             case {"is": "error", "text": str(text), "state": str(state)}:
                 raise error_of(action, text, state)
             case {"is": "cancelled"}:
@@ -206,6 +202,19 @@ class RosRobot:
                 return UNCANCELLED
             self._in_doubt = False
             return "another worker has cancelled all goals"
+
+
+def ros_readiness(
+    name: str, python: Path, needs: Sequence[str], mend: Callable[[Sequence[str]], str], note: str
+) -> Readiness:
+    """Whether an interpreter has the modules that a worker needs; `mend` names what installs the missing."""
+    missing = lacks(python, needs)
+    if missing is None:
+        return Readiness(name, works=False, missing=f"{python} cannot be run", mend=OTHER_PYTHON, note=note)
+    if missing:
+        lacking = f"{python} lacks {', '.join(missing)}"
+        return Readiness(name, works=False, missing=lacking, mend=mend(missing), note=note)
+    return Readiness(name, works=True, note=note)
 
 
 def actions_of(skills: SkillTable) -> Message:

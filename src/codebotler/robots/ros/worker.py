@@ -19,6 +19,7 @@ from codebotler.robots.base import NotReadyError
 
 Message: TypeAlias = dict[str, Any]
 
+WORKERS = Path(__file__).with_name("workers")
 READY = 30.0  # seconds within which it must report that it is ready
 LEAVES = 4.0  # seconds that it may take to end by itself
 LAST_LINES = 5  # of its error output, kept for error messages
@@ -31,7 +32,7 @@ class RosWorker:
 
     Args:
         python: the interpreter.
-        script: a file, or a folder with a `__main__.py`.
+        script: a file of `workers/`, or a path.
         start: the first message it receives.
         environment: variables beyond those of this process.
 
@@ -39,14 +40,14 @@ class RosWorker:
         NotReadyError: it cannot be started, or reports that it cannot work.
     """
 
-    def __init__(self, python: Path, script: Path, start: Message, environment: Mapping[str, str]) -> None:
+    def __init__(self, python: Path, script: str, start: Message, environment: Mapping[str, str]) -> None:
         self._messages: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._printed: deque[str] = deque(maxlen=LAST_LINES)
         self._writing = threading.Lock()
         self._cancel_sent = threading.Event()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that the user names
-                [str(python), str(script)],
+                [str(python), str(WORKERS / script)],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
@@ -67,11 +68,6 @@ class RosWorker:
             reader.start()
         self.send(start)
         self.about = self._ready(python)
-
-    @property
-    def pid(self) -> int:
-        """The ID of the process."""
-        return self._process.pid
 
     def send(self, message: Message) -> None:
         """Send a message; if the process has died, that is received."""

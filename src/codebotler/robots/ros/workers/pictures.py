@@ -25,7 +25,7 @@ class Camera:
         It must have come within the last `oldest` seconds.
         """
         if self._last is None:
-            return {"none": f"no picture has come on {self.topic} yet; is the camera's node running?"}
+            return {"none": f"no picture has arrived on {self.topic} yet; is the camera's node running?"}
         came, message = self._last
         kind, age = message._connection_header["type"], time.monotonic() - came
         if kind not in self._types:

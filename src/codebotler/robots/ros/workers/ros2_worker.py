@@ -7,13 +7,9 @@ from __future__ import annotations
 
 import importlib
 import os
-import sys
 import threading
 import time
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "ros1" / "worker"))
 
 from channel import Message, SetupError, serve
 from goals import Goal, SkillWorker
@@ -122,18 +118,14 @@ class Ros2Worker(SkillWorker):
         return False
 
     def send(self, goal: Goal, arguments: list[Any]) -> None:
-        """Send a goal, unless it is cancelled."""
+        """Send a goal."""
         message = goal.server.spec.Goal()
         for field, value in zip(goal.server.fields, arguments):
             setattr(message, field, value)
-        with goal.lock:
-            if goal.cancelled is not None:
-                self.end(goal, "cancelled")
-                return
-            goal.sent = time.monotonic()
-            sending = goal.server.client.send_goal_async(
-                message, feedback_callback=lambda m: self._feedback(goal, m.feedback)
-            )
+        goal.sent = time.monotonic()
+        sending = goal.server.client.send_goal_async(
+            message, feedback_callback=lambda m: self._feedback(goal, m.feedback)
+        )
         sending.add_done_callback(lambda done: self._answered(goal, done.result()))
 
     def _answered(self, goal: Goal, handle: Any) -> None:

@@ -66,8 +66,16 @@ class SkillWorker:
         raise NotImplementedError
 
     def send(self, goal: Goal, arguments: list[Any]) -> None:
-        """Send a goal, unless it is cancelled."""
+        """Send a goal, whose lock is held."""
         raise NotImplementedError
+
+    def start(self, goal: Goal, arguments: list[Any]) -> None:
+        """Send a goal, unless it is cancelled."""
+        with goal.lock:
+            if goal.cancelled is not None:
+                self.end(goal, "cancelled")
+            else:
+                self.send(goal, arguments)
 
     def obey(self, line: Message) -> None:
         """Perform or cancel a skill."""
@@ -75,7 +83,7 @@ class SkillWorker:
             server = self.servers[line["skill"]]
             self.goal = goal = Goal(line["id"], server)
             if server.is_connected(self.silence):
-                self.send(goal, line["arguments"])
+                self.start(goal, line["arguments"])
             else:
                 threading.Thread(
                     target=self._wait_and_send, args=(goal, line["arguments"]), daemon=True
@@ -146,14 +154,11 @@ class SkillWorker:
 
     def _wait_and_send(self, goal: Goal, arguments: list[Any]) -> None:
         until = time.monotonic() + self.patience + self.settles
-        while time.monotonic() < until and goal.cancelled is None and not self.graph.is_left():
-            if goal.server.is_connected(self.silence):
-                self.send(goal, arguments)
+        while time.monotonic() < until and not self.graph.is_left():
+            if goal.cancelled is not None or goal.server.is_connected(self.silence):
+                self.start(goal, arguments)
                 return
             time.sleep(0.005)
-        if goal.cancelled is not None:
-            self.end(goal, "cancelled")
-            return
         why = self.graph.why_missing(goal.server.name, goal.server.type)
         self.end(goal, "unsent", text=why)
 

@@ -12,13 +12,12 @@ from urllib.parse import urlsplit
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
-from codebotler.robots.ros import actions_of
-from codebotler.robots.ros1.robot import WORKER, master_uri
+from codebotler.robots.ros.robot import actions_of
+from codebotler.robots.ros.ros1 import master_uri
+from codebotler.robots.ros.worker import Message, RosWorker
 from codebotler.robots.simulated import Simulated
-from codebotler.robots.worker import Message, RosWorker
 from codebotler.simulator.robot import RobotError
 
-SERVERS = WORKER / "servers.py"
 NODE = "virtual_robot"
 HERE = ("localhost", "127.0.0.1")
 HEARS = 3600.0  # seconds of one wait for messages
@@ -74,7 +73,7 @@ class VirtualRobot:
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
         start = {"node": NODE, "actions": actions_of(self._skills), "port": port}
-        worker = self._worker = RosWorker(self._python, SERVERS, start, environment)
+        worker = self._worker = RosWorker(self._python, "servers.py", start, environment)
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
         ]

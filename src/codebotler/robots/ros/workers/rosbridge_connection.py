@@ -13,13 +13,8 @@ from typing import Any
 from websockets.exceptions import ConnectionClosed, WebSocketException
 from websockets.sync.client import connect
 
-from codebotler.robots.rosbridge.protocol import (
-    ActionProtocol,
-    GoalUpdate,
-    Message,
-    Ros1Protocol,
-    Ros2Protocol,
-)
+from channel import Message
+from rosbridge_protocol import ActionProtocol, GoalUpdate, Ros1Protocol, Ros2Protocol
 
 ASKS_VERSION = {"op": "call_service", "id": "version", "service": "/rosapi/get_ros_version", "args": {}}
 VERSION = 2.0  # seconds that a rosbridge may take to tell its version of ROS; one without rosapi cannot
@@ -103,7 +98,7 @@ class Connection:
                 try:
                     self._take(json.loads(text))
                 except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-                    self.complaint = f"it sent something that is no message of rosbridge: {text[:100]!r}"
+                    self.complaint = f"it sent something that is not a rosbridge message: {text[:100]!r}"
         self.is_lost = True
         self._lost()
         self.has_ended = True

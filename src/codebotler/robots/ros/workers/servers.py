@@ -100,7 +100,7 @@ def started_master(port: int | None, uri: str) -> Any:
             probe.bind(("127.0.0.1", port))
         except OSError as error:
             raise SetupError(
-                f"port {port} is in use by something that is no ROS master ({error}); "
+                f"port {port} is in use by something that is not a ROS master ({error}); "
                 "choose another with --port"
             ) from None
     master = rosmaster.master.Master(port)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
-Message: TypeAlias = dict[str, Any]
+from channel import Message
+from message_types import PACKAGE
 
-PACKAGE = "robot_actions_pkg"
 AT_ONCE = {"secs": 0, "nsecs": 0}
 ENDS_ROS1 = {2: "cancelled", 3: "succeeded", 4: "aborted", 5: "rejected", 8: "cancelled", 9: "lost"}
 """How a goal ended, by the status of actionlib_msgs/GoalStatus."""
