@@ -9,7 +9,8 @@ from pydantic import BaseModel
 
 from codebotler.checking.check import check
 from codebotler.core.trace import Status
-from codebotler.core.world import OptionFile, PersonFile, Room, RoomFile, World
+from codebotler.core.world import Room, World
+from codebotler.core.world_file import OptionFile, PersonFile, RoomFile
 from codebotler.models.recorded import Solution
 from codebotler.simulator.engine import run
 from codebotler.simulator.sandbox.stdlib import LISTED

@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 
 from codebotler.core.errors import UserError
-from codebotler.core.world import WorldFile
+from codebotler.core.world_file import WorldFile
 from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.load import SUITES, read_task
 from roboeval.suites.schema import SuiteFile

@@ -13,7 +13,7 @@ from codebotler.checking.static import static_problems
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import Flaw, parsed, tree_of
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.core.world import check_regex
+from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import Behaviour

@@ -2,27 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import re
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, TypeAlias
-
-import yaml
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    StringConstraints,
-    Tag,
-    model_validator,
-)
+from typing import TypeAlias
 
 from codebotler.core.words import counted
-from codebotler.core.yaml_files import Place, YamlFile
 
 warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # odd regexes, which still work
 
@@ -84,11 +69,14 @@ class World:
     @classmethod
     def read(cls, path: Path) -> World:
         """Read a world file; a UserError names the line of what is wrong, and how to mend it."""
-        file = YamlFile.read(path)
-        return file.validate(WorldFile).world(file)
+        from codebotler.core.world_file import read_world
+
+        return read_world(path)
 
     def to_yaml(self) -> str:
         """This world as the text of a world file."""
+        import yaml
+
         return yaml.safe_dump(self.to_data(), sort_keys=False, allow_unicode=True, width=100)
 
     def to_data(self) -> dict[str, object]:
@@ -129,152 +117,6 @@ def laid_out(world: World) -> World:
         )
         rooms.append(replace(room, footprint=footprint, stand_at=room.stand_at or centre))
     return replace(world, rooms=tuple(rooms))
-
-
-Text = Annotated[str, StringConstraints(strict=True)]
-Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
-
-
-def check_regex(text: str) -> str:
-    """A text, unless it is no regular expression."""
-    try:
-        re.compile(text)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise ValueError(f"it is not a valid regular expression: {error}") from None
-    return text
-
-
-Pattern = Annotated[Text, AfterValidator(check_regex)]
-NamePattern = Annotated[Name, AfterValidator(check_regex)]
-Metres = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=-1e6, le=1e6)]
-Corner: TypeAlias = tuple[Metres, Metres]
-
-
-class _Form(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-def _not_zero(option: int) -> int:
-    if option == 0:
-        raise ValueError("there is no option 0; 1 is the first, and -1 the last")
-    return option
-
-
-class OptionFile(_Form):
-    """An answer by its position among the options, in a world file."""
-
-    option: Annotated[int, Field(strict=True, ge=-100, le=100), AfterValidator(_not_zero)]
-
-
-def _kind_of_answer(value: object) -> str:
-    return "option" if isinstance(value, dict | OptionFile) else "text"
-
-
-AnswerFile = Annotated[
-    Annotated[Pattern, Tag("text")] | Annotated[OptionFile, Tag("option")], Discriminator(_kind_of_answer)
-]
-
-
-class PersonFile(_Form):
-    """A person in a world file."""
-
-    name: NamePattern
-    answers: list[AnswerFile] = []
-    topics: dict[NamePattern, AnswerFile] = {}
-    after_looks: Annotated[int, Field(strict=True, ge=0, le=1_000)] = 0
-    leaves: Annotated[bool, Field(strict=True)] = False
-
-    def person(self) -> Person:
-        """The person that it describes."""
-        topics = tuple((topic, _answer(answer)) for topic, answer in self.topics.items())
-        answers = tuple(map(_answer, self.answers))
-        return Person(self.name, answers, topics, self.after_looks, self.leaves)
-
-
-def _answer(form: AnswerFile) -> Answer:
-    return form.option if isinstance(form, OptionFile) else form
-
-
-class RoomFile(_Form):
-    """A room in a world file: its name alone, or with geometry."""
-
-    name: NamePattern
-    footprint: Annotated[list[Corner], Field(min_length=3)] | None = None
-    stand_at: Corner | None = None
-
-    @model_validator(mode="before")
-    @classmethod
-    def _name_alone(cls, data: object) -> object:
-        return data if isinstance(data, dict | RoomFile) else {"name": data}
-
-
-class WorldFile(_Form):
-    """A world in a file, alone or inside a task."""
-
-    about: Text = ""
-    robot: Name
-    rooms: Annotated[list[RoomFile], Field(min_length=1)]
-    objects: dict[Text, list[NamePattern]] = {}
-    people: dict[Text, list[PersonFile]] = {}
-    may_wait_forever: Annotated[bool, Field(strict=True)] = False
-
-    def world(self, file: YamlFile, at: Place = ()) -> World:
-        """The world that it describes, or a UserError about a room or a regex."""
-        names = [room.name for room in self.rooms]
-        for index, room in enumerate(self.rooms):
-            if room.name in names[:index]:
-                raise file.wrong(f'the room "{room.name}" is listed twice; remove one', *at, "rooms", index)
-            if room.stand_at and room.footprint and not _is_within(room.stand_at, room.footprint):
-                point = f"({room.stand_at[0]:g}, {room.stand_at[1]:g})"
-                sentence = f'the robot would stand at {point}, outside the footprint of "{room.name}"'
-                raise file.wrong(f"{sentence}; move one of them", *at, "rooms", index, "stand_at")
-        known = ", ".join(names)
-        if self.robot not in names:
-            raise file.wrong(f'the robot starts in "{self.robot}", but the rooms are: {known}', *at, "robot")
-        for key, named in (("objects", self.objects), ("people", self.people)):
-            for name in named:
-                if name not in names:
-                    raise file.wrong(f'there is no room "{name}"; the rooms are: {known}', *at, key, name)
-        return World(
-            rooms=tuple(
-                Room(
-                    name=room.name,
-                    objects=tuple(self.objects.get(room.name, ())),
-                    people=tuple(person.person() for person in self.people.get(room.name, ())),
-                    footprint=None if room.footprint is None else tuple(room.footprint),
-                    stand_at=room.stand_at,
-                )
-                for room in self.rooms
-            ),
-            robot=self.robot,
-            about=self.about,
-            may_wait_forever=self.may_wait_forever,
-        )
-
-
-_ON_EDGE = 1e-9  # of the size of a footprint; few decimal fractions are exact in binary
-
-
-def _is_within(point: Point, corners: list[Point]) -> bool:
-    """Whether a point is in a polygon or on its edge: how often a ray from it crosses that is then odd."""
-    x, y = point
-    odd = False
-    size = max(max(xs) - min(xs) for xs in zip(*corners, strict=True))
-    for (x1, y1), (x2, y2) in zip(corners, [*corners[1:], corners[0]], strict=True):
-        if _distance(point, (x1, y1), (x2, y2)) <= _ON_EDGE * size:
-            return True
-        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
-            odd = not odd
-    return odd
-
-
-def _distance(point: Point, start: Point, end: Point) -> float:
-    """How far a point is from a line between two others."""
-    (x, y), (x1, y1), (x2, y2) = point, start, end
-    dx, dy = x2 - x1, y2 - y1
-    square = dx * dx + dy * dy
-    along = min(1.0, max(0.0, ((x - x1) * dx + (y - y1) * dy) / square)) if square else 0.0
-    return math.hypot(x - x1 - along * dx, y - y1 - along * dy)
 
 
 def _person_data(person: Person) -> dict[str, object]:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from codebotler.core.world import AnswerFile, Name, Pattern, PersonFile, Text, WorldFile
+from codebotler.core.world_file import AnswerFile, Name, Pattern, PersonFile, Text, WorldFile
 from codebotler.simulator.rules import Limits, Rules
 
 MOST_WORLDS = 10_000  # of one task; a whole suite then takes a gigabyte of memory, and minutes to draw

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
-from codebotler.core.world import Name, Text
+from codebotler.core.world_file import Name, Text
 from codebotler.core.yaml_files import YamlFile
 from codebotler.models.recorded import NAMES, InstructionSolutions, Solution
 from roboeval.suites.load import Task

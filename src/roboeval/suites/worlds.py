@@ -13,7 +13,8 @@ from types import SimpleNamespace
 from typing import Any, TypeAlias
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.world import OptionFile, Person, Room, World
+from codebotler.core.world import Person, Room, World
+from codebotler.core.world_file import OptionFile
 from codebotler.core.yaml_files import YamlFile
 from roboeval.suites.expression import ExpressionError, Names, each_of, parsed, value
 from roboeval.suites.pairwise import Row, spread

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from codebotler.core.errors import UserError
-from codebotler.core.world import HALLWAY, Person, Room, World, WorldFile, laid_out
+from codebotler.core.world import HALLWAY, Person, Room, World, laid_out
+from codebotler.core.world_file import WorldFile
 from codebotler.core.yaml_files import YamlFile
 
 GOOD = "robot: hall\nrooms:\n  - hall\n  - lab\n"
