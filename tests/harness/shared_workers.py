@@ -15,7 +15,7 @@ import pytest
 
 from codebotler.core.trace import Outcome
 from codebotler.simulator.fork_server import ForkServer
-from codebotler.simulator.skill_protocol import SkillPerformer
+from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.worker import EngineError, Worker
 
 Started = TypeVar("Started")

@@ -1,58 +1,27 @@
-"""The protocol of skills: answers what a program asks of its robot, and judges how its run ended."""
+"""The protocol of skills: answers what a program asks of its robot, and says how its run ended."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from json.encoder import encode_basestring_ascii as quoted
 from math import inf
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
-from codebotler.core.skills import Skill, SkillTable
-from codebotler.core.trace import Option, Outcome, RunError, Status, Trace
+from codebotler.core.skills import Skill
+from codebotler.core.trace import Option, Outcome, RunError, Status
 from codebotler.simulator.isolated_process import (
     IsolatedProcess,
     LostProcessError,
     ProtocolError,
     cause_of_death,
 )
-from codebotler.simulator.robot import Argument, Result, RobotError
-from codebotler.simulator.rules import Rules
+from codebotler.simulator.ledger import STOP, WAITS, Ledger, SkillAnswer, SkillPerformer
+from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.sandbox import ACTS, CPU_SECONDS, LIVE_CPU_SECONDS, LOOKS, TELLS
 
-OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 LAST_LINE = 1_000_000
 LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
-WAITS = "it waits for something that can never come"
-# What kind of answer, what it says, and whether looking may show something else now.
-SkillAnswer: TypeAlias = tuple[str, object, bool]
-STOP: SkillAnswer = ("stop", None, False)
 Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
-
-
-class SkillPerformer(Protocol):
-    """A robot, as a run needs it; executing a skill may take as long as it likes."""
-
-    rules: Rules
-    skills: SkillTable
-    is_live: bool  # time passes by itself: sleeping takes it, and each skill refuels the program
-    never_fails: frozenset[str]  # skills that return nothing and cannot fail, so that nobody waits for them
-    surely: tuple[tuple[str, str], ...]  # skills and their only arguments that always succeed
-    only_looks: frozenset[str]  # skills whose result stays the same until another skill is executed
-
-    @property
-    def now(self) -> float:
-        """What the program's clock shows, in seconds since the start."""
-
-    @property
-    def trace(self) -> Trace:
-        """What it has done so far."""
-
-    def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
-        """Execute one skill, or raise RobotError."""
-
-    def sleep_until(self, now: float) -> None:
-        """Let time pass, until `now` seconds since the start; back at once when it is to stop."""
 
 
 class SkillProtocol:
@@ -66,9 +35,7 @@ class SkillProtocol:
     ) -> None:
         self._may_import = may_import
         self.child, self.robot, self.limits = child, robot, robot.rules.limits
-        self.calls = self.text = 0  # characters of all texts
-        self.limit: str | None = None  # the one that was reached, in words
-        self.errors: list[RobotError] = []
+        self.ledger = Ledger(robot)
         self._heard = False
         self._skills = {skill.name: skill for skill in robot.skills.rows}
         self._glances = [
@@ -87,7 +54,7 @@ class SkillProtocol:
         try:
             final = self.talk()
         except TimeoutError:
-            self.limit = WAITS
+            self.ledger.limit = WAITS
             final = None
         except ProtocolError as error:
             self.child.end()
@@ -95,13 +62,13 @@ class SkillProtocol:
         except BaseException:
             self.child.end()
             raise
-        if final is None and self.limit is None:
+        if final is None and self.ledger.limit is None:
             return self._died(self.child.ended())
         self.child.kill()
         self.child.hang_up()
-        if self.limit is not None:
+        if self.ledger.limit is not None:
             line = final.get("line") if final else None
-            return self._outcome(Status.TIMEOUT, "TimeoutError", self.limit, line)
+            return self._outcome(Status.TIMEOUT, "TimeoutError", self.ledger.limit, line)
         return self._ended(final or {})
 
     def talk(self) -> dict[str, object] | None:
@@ -118,7 +85,7 @@ class SkillProtocol:
                         self.child.send((kind, value, self._known() if changed else {}, self.robot.now))
                 case _:
                     raise ProtocolError("a request is malformed")
-            overrun += self.limit is not None
+            overrun += self.ledger.limit is not None
             if overrun > OVERRUN:
                 return None
         return None
@@ -126,60 +93,28 @@ class SkillProtocol:
     def _answer(self, name: str, values: list[object], now: float) -> SkillAnswer:
         if self.robot.is_live:
             self.child.reset_patience()
-        elif self.limit is None:
-            self._let_time_pass(now)
-        if self.limit is not None:
+        elif self.ledger.limit is None:
+            self.ledger.let_time_pass(now)
+        if self.ledger.limit is not None:
             return STOP
         if name in self._skills:
-            return self._perform(self._skills[name], values)
+            skill = self._skills[name]
+            return self.ledger.perform(skill.name, _arguments(skill, values))
         match name, values:
             case "sleep", [float(seconds)] if self.robot.is_live and 0 <= seconds < inf:
                 self.robot.sleep_until(self.robot.now + seconds)
                 return ("ok", None, True)
             case "wait", _:
-                self.limit = WAITS
+                self.ledger.limit = WAITS
             case "too-long", _:
-                self.limit = f"a text of more than {self.limits.text:,} characters"
+                self.ledger.limit = f"a text of more than {self.limits.text:,} characters"
             case _:
                 raise ProtocolError("there is no such skill")
         return STOP
 
-    def _let_time_pass(self, now: float) -> None:
-        if now > self.limits.seconds:
-            now = self.limits.seconds
-            self.limit = f"{self.limits.seconds:,.0f} seconds of simulated time"
-        if now > self.robot.now:  # if it is less, the program has found the channel, and deceives itself
-            self.robot.sleep_until(float(now))
-
     def _known(self) -> dict[str, Result]:
         """Results of looks without argument and trace, by request, which a child need not ask for."""
         return {request: self.robot.perform(name, ()) for request, name in self._glances}
-
-    def _perform(self, skill: Skill, values: list[object]) -> SkillAnswer:
-        arguments = _arguments(skill, values)
-        self._spend(arguments)
-        if self.limit is not None:
-            return STOP
-        try:
-            result = self.robot.perform(skill.name, arguments)
-        except RobotError as error:
-            self.errors.append(error)
-            return ("error", (len(self.errors) - 1, error.kind, str(error)), True)
-        return ("ok", result, skill.name not in self.robot.only_looks)
-
-    def _spend(self, arguments: list[Argument]) -> None:
-        limits, longest = self.limits, 0
-        for argument in arguments:
-            texts = (argument,) if isinstance(argument, str) else [option.text for option in argument]
-            longest = max(longest, *map(len, texts), 0)
-            self.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - 1)
-        self.calls += 1
-        if self.calls > limits.calls:
-            self.limit = f"{limits.calls:,} skill calls"
-        elif longest > limits.text:
-            self.limit = f"a text of more than {limits.text:,} characters"
-        elif self.text > limits.trace:
-            self.limit = f"texts of more than {limits.trace:,} characters in all"
 
     def _ended(self, final: dict[str, object]) -> Outcome:
         line = final.get("line")
@@ -192,8 +127,8 @@ class SkillProtocol:
                 return self._outcome(
                     Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
                 )
-            case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.errors):
-                error = self.errors[number]
+            case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.ledger.errors):
+                error = self.ledger.errors[number]
                 return self._outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
             case {"end": "python-error", "kind": str(kind), "message": str(message)}:
                 name = kind if kind.isidentifier() else "Exception"

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from codebotler.core.trace import Outcome
 from codebotler.simulator.fork_server import ForkServer
 from codebotler.simulator.isolated_process import LostProcessError
+from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.preparer import Prepared, Preparer
 from codebotler.simulator.sandbox import FORK_SERVER, LIBRARY_SERVER, LIVE_SERVER
-from codebotler.simulator.skill_protocol import ImportsMoreError, SkillPerformer, SkillProtocol
+from codebotler.simulator.skill_protocol import ImportsMoreError, SkillProtocol
 
 EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
 

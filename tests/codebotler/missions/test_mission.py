@@ -24,7 +24,7 @@ from codebotler.missions.store import find, missions, recover
 from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
 from codebotler.robots.reservation import Reservation
 from codebotler.robots.simulated import Simulated
-from codebotler.simulator import skill_protocol
+from codebotler.simulator import ledger
 from codebotler.simulator.robot import RobotError
 from codebotler.simulator.worker import Worker
 from doubles import Answering, giving, raising
@@ -513,7 +513,7 @@ def test_stop_just_before_the_program_begins_lets_it_not_begin(
             mission.stop("the test")
             super().__init__()
 
-        def run_live(self, source: str, robot: skill_protocol.SkillPerformer) -> Outcome:
+        def run_live(self, source: str, robot: ledger.SkillPerformer) -> Outcome:
             begun.append(source)
             return super().run_live(source, robot)
 

@@ -23,10 +23,11 @@ from codebotler.simulator import isolated_process
 from codebotler.simulator.engine import digest, run
 from codebotler.simulator.fork_server import ForkServer
 from codebotler.simulator.isolated_process import IsolatedProcess, compiled_file
+from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
-from codebotler.simulator.skill_protocol import OVERRUN, SkillAnswer, SkillProtocol
+from codebotler.simulator.skill_protocol import OVERRUN, SkillProtocol
 from codebotler.simulator.worker import EngineError, Worker
 from processes import are_gone, children_of, engine_processes, fork_servers
 
