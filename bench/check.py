@@ -102,13 +102,16 @@ def rejections(
     """For each program and each seed, whether the check rejects it; the seeds of a program share its code."""
     plans = {name: RoomMap.of(task.scenarios[0].world) for name, task in suite.tasks.items()}
 
-    def one(source: Source) -> list[bool]:
+    def rejected(source: Source) -> list[bool]:
         task, program = source
         plan = plans[task] if with_rooms else None
         checks = (check_on(pool.here(), program, plan, CheckSettings(seed=seed)) for seed in seeds)
         return [bool(check.problems) for check in checks]
 
-    return list(pool.map_distinct(one, sources, name=lambda source: digest(*source)))
+    def all_rejected(some: Sequence[Source]) -> list[list[bool]]:
+        return list(map(rejected, some))
+
+    return list(pool.map_distinct(all_rejected, sources, name=lambda source: digest(*source)))
 
 
 @dataclass

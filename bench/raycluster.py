@@ -11,7 +11,7 @@ import os
 import statistics
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from codebotler.simulator.worker import Worker
@@ -42,8 +42,8 @@ def seconds(engine: Engine, completions: list[Completion], suite: Suite) -> tupl
 def fed(cluster: Engine, row: str) -> float:
     """How many calls a second one process hands out and takes back."""
 
-    def give(_worker: Worker, work: Work) -> str:
-        return row[: -1 - int(work[1]) % 2]
+    def give(_worker: Worker, works: Sequence[Work]) -> list[str]:
+        return [row[: -1 - int(number) % 2] for _, number in works]
 
     start = time.perf_counter()
     count = sum(1 for _ in cluster.map_distinct(give, (("", str(n)) for n in range(EMPTY)), len))

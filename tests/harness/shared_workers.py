@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
@@ -16,9 +16,10 @@ import pytest
 from codebotler.core.trace import Outcome
 from codebotler.simulator.fork_server import ForkServer
 from codebotler.simulator.ledger import SkillPerformer
-from codebotler.simulator.worker import EngineError, Worker
+from codebotler.simulator.worker import EngineError, Job, NewRobot, Worker
 
 Started = TypeVar("Started")
+Ran = TypeVar("Ran")
 IDLE: list[SharedWorker] = []
 STARTER = [ThreadPoolExecutor(1, "starter")]  # processes of an engine end with the thread that started them
 
@@ -32,21 +33,24 @@ class SharedWorker(Worker):
         start = self._preparer.start
         self._preparer.start = lambda: lasting(start)  # type: ignore[method-assign]  # so does its process
 
-    def run(self, source: str, new_robot: Callable[[], SkillPerformer]) -> Outcome:
-        """Run a program."""
-        self._expect_a_user()
-        self.is_running = True
-        outcome = super().run(source, new_robot)
-        self.is_running = False
-        return outcome
+    def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
+        """Run the tame ones of some programs."""
+        return self._running(lambda: super(SharedWorker, self).run_tame(jobs))
+
+    def run_alone(self, source: str, new_robot: NewRobot) -> Outcome:
+        """Run a program in a process of its own."""
+        return self._running(lambda: super(SharedWorker, self).run_alone(source, new_robot))
 
     def run_live(self, source: str, robot: SkillPerformer) -> Outcome:
         """Run a program on a robot."""
+        return self._running(lambda: super(SharedWorker, self).run_live(source, robot))
+
+    def _running(self, run: Callable[[], Ran]) -> Ran:
         self._expect_a_user()
         self.is_running = True
-        outcome = super().run_live(source, robot)
+        ran = run()
         self.is_running = False
-        return outcome
+        return ran
 
     def stop(self) -> None:
         """End what is running, if anything is, and with it the worker."""
@@ -76,8 +80,10 @@ class SharedWorker(Worker):
             raise EngineError("the engine was stopped")
 
 
-def worker() -> Worker:
+def worker(*, one_process_per_run: bool = False) -> Worker:
     """One that waits, or else a new one."""
+    if one_process_per_run:
+        return Worker(one_process_per_run=True)
     if not IDLE:
         return lasting(SharedWorker)
     found = IDLE.pop()

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.room_names import MOST_ROOMS, lists_rooms, named_rooms
-from codebotler.checking.sampled import SAMPLES, CheckSettings, Run, failures, run_sample, sampled_runs
+from codebotler.checking.sampled import SAMPLES, CheckSettings, Run, failures, run_samples, sampled_runs
 from codebotler.checking.static import static_problems
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import Flaw, parsed, tree_of
@@ -21,6 +21,7 @@ from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap
 from codebotler.simulator.worker import Worker
 
 START = "start_loc"  # models know it by this name from the paper
+AT_ONCE = 16  # worlds that a worker is given
 GUESSES = 3  # times that the rooms to which a program drives are added to those in its text
 SOME_ROOMS = ("room 1", "room 2")  # for a program that drives to all rooms and names none
 
@@ -65,14 +66,15 @@ def check(
     known = room_map or _room_map(program, rooms, start, skills)
     with nullcontext(pool) if pool else WorkerPool(workers) as opened:
 
-        def one(room_map: RoomMap, sampler: FactSampler) -> Sample:
-            return run_sample(opened.here(), program, room_map, sampler, settings)
+        def share(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+            return run_samples(opened.here(), program, room_map, samplers, settings)
 
-        def run(room_map: RoomMap, samplers: Iterable[FactSampler]) -> list[Sample]:
-            futures = [opened.submit(one, room_map, sampler) for sampler in samplers]
-            return [future.result() for future in futures]
+        def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+            shares = [samplers[start :: opened.workers] for start in range(opened.workers)]
+            futures = [opened.submit(share, room_map, each) for each in shares if each]
+            return [sample for future in futures for sample in future.result()]
 
-        return _checked(program, known, settings, run, opened.workers)
+        return _checked(program, known, settings, run, AT_ONCE * opened.workers)
 
 
 def check_on(
@@ -84,14 +86,16 @@ def check_on(
     """The same check on one worker, the calling thread's own, for checking many programs at the same time."""
     how = settings or CheckSettings()
 
-    def run(room_map: RoomMap, samplers: Iterable[FactSampler]) -> Iterable[Sample]:
-        return (run_sample(worker, program, room_map, sampler, how) for sampler in samplers)
+    def run(room_map: RoomMap, samplers: Sequence[FactSampler]) -> list[Sample]:
+        return run_samples(worker, program, room_map, samplers, how)
 
     rooms = room_map or _room_map(program, None, None, how.skills)
     return _checked(program, rooms, how, run)
 
 
-def _checked(program: str, room_map: RoomMap, settings: CheckSettings, run: Run, width: int = 1) -> Check:
+def _checked(
+    program: str, room_map: RoomMap, settings: CheckSettings, run: Run, width: int = AT_ONCE
+) -> Check:
     tree = parsed(program, compiled=True)
     if isinstance(tree, Flaw):
         problem = Problem(tree.kind, tree.message, tree.line)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TypeAlias
 
 from codebotler.checking.problems import Problem, Sample, no_room
@@ -39,21 +40,37 @@ class CheckSettings:
             raise UserError(f"the number of samples is {self.samples}; write one from 1 to {MOST_SAMPLES:,}")
 
 
-def run_sample(
-    worker: Worker, program: str, room_map: RoomMap, sampler: FactSampler, settings: CheckSettings
-) -> Sample:
-    """Run a program in one sampled world."""
-    robots: list[SampledRobot] = []
+def run_samples(
+    worker: Worker,
+    program: str,
+    room_map: RoomMap,
+    samplers: Sequence[FactSampler],
+    settings: CheckSettings,
+) -> list[Sample]:
+    """Run a program in sampled worlds; of worlds that are alike to it, only the first may be run."""
+    if not samplers:
+        return []
+    robots: dict[int, SampledRobot] = {}
 
-    def new_robot() -> SampledRobot:
-        robots.append(SampledRobot(room_map, sampler, settings.rules, settings.skills, settings.behaviours))
-        return robots[-1]
+    def new_robot(number: int) -> SampledRobot:
+        sampler = samplers[number]
+        robots[number] = SampledRobot(room_map, sampler, settings.rules, settings.skills, settings.behaviours)
+        return robots[number]
 
-    outcome = worker.run(program, new_robot)
-    robot = robots[-1]
-    return Sample(
-        sampler.sample, outcome, tuple(robot.facts), tuple(robot.draws), _is_in_vain(outcome, robot)
-    )
+    makers = [partial(new_robot, number) for number in range(len(samplers))]
+    outcomes = worker.run_tame([(program, makers)])
+    ran: list[Sample] = []
+    for number, sampler in enumerate(samplers):
+        if (0, number) in outcomes:
+            outcome = outcomes[0, number]
+        elif any(one.is_as_in(sampler) for one in ran):
+            continue
+        else:
+            outcome = worker.run_alone(program, makers[number])
+        robot = robots[number]
+        facts, draws = tuple(robot.facts), tuple(robot.draws)
+        ran.append(Sample(sampler.sample, outcome, facts, draws, _is_in_vain(outcome, robot)))
+    return ran
 
 
 def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
@@ -62,14 +79,14 @@ def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
     return outcome.status is Status.TIMEOUT
 
 
-Run: TypeAlias = Callable[[RoomMap, Iterable[FactSampler]], Iterable[Sample]]
-"""Runs one program in several worlds."""
+Run: TypeAlias = Callable[[RoomMap, Sequence[FactSampler]], Iterable[Sample]]
+"""Runs one program in several worlds, of which it may leave out those that are alike to the program."""
 
 
 def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: int) -> list[Sample]:
     """The runs in so many worlds, and in more if the program waits or searches in vain in all of them.
 
-    Worlds that are alike to the program are run once; `width` runs go on at the same time.
+    Worlds that are alike to the program need one run only; `run` is called with at most `width` worlds.
     """
     known: list[Sample] = []
     ran: list[Sample] = []

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from itertools import groupby
+from operator import itemgetter
 
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome
@@ -25,9 +28,12 @@ def run(
     """Run programs in worlds, read as they are needed, and yield their outcomes in the order of the pairs."""
     with WorkerPool(workers or cores(), require_isolation=require_isolation) as pool:
 
-        def run_pair(pair: tuple[str, World]) -> Outcome:
-            source, world = pair
-            return pool.here().run(source, lambda: SimulatedRobot(world, rules, skills, behaviours))
+        def run_pairs(pairs: Sequence[tuple[str, World]]) -> list[Outcome]:
+            jobs = [
+                (source, [partial(SimulatedRobot, world, rules, skills, behaviours) for _, world in same])
+                for source, same in groupby(pairs, key=itemgetter(0))
+            ]
+            return [outcome for outcomes in pool.here().run_all(jobs) for outcome in outcomes]
 
         worlds: dict[World, int] = {}
 
@@ -35,7 +41,7 @@ def run(
             source, world = pair
             return digest(source, str(worlds.setdefault(world, len(worlds))))
 
-        yield from pool.map_distinct(run_pair, pairs, name=name)
+        yield from pool.map_distinct(run_pairs, pairs, name=name)
 
 
 def digest(*texts: str) -> bytes:

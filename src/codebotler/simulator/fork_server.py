@@ -8,9 +8,10 @@ import socket
 import sys
 
 from codebotler.core.world import Person, Room, World
+from codebotler.simulator.batch import message
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, start
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox import WITHOUT_REFERENCES
+from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.skill_protocol import SkillProtocol, described
 
@@ -65,13 +66,7 @@ class ForkServer:
         os.close(report)
         self._end_is_unread = False
         try:
-            setup = (described(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
-            self._door.sendall(marshal.dumps(setup, WITHOUT_REFERENCES))
-            for _ in range(self._read_report()):
-                self._warm_up()
-            self.has_seccomp = self._read_report() == 1
-            for _ in range(REHEARSALS):
-                self._rehearse()
+            self._set_up()
         except (LostProcessError, OSError):
             self.close()
             raise LostProcessError("the fork server does not start") from None
@@ -108,6 +103,16 @@ class ForkServer:
         self._process.returncode = 0  # whatever becomes of it, nobody here waits for that
         os.close(self._report)
         self._door.close()
+
+    def _set_up(self) -> None:
+        """Let it get ready, and learn whether its children will be behind a filter of system calls."""
+        setup = (described(SimulatedRobot(WARM_UP_WORLD)), WARM_UP_RUNS)
+        self._door.sendall(marshal.dumps(setup, WITHOUT_REFERENCES))
+        for _ in range(self._read_report()):
+            self._warm_up()
+        self.has_seccomp = self._read_report() == 1
+        for _ in range(REHEARSALS):
+            self._rehearse()
 
     def _warm_up(self) -> None:
         channel = self._ask_for_channel()
@@ -147,3 +152,17 @@ class ForkServer:
         if not data:
             raise LostProcessError("the fork server has ended")
         return int.from_bytes(data, sys.byteorder, signed=True)
+
+
+class BatchServer(ForkServer):
+    """A fork server whose children run batches of tame programs."""
+
+    def __init__(self) -> None:
+        super().__init__(BATCH_SERVER)
+
+    def _set_up(self) -> None:
+        """Let it run programs of ours, by which the interpreter learns; no address of these can be seen."""
+        rehearsal = message([(WARM_UP_CODE, [SimulatedRobot(WARM_UP_WORLD)])])
+        setup = marshal.dumps((rehearsal, WARM_UP_RUNS), WITHOUT_REFERENCES)
+        self._door.sendall(len(setup).to_bytes(HEADER, "big") + setup)
+        self.has_seccomp = self._read_report() == 1

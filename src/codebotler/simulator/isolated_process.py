@@ -25,12 +25,14 @@ from typing import IO
 from codebotler.core.cachedproperty import cached_property
 from codebotler.core.trace import RunError, Status
 from codebotler.simulator.sandbox import (
+    BATCH_SERVER,
     CPU_SECONDS,
     FLAGS,
     HEADER,
     MAX_FRAME,
     MORE,
     PIECE,
+    PREPARER,
     WITHOUT_REFERENCES,
 )
 
@@ -39,17 +41,28 @@ LONGEST = 60.0  # seconds of waiting for a process in all; nothing that computes
 SILENCE = 1  # seconds after which a silent process is looked at
 SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
 SANDBOX = Path(__file__).with_name("sandbox")
+CORE = "codebotler.core"
+# What a child needs that has robots of its own, besides the sandbox.
+SIMULATION = (
+    *(f"{CORE}.{name}" for name in ("errors", "skills", "trace", "words", "world")),
+    *(
+        f"{__package__}.{name}"
+        for name in ("batch_process", "fact_sampler", "ledger", "robot", "rules", "sampled_robot")
+    ),
+)
+MODULES = {PREPARER: f"{__package__}.sandbox.preparer", BATCH_SERVER: f"{__package__}.batch_process"}
 
 
 # --- starting
 
 
 def start(role: str, *descriptors: int) -> subprocess.Popen[bytes]:
-    """Start a process of the sandbox in one of its roles, and hand it descriptors."""
-    handed = (compiled_file().fileno(), *descriptors)
+    """Start a process in one of the roles, and hand it descriptors."""
+    handed = (compiled_file(*(SIMULATION if role == BATCH_SERVER else ())).fileno(), *descriptors)
+    module = MODULES.get(role, f"{__package__}.sandbox.fork_server")
     with ONE_AT_A_TIME:
         return subprocess.Popen(  # noqa: S603 - our own file, by the interpreter that runs us
-            [sys.executable, *FLAGS, str(SANDBOX / "start.py"), role, *map(str, handed)],
+            [sys.executable, *FLAGS, str(SANDBOX / "start.py"), module, role, *map(str, handed)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -76,24 +89,24 @@ os.register_at_fork(
 )
 
 
-def compiled_file() -> IO[bytes]:
-    """A file with the code of the modules that isolated processes run."""
+def compiled_file(*further: str) -> IO[bytes]:
+    """A file with the code of the modules that isolated processes run, and of further ones."""
     with ONE_AT_A_TIME:
-        return _written_file()
+        return _written_file(further)
 
 
 @cache
-def _written_file() -> IO[bytes]:
+def _written_file(further: tuple[str, ...]) -> IO[bytes]:
     file: IO[bytes] = (  # closed at the end of this process; in memory if possible, since a disk may be full
         os.fdopen(os.memfd_create("codes"), "w+b") if sys.platform == "linux" else tempfile.TemporaryFile()  # noqa: SIM115 - see above
     )
     atexit.register(file.close)
-    file.write(compiled_modules(compiled))
+    file.write(compiled_modules(compiled, further))
     file.flush()
     return file
 
 
-def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
+def compiled_modules(compiler: Callable[[str, str], bytes], further: tuple[str, ...] = ()) -> bytes:
     """The code of all modules that isolated processes run, by name, as one message."""
     simulator, package = __package__, __package__ + ".sandbox"
     sources = dict.fromkeys((simulator.partition(".")[0], simulator), "")
@@ -102,6 +115,12 @@ def compiled_modules(compiler: Callable[[str, str], bytes]) -> bytes:
         sources[f"{package}.{path.stem}"] = path.read_text(encoding="utf-8")
     for name in ("__future__", "types"):
         sources[name] = inspect.getsource(importlib.import_module(name))
+    for name in further:
+        sources[name] = (
+            SANDBOX.parents[1].joinpath(*name.split(".")[1:]).with_suffix(".py").read_text("utf-8")
+        )
+    if further:
+        sources[CORE] = ""
     codes = {name: compiler(source, name) for name, source in sources.items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol, TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, TypeAlias
 
 from codebotler.core.skills import SkillTable
-from codebotler.core.trace import Trace
-from codebotler.simulator.robot import Argument, Result, RobotError
+from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
+from codebotler.simulator.robot import Argument, Result, RobotError, SimulatedRobot
 from codebotler.simulator.rules import Rules
 
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 WAITS = "it waits for something that can never come"
+LAST_LINE = 1_000_000
+LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 # What kind of answer, what it says, and whether looking may show something else now.
-SkillAnswer: TypeAlias = tuple[str, object, bool]
+SkillAnswer: TypeAlias = tuple[str, Any, bool]
 STOP: SkillAnswer = ("stop", None, False)
 
 
@@ -71,6 +73,32 @@ class Ledger:
         if now > self.robot.now:  # if it is less, the program has found the channel, and deceives itself
             self.robot.sleep_until(float(now))
 
+    def ended(self, final: Mapping[str, object]) -> Outcome:
+        """The outcome of a run, by what its process said at the end."""
+        line = final.get("line")
+        if self.limit is not None:
+            return self.outcome(Status.TIMEOUT, "TimeoutError", self.limit, line)
+        match final:
+            case {"end": "finished"}:
+                return Outcome(Status.FINISHED, self.robot.trace)
+            case {"end": "timeout"}:
+                return self.outcome(
+                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
+                )
+            case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.errors):
+                error = self.errors[number]
+                return self.outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
+            case {"end": "python-error", "kind": str(kind), "message": str(message)}:
+                name = kind if kind.isidentifier() else "Exception"
+                return self.outcome(Status.PYTHON_ERROR, name[:100], message, line)
+            case _:
+                return self.outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")
+
+    def outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
+        """The outcome of a run that ended in an error."""
+        where = line if type(line) is int and 0 < line <= LAST_LINE else None
+        return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
+
     def _spend(self, arguments: Sequence[Argument]) -> None:
         limits, longest = self.limits, 0
         for argument in arguments:
@@ -84,3 +112,36 @@ class Ledger:
             self.limit = f"a text of more than {limits.text:,} characters"
         elif self.text > limits.trace:
             self.limit = f"texts of more than {limits.trace:,} characters in all"
+
+
+class RememberingLedger(Ledger):
+    """The ledger of a run in simulation, which does at once what the robot has just done before.
+
+    Looking and speaking leave the robot as it is. So a program that waits for something costs little, though
+    it looks a thousand times.
+    """
+
+    def __init__(self, robot: SimulatedRobot) -> None:
+        super().__init__(robot)
+        self._simulated, self._idle = robot, robot.only_looks | robot.never_fails
+        self._same: dict[tuple[object, ...], tuple[int, SkillAnswer, Sequence[Event]]] = {}
+
+    def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
+        """Let the robot execute one skill, unless that goes beyond a limit."""
+        robot = self._simulated
+        if skill not in self._idle:
+            self._same.clear()
+            return super().perform(skill, arguments)
+        call = (skill, *arguments)
+        if call in self._same:
+            text, answer, events = self._same[call]
+            if self.calls < self.limits.calls and self.text + text <= self.limits.trace:
+                self.calls += 1
+                self.text += text
+                robot.repeat(events)
+                return answer
+        text, before = self.text, len(robot.events)
+        answer = super().perform(skill, arguments)
+        if answer[0] == "ok":
+            self._same[call] = self.text - text, answer, robot.events[before:]
+        return answer

@@ -11,11 +11,11 @@ import sys
 import tempfile
 import threading
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from itertools import islice
+from functools import partial
 from queue import SimpleQueue
-from typing import Any, ParamSpec, Self, TypeVar
+from typing import Any, Generic, ParamSpec, Self, TypeVar
 
 from codebotler.simulator.worker import EngineError, Worker
 
@@ -26,6 +26,8 @@ ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
 
 IN_MEMORY = 8_000_000  # bytes of results
 UNREADABLE = b""  # in the place of a key that could not be read
+LARGEST = 16  # keys of a call
+AHEAD = 2  # calls for each thread that are under way, so that none waits
 MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
 Key = TypeVar("Key")
@@ -40,13 +42,16 @@ class WorkerPool:
     Where the kernel has no seccomp, this warns, or refuses if isolation is required.
     """
 
-    def __init__(self, workers: int, *, require_isolation: bool = False) -> None:
+    def __init__(
+        self, workers: int, *, require_isolation: bool = False, one_process_per_run: bool = False
+    ) -> None:
         if sys.platform == "win32":
             raise EngineError(ON_WINDOWS)
         self.workers = workers
         self._threads = ThreadPoolExecutor(workers, thread_name_prefix="worker")
         self._local = threading.local()
-        first = Worker()
+        self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
+        first = self._new_worker()
         if not first.has_seccomp:
             missing = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
             if require_isolation:
@@ -76,7 +81,7 @@ class WorkerPool:
             try:
                 worker = self._idle.pop()
             except IndexError:
-                worker = Worker()
+                worker = self._new_worker()
                 self._workers.append(worker)
                 if self._stopping:
                     worker.stop()
@@ -112,57 +117,92 @@ class WorkerPool:
 
     def map_distinct(
         self,
-        function: Callable[[Key], Called],
+        function: Callable[[Sequence[Key]], Sequence[Called]],
         keys: Iterable[Key],
         *,
         name: Callable[[Key], bytes],
         then: Callable[[Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """Like `map`, in threads, calling the function once for equal keys and reading ahead a little.
+        """The results for keys, in their order, calling the function in threads, with several keys at once.
 
-        While the next result is long in coming, more is read, so that the other threads have work. What the
-        keys or a call raise comes in its place among the results. `name` gives each key a short name of its
-        own. `then` is called with each result in the thread that asks for them, and its own is pickled.
+        Equal keys are called once. While the next result is long in coming, more keys are read, so that the
+        other threads have work. What the keys or a call raise comes in its place among the results.
+
+        Args:
+            function: gives a result for each of a few keys.
+            keys: read a little ahead.
+            name: gives each key a short name of its own.
+            then: called with each result in the thread that asks for them; its own result is pickled.
         """
-        failed: dict[bytes, BaseException] = {}
-        waiting: deque[bytes] = deque()
-        running: dict[Future[Called], bytes] = {}
-        ended: SimpleQueue[Future[Called]] = SimpleQueue()
-        remaining = _named(keys, name)
+        distinct = DistinctKeys(keys, name)
+        waiting, failed = distinct.waiting, distinct.failed
+        running: dict[Future[Sequence[Called]], list[bytes]] = {}
+        under_way: set[bytes] = set()
+        ended: SimpleQueue[Future[Sequence[Called]]] = SimpleQueue()
+        calls, sent = AHEAD * self.workers, 0
         with ResultFile() as done:
             while True:
-                room = min(8 * self.workers - len(running), MOST_AHEAD - len(waiting))
-                for named, key in islice(remaining, max(0, room)):
-                    waiting.append(named)
-                    if named == UNREADABLE:
-                        failed[named] = key
-                    elif named not in done and named not in running.values():
-                        future = self._threads.submit(function, key)
-                        running[future] = named
-                        future.add_done_callback(ended.put)
+                while len(running) < calls and (batch := distinct.read(batch_size(sent, calls))):
+                    future = self._threads.submit(function, list(batch.values()))
+                    running[future] = list(batch)
+                    under_way.update(batch)
+                    sent += len(batch)
+                    future.add_done_callback(ended.put)
                 if not waiting:
                     return
-                if waiting[0] not in running.values() and ended.empty():
+                if waiting[0] not in under_way and ended.empty():
                     named = waiting.popleft()
                     if named in failed:
                         raise failed[named]
                     yield done[named]
                     continue
                 future = ended.get()
-                named = running.pop(future)
+                names = running.pop(future)
+                under_way.difference_update(names)
                 try:
-                    done[named] = then(future.result())
+                    for named, result in zip(names, future.result(), strict=True):
+                        done[named] = then(result)
                 except Exception as error:  # noqa: BLE001 - raised where the result is waited for
-                    failed[named] = error
+                    failed.update(dict.fromkeys(names, error))
 
 
-def _named(keys: Iterable[Key], name: Callable[[Key], bytes]) -> Iterator[tuple[bytes, Any]]:
-    """Keys by name; last comes what was raised when they were read, if anything was."""
-    try:
-        for key in keys:
-            yield name(key), key
-    except Exception as error:  # noqa: BLE001 - raised after the results of what was read before
-        yield UNREADABLE, error
+def batch_size(sent: int, width: int) -> int:
+    """How many keys a call is given: few at first, so that small jobs are spread over all threads."""
+    return min(LARGEST, 1 + sent // width)
+
+
+class DistinctKeys(Generic[Key]):
+    """Keys with a name each, which are read in batches, equal ones once."""
+
+    def __init__(self, keys: Iterable[Key], name: Callable[[Key], bytes]) -> None:
+        self._keys, self._name = iter(keys), name
+        self._seen: set[bytes] = set()
+        self.waiting: deque[bytes] = (
+            deque()
+        )  # the names of all keys that were read, until somebody takes them
+        self.failed: dict[bytes, BaseException] = {}
+
+    def read(self, most: int) -> dict[bytes, Key]:
+        """The next new keys by name; none once there are no more, or too many wait to be taken.
+
+        What is raised when they are read comes in the place of the next one, as that of a name that fails.
+        """
+        batch: dict[bytes, Key] = {}
+        try:
+            while len(batch) < most and len(self.waiting) < MOST_AHEAD:
+                key = next(self._keys)
+                name = self._name(key)
+                self.waiting.append(name)
+                if name not in self._seen:
+                    self._seen.add(name)
+                    batch[name] = key
+        except StopIteration:
+            pass
+        except Exception as error:  # noqa: BLE001 - raised after the results of what was read before
+            self._keys = iter(())
+            self.waiting.append(UNREADABLE)
+            self.failed[UNREADABLE] = error
+        return batch
 
 
 class ResultFile:

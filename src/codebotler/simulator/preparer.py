@@ -6,6 +6,7 @@ import json
 import signal
 import socket
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.simulator.isolated_process import (
@@ -15,11 +16,12 @@ from codebotler.simulator.isolated_process import (
     cause_of_death,
     start,
 )
-from codebotler.simulator.sandbox import IMPORTING, MAX_CODE, PREPARER, REFUSED
+from codebotler.simulator.sandbox import IMPORTING, MAX_CODE, PREPARER, REFUSED, TAME
 
 MAX_SOURCE = 5_000_000
 LONG = 100_000  # characters of a program that is prepared in a process of its own
 SERVES = 500  # programs that one process prepares
+Skills: TypeAlias = tuple[str, ...]  # the names of those that a program may call
 EXHAUSTED = ("MemoryError", "TimeoutError", "Crash")
 
 
@@ -29,6 +31,7 @@ class Prepared:
 
     code: bytes  # marshalled; only a child may open it
     imports: bool  # more than is always there
+    is_tame: bool  # nothing that it does can be felt by another run in the same process
 
 
 class Preparer:
@@ -37,15 +40,16 @@ class Preparer:
     def __init__(self) -> None:
         self._process: IsolatedProcess | None = None
         self._served = 0
-        self._last: tuple[str, bool, Prepared | Outcome] | None = None
+        self._last: tuple[tuple[str, bool, Skills], Prepared | Outcome] | None = None
 
-    def prepare(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
+    def prepare(self, source: str, *, lowercase: bool, skills: Skills) -> Prepared | Outcome:
         """A program's code, or the outcome of all its runs where it has none; the last one is kept."""
         if len(source) > MAX_SOURCE:
             return refused("MemoryError", f"the program is longer than {MAX_SOURCE:,} characters")
-        if self._last is None or self._last[:2] != (source, lowercase):
-            self._last = source, lowercase, self._prepare(source, lowercase=lowercase)
-        return self._last[2]
+        asked = source, lowercase, skills
+        if self._last is None or self._last[0] != asked:
+            self._last = asked, self._prepare(*asked)
+        return self._last[1]
 
     def start(self) -> IsolatedProcess:
         """The process, started now if there is none; what is sent to it waits until it is ready."""
@@ -73,23 +77,23 @@ class Preparer:
         if self._process is not None:
             self._process.hang_up()
 
-    def _prepare(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
+    def _prepare(self, source: str, lowercase: bool, skills: Skills) -> Prepared | Outcome:  # noqa: FBT001 - private
         if len(source) > LONG or self._served >= SERVES:
             self.close()
         served = self._served
         try:
-            result = self._ask(source, lowercase=lowercase)
+            result = self._ask((source, lowercase, skills))
             if served and isinstance(result, Outcome) and result.error and result.error.kind in EXHAUSTED:
                 self.close()  # perhaps earlier programs had exhausted it: a verdict needs a fresh one
-                result = self._ask(source, lowercase=lowercase)
+                result = self._ask((source, lowercase, skills))
             return result
         finally:
             if len(source) > LONG:
                 self.close()
 
-    def _ask(self, source: str, *, lowercase: bool) -> Prepared | Outcome:
+    def _ask(self, asked: tuple[str, bool, Skills]) -> Prepared | Outcome:
         process = self.start()
-        process.send((source, lowercase))
+        process.send(asked)
         self._served += 1
         try:
             answer = process.receive_bytes(len(IMPORTING) + MAX_CODE)
@@ -105,7 +109,7 @@ class Preparer:
         process.reset_patience()
         if answer[:1] == REFUSED:
             return refused(*json.loads(answer[1:]))
-        return Prepared(answer[1:], imports=answer[:1] == IMPORTING)
+        return Prepared(answer[1:], imports=answer[:1] == IMPORTING, is_tame=answer[:1] == TAME)
 
 
 def refused(kind: str, message: str, line: int | None = None) -> Outcome:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
@@ -34,6 +34,7 @@ class RobotError(Exception):
 Argument: TypeAlias = str | tuple[Option, ...]
 Result: TypeAlias = str | list[str] | bool | int | None
 Behaviour: TypeAlias = Callable[..., Result]
+Setup: TypeAlias = "tuple[type[SimulatedRobot], tuple[Any, ...]]"  # of a copy: its class, and the arguments
 
 
 @dataclass
@@ -91,6 +92,7 @@ class SimulatedRobot:
     ) -> None:
         self.rules, self.skills = rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
+        self.setup: Setup = (SimulatedRobot, (world, rules))
         if missing := [name for name in skills if name not in self.behaviours]:
             raise UserError(f'the skill "{missing[0]}" has no behaviour: say in `behaviours` what it does')
         self.never_fails = frozenset(name for name, does in self.behaviours.items() if does is say)
@@ -112,6 +114,11 @@ class SimulatedRobot:
         """What the robot has done so far."""
         return tuple(self.events)
 
+    @property
+    def own_skills(self) -> tuple[str, ...]:
+        """The skills that a copy made from `setup` would not have: their behaviours were given."""
+        return given_behaviours(self, BEHAVIOURS)
+
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill; a question is answered by the position of the chosen option."""
         return self.behaviours[skill](self, *arguments)
@@ -126,9 +133,22 @@ class SimulatedRobot:
         """Add an event that happens here and now; the text loses the spaces at its ends."""
         self.events.append(Event(kind, text.strip(), options, None, found, self.room, self.now))
 
+    def repeat(self, events: Sequence[Event]) -> None:
+        """Add events that happened here before, and happen again now."""
+        self.events += [
+            event if event.time == self.now else replace(event, time=self.now) for event in events
+        ]
+
     def amend(self, answer: str) -> None:
         """Add to the last event what was answered."""
         self.events[-1] = replace(self.events[-1], answer=answer)
+
+
+def given_behaviours(robot: SimulatedRobot, usual: Mapping[str, Behaviour]) -> tuple[str, ...]:
+    """The skills of a robot that behave in another way than usual."""
+    if robot.behaviours is usual:
+        return ()
+    return tuple(name for name in robot.skills if robot.behaviours[name] is not usual.get(name))
 
 
 def found_in(label: str, request: str) -> bool:

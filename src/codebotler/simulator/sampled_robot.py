@@ -20,6 +20,7 @@ from codebotler.simulator.robot import (
     SimulatedRobot,
     Thing,
     found_in,
+    given_behaviours,
     is_found_by_itself,
 )
 from codebotler.simulator.rules import Rules
@@ -165,6 +166,7 @@ class SampledRobot(SimulatedRobot):
     ) -> None:
         does = SAMPLED if behaviours is None else behaviours
         super().__init__(World(tuple(map(Room, room_map.rooms)), room_map.start), rules, skills, does)
+        self.setup = SampledRobot, (room_map, sampler, rules)
         self.room_map, self.sampler = room_map, sampler
         self.only_looks |= {name for name, behaviour in does.items() if behaviour is look}
         if does.get("go_to") is drive:
@@ -177,6 +179,11 @@ class SampledRobot(SimulatedRobot):
         self.draws: list[Draw] = []
         self.searches: defaultdict[str, Search] = defaultdict(Search)
         self.excuses: set[str] = set()  # messages of errors
+
+    @property
+    def own_skills(self) -> tuple[str, ...]:
+        """The skills that a copy made from `setup` would not have."""
+        return given_behaviours(self, SAMPLED)
 
     @property
     def here(self) -> ExploredRoom:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from json.encoder import encode_basestring_ascii as quoted
 from math import inf
 from typing import TypeAlias
 
 from codebotler.core.skills import Skill
-from codebotler.core.trace import Option, Outcome, RunError, Status
+from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.isolated_process import (
     IsolatedProcess,
     LostProcessError,
@@ -18,8 +19,6 @@ from codebotler.simulator.ledger import STOP, WAITS, Ledger, SkillAnswer, SkillP
 from codebotler.simulator.robot import Argument, Result
 from codebotler.simulator.sandbox import ACTS, CPU_SECONDS, LIVE_CPU_SECONDS, LOOKS, TELLS
 
-LAST_LINE = 1_000_000
-LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
 Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 
@@ -58,7 +57,9 @@ class SkillProtocol:
             final = None
         except ProtocolError as error:
             self.child.end()
-            return self._outcome(Status.KILLED, "Crash", f"the program spoke on the robot's line: {error}")
+            return self.ledger.outcome(
+                Status.KILLED, "Crash", f"the program spoke on the robot's line: {error}"
+            )
         except BaseException:
             self.child.end()
             raise
@@ -66,9 +67,6 @@ class SkillProtocol:
             return self._died(self.child.ended())
         self.child.kill()
         self.child.hang_up()
-        if self.ledger.limit is not None:
-            line = final.get("line") if final else None
-            return self._outcome(Status.TIMEOUT, "TimeoutError", self.ledger.limit, line)
         return self._ended(final or {})
 
     def talk(self) -> dict[str, object] | None:
@@ -99,7 +97,7 @@ class SkillProtocol:
             return STOP
         if name in self._skills:
             skill = self._skills[name]
-            return self.ledger.perform(skill.name, _arguments(skill, values))
+            return self.ledger.perform(skill.name, arguments_of(skill, values))
         match name, values:
             case "sleep", [float(seconds)] if self.robot.is_live and 0 <= seconds < inf:
                 self.robot.sleep_until(self.robot.now + seconds)
@@ -117,34 +115,15 @@ class SkillProtocol:
         return {request: self.robot.perform(name, ()) for request, name in self._glances}
 
     def _ended(self, final: dict[str, object]) -> Outcome:
-        line = final.get("line")
-        match final:
-            case {"end": "again"} if not self._may_import:
-                raise ImportsMoreError(self.child.patience)
-            case {"end": "finished"}:
-                return Outcome(Status.FINISHED, self.robot.trace)
-            case {"end": "timeout"}:
-                return self._outcome(
-                    Status.TIMEOUT, "TimeoutError", f"{self.limits.ticks:,} turns of loops", line
-                )
-            case {"end": "robot-error", "number": int(number)} if 0 <= number < len(self.ledger.errors):
-                error = self.ledger.errors[number]
-                return self._outcome(Status.ROBOT_ERROR, error.kind, str(error), line)
-            case {"end": "python-error", "kind": str(kind), "message": str(message)}:
-                name = kind if kind.isidentifier() else "Exception"
-                return self._outcome(Status.PYTHON_ERROR, name[:100], message, line)
-            case _:
-                return self._outcome(Status.KILLED, "Crash", "the program spoke on the robot's line")
+        if final.get("end") == "again" and self.ledger.limit is None and not self._may_import:
+            raise ImportsMoreError(self.child.patience)
+        return self.ledger.ended(final)
 
     def _died(self, status: int) -> Outcome:
         if not self._heard and not self.child.was_isolated():
             raise LostProcessError("a child ended before it was isolated")
         cause, error = cause_of_death(status, LIVE_CPU_SECONDS if self.robot.is_live else CPU_SECONDS)
         return Outcome(cause, self.robot.trace, error)
-
-    def _outcome(self, status: Status, kind: str, message: str, line: object = None) -> Outcome:
-        where = line if type(line) is int and 0 < line <= LAST_LINE else None
-        return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
 
 
 def described(robot: SkillPerformer) -> Description:
@@ -159,7 +138,8 @@ def described(robot: SkillPerformer) -> Description:
     )
 
 
-def _arguments(skill: Skill, values: list[object]) -> list[Argument]:
+def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:
+    """What a program gives to a skill, as the robot takes it; a ProtocolError if it is anything else."""
     if len(values) != len(skill.parameters):
         raise ProtocolError("a skill has other parameters")
     arguments: list[Argument] = []

@@ -5,33 +5,43 @@ from __future__ import annotations
 import logging
 import os
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeAlias
 
 from codebotler.core.trace import Outcome
-from codebotler.simulator.fork_server import ForkServer
-from codebotler.simulator.isolated_process import LostProcessError
+from codebotler.simulator.batch import outcomes
+from codebotler.simulator.fork_server import BatchServer, ForkServer
+from codebotler.simulator.isolated_process import LostProcessError, ProtocolError
 from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.preparer import Prepared, Preparer
-from codebotler.simulator.sandbox import FORK_SERVER, LIBRARY_SERVER, LIVE_SERVER
+from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIBRARY_SERVER, LIVE_SERVER
 from codebotler.simulator.skill_protocol import ImportsMoreError, SkillProtocol
 
 EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
+NewRobot: TypeAlias = Callable[[], SimulatedRobot]
+Job: TypeAlias = tuple[str, Sequence[NewRobot]]
+"""A program, and what makes the robots with which it runs, one after the other."""
 
 
 class Worker:
     """The processes that run programs one at a time.
 
-    Nearly all programs import nothing. They run in children of a fork server that is small and cheap to fork,
-    the others in those of one that has the standard library, which is started when the first of them comes.
+    Nearly all programs are tame: some of them share a child, which has copies of their robots. Whatever is
+    not, and whatever a child could not decide, has a child of its own for each run, whose skills the engine
+    performs: from a fork server that is small and cheap to fork, or from one that has the standard library.
+    These are started when the first such program comes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, one_process_per_run: bool = False) -> None:
         self._stopped = False
+        self._one_process_per_run = one_process_per_run
         self._preparer = Preparer()
         self._preparer.start()  # beside the fork server
         self._fork_servers: dict[str, ForkServer] = {}
         try:
-            self.has_seccomp = self._fork_server(FORK_SERVER).has_seccomp
+            first = self._fork_server(FORK_SERVER if one_process_per_run else BATCH_SERVER)
+            self.has_seccomp = first.has_seccomp
         except LostProcessError as error:
             self._preparer.close()
             raise EngineError(f"the engine cannot start: {error}") from None
@@ -39,21 +49,27 @@ class Worker:
             self._preparer.close()
             raise
 
-    def run(self, source: str, new_robot: Callable[[], SkillPerformer]) -> Outcome:
-        """Run a program, once more with a new robot if a process was lost through no fault of the program."""
-        name = zlib.crc32(source.encode(errors="surrogatepass"))
-        EVENTS.debug("program %08x: started", name)
-        try:
-            outcome = self._try(source, new_robot)
-        except LostProcessError as first:
-            EVENTS.debug("program %08x: a process was lost, and it is run again: %s", name, first)
-            try:
-                outcome = self._try(source, new_robot)
-            except LostProcessError as error:
-                raise EngineError(f"an isolated process was lost twice: {error}") from None
-        why = "" if outcome.error is None else f" ({outcome.error.kind}: {outcome.error.message!a})"
-        EVENTS.debug("program %08x: %s%s", name, outcome.status.value, why)
-        return outcome
+    def run(self, source: str, new_robot: NewRobot) -> Outcome:
+        """Run a program with a robot, and once more with a new one if need be."""
+        return self.run_all([(source, [new_robot])])[0][0]
+
+    def run_all(self, jobs: Sequence[Job]) -> list[list[Outcome]]:
+        """Run programs, of which each outcome depends on nothing but the program and its robot.
+
+        Args:
+            jobs: the programs; all robots have the same skills and the same way with literals.
+
+        Returns:
+            for each program, the outcome with each of its robots; a run that is repeated has a new robot.
+        """
+        known = self.run_tame(jobs)
+        return [
+            [
+                known[number, run] if (number, run) in known else self.run_alone(source, new_robot)
+                for run, new_robot in enumerate(robots)
+            ]
+            for number, (source, robots) in enumerate(jobs)
+        ]
 
     def run_live(self, source: str, robot: SkillPerformer) -> Outcome:
         """Run a program on a robot, once and never again: what that has done cannot be undone.
@@ -61,7 +77,7 @@ class Worker:
         What the robot raises besides `RobotError` ends the run and is raised here.
         """
         try:
-            prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
+            prepared = self._prepare(source, robot)
             return prepared if isinstance(prepared, Outcome) else self._fork(LIVE_SERVER, prepared, robot)
         except LostProcessError as error:
             self.close()
@@ -92,10 +108,82 @@ class Worker:
         while self._fork_servers:
             self._fork_servers.popitem()[1].forget()
 
-    def _try(self, source: str, new_robot: Callable[[], SkillPerformer]) -> Outcome:
+    def _prepare(self, source: str, robot: SkillPerformer) -> Prepared | Outcome:
+        lowercase = robot.rules.literals == "lowercase"
+        return self._preparer.prepare(source, lowercase=lowercase, skills=tuple(robot.skills))
+
+    # --- several tame programs in a child
+
+    def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
+        """The outcomes of tame programs, as far as they are certain, by the numbers of job and robot."""
+        known: dict[tuple[int, int], Outcome] = {}
+        if self._one_process_per_run:
+            return known
+        try:
+            waiting = list(self._tame(jobs))
+            while waiting:
+                waiting = self._run_batch(waiting, jobs, known)
+        except (LostProcessError, OSError):
+            if self._stopped:
+                raise EngineError("the engine was stopped") from None
+            self.close()
+        return known
+
+    def _tame(self, jobs: Sequence[Job]) -> Iterator[tuple[int, bytes, list[SimulatedRobot]]]:
+        for number, (source, robots) in enumerate(jobs):
+            first = robots[0]()
+            prepared = self._prepare(source, first)
+            if isinstance(prepared, Prepared) and prepared.is_tame:
+                yield number, prepared.code, [first, *(new() for new in robots[1:])]
+
+    def _run_batch(
+        self,
+        batch: list[tuple[int, bytes, list[SimulatedRobot]]],
+        jobs: Sequence[Job],
+        known: dict[tuple[int, int], Outcome],
+    ) -> list[tuple[int, bytes, list[SimulatedRobot]]]:
+        """Run programs in one child; return those that it had not begun when it broke off, if it did."""
+        child = self._fork_server(BATCH_SERVER).fork()
+        for number, _, robots in batch:
+            for _ in robots:
+                _log(jobs[number][0], "started")
+        told = outcomes(child, [(code, robots) for _, code, robots in batch])
+        waiting = list(batch)
+        try:
+            while waiting:
+                number, _, robots = waiting.pop(0)
+                for run in range(len(robots)):
+                    outcome = next(told)
+                    if outcome is not None:
+                        known[number, run] = outcome
+                        _log_end(jobs[number][0], outcome)
+        except (LostProcessError, ProtocolError, TimeoutError):
+            pass
+        finally:
+            child.kill()
+            child.hang_up()
+        return waiting
+
+    # --- a child for each run
+
+    def run_alone(self, source: str, new_robot: NewRobot) -> Outcome:
+        """Run a program, once more with a new robot if a process was lost through no fault of the program."""
+        _log(source, "started")
+        try:
+            outcome = self._try(source, new_robot)
+        except LostProcessError as first:
+            _log(source, f"a process was lost, and it is run again: {first}")
+            try:
+                outcome = self._try(source, new_robot)
+            except LostProcessError as error:
+                raise EngineError(f"an isolated process was lost twice: {error}") from None
+        _log_end(source, outcome)
+        return outcome
+
+    def _try(self, source: str, new_robot: NewRobot) -> Outcome:
         try:
             robot = new_robot()
-            prepared = self._preparer.prepare(source, lowercase=robot.rules.literals == "lowercase")
+            prepared = self._prepare(source, robot)
             if isinstance(prepared, Outcome):
                 return prepared
             if prepared.imports:
@@ -121,10 +209,20 @@ class Worker:
 
     def _fork_server(self, role: str) -> ForkServer:
         if role not in self._fork_servers:
-            self._fork_servers[role] = ForkServer(role)
+            self._fork_servers[role] = BatchServer() if role == BATCH_SERVER else ForkServer(role)
             if self._stopped:
                 self._fork_servers[role].kill()
         return self._fork_servers[role]
+
+
+def _log(source: str, what: str) -> None:
+    if EVENTS.isEnabledFor(logging.DEBUG):
+        EVENTS.debug("program %08x: %s", zlib.crc32(source.encode(errors="surrogatepass")), what)
+
+
+def _log_end(source: str, outcome: Outcome) -> None:
+    why = "" if outcome.error is None else f" ({outcome.error.kind}: {outcome.error.message!a})"
+    _log(source, f"{outcome.status.value}{why}")
 
 
 class EngineError(RuntimeError):

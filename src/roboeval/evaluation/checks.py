@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -63,9 +63,10 @@ def _open(run: Run, metadata: dict[str, Any]) -> Appender:
     return Appender(rows)
 
 
-def _check(plans: Mapping[str, RoomMap], settings: CheckSettings, worker: Worker, work: Work) -> Check:
-    task, program = work
-    return check_on(worker, program, plans[task], settings)
+def _check(
+    plans: Mapping[str, RoomMap], settings: CheckSettings, worker: Worker, works: Sequence[Work]
+) -> list[Check]:
+    return [check_on(worker, program, plans[task], settings) for task, program in works]
 
 
 def _sentences(check: Check) -> list[str]:

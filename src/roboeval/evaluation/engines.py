@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from typing import Protocol, Self, TypeAlias, TypeVar
 
@@ -15,13 +15,15 @@ PYTHON = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend o
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
 Ran = TypeVar("Ran")
 Value = TypeVar("Value")
+RunPrograms: TypeAlias = Callable[[Worker, Sequence[Work]], Sequence[Ran]]
+"""Runs a few programs on a worker, and returns a result for each."""
 
 
 class Engine(Protocol):
     """Calls functions that run programs isolated."""
 
     def map_distinct(
-        self, function: Callable[[Worker, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
+        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
         """The values of `then`, in the order of the programs, which are read as needed; equal ones run once.
 
@@ -51,10 +53,10 @@ class Local:
             self._pool.__exit__()
 
     def map_distinct(
-        self, function: Callable[[Worker, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
+        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
         """See `Engine`."""
         here = self._pool.here
         return self._pool.map_distinct(
-            lambda work: function(here(), work), works, name=lambda work: digest(*work), then=then
+            lambda some: function(here(), some), works, name=lambda work: digest(*work), then=then
         )

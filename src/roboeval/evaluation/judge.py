@@ -129,12 +129,15 @@ def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> Non
 
 
 def run_in_worlds(
-    suite: Suite, worker: Worker, work: tuple[str, str], *, ablated: bool
-) -> tuple[str, Sequence[Outcome]]:
-    """Run a program in each world of its task; return the task and how each run ended."""
-    task, program = work
-    scenarios = suite.tasks[task].judged_in(ablated=ablated)
-    return task, [worker.run(program, partial(SimulatedRobot, one.world, suite.rules)) for one in scenarios]
+    suite: Suite, worker: Worker, works: Sequence[tuple[str, str]], *, ablated: bool
+) -> list[tuple[str, Sequence[Outcome]]]:
+    """Run programs, each in the worlds of its task; return for each the task and how each run ended."""
+    jobs = [
+        (program, [partial(SimulatedRobot, one.world, suite.rules) for one in scenarios])
+        for task, program in works
+        for scenarios in [suite.tasks[task].judged_in(ablated=ablated)]
+    ]
+    return [(task, outcomes) for (task, _), outcomes in zip(works, worker.run_all(jobs), strict=True)]
 
 
 def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> Judgement | None:

@@ -16,14 +16,13 @@ from typing import Any, Self
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP, ResultFile
+from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP, ResultFile, batch_size
 from codebotler.simulator.worker import EngineError, Worker
-from roboeval.evaluation.engines import PYTHON, Ran, Value, Work
+from roboeval.evaluation.engines import PYTHON, Ran, RunPrograms, Value, Work
 
 LOG = logging.getLogger("roboeval.ray")
 VERSIONS = f"codebotler {__version__} with Python {PYTHON}"
 
-LARGEST = 16  # programs of a shard: some tens of milliseconds, beside which Ray's one or two are little
 AHEAD = 2  # shards for each core that are under way, so that none waits for this process
 RETRIES = 20  # of a shard whose machine is lost
 PATIENCE_S = 10  # until it is asked whether the cluster has any core left
@@ -64,7 +63,7 @@ class RayCluster:
         self._ray.shutdown()
 
     def map_distinct(
-        self, function: Callable[[Worker, Work], Ran], works: Iterable[Work], then: Callable[[Ran], Value]
+        self, function: RunPrograms[Ran], works: Iterable[Work], then: Callable[[Ran], Value]
     ) -> Iterator[Value]:
         """See `Engine`.
 
@@ -80,7 +79,7 @@ class RayCluster:
         with ResultFile() as done:
             while True:
                 while len(shards) < most:
-                    size = min(shard_size(sent, most), MOST_AHEAD - len(waiting))
+                    size = min(batch_size(sent, 2 * most), MOST_AHEAD - len(waiting))
                     read = [(digest(*work), work) for work in islice(works, size)]
                     if not read:
                         break
@@ -140,13 +139,8 @@ class RayCluster:
         )
 
 
-def shard_size(sent: int, most: int) -> int:
-    """How many programs to put into a shard: few at first, so that small jobs are spread over all cores."""
-    return min(LARGEST, 1 + sent // (2 * most))
-
-
 def run_shard(
-    functions: tuple[Callable[[Worker, Work], Ran], Callable[[Ran], Value]],
+    functions: tuple[RunPrograms[Ran], Callable[[Ran], Value]],
     works: Sequence[Work],
     versions: str,  # others might judge otherwise
     require_isolation: bool,  # noqa: FBT001 - Ray passes positions
@@ -158,7 +152,7 @@ def run_shard(
     function, then = functions
     try:
         worker = own_worker(require_isolation=require_isolation)
-        values = [then(function(worker, work)) for work in works]
+        values = [then(ran) for ran in function(worker, works)]
     except EngineError as error:
         raise EngineError(f"{machine}: {error}") from None
     return values, None if worker.has_seccomp else f"{machine}: {NO_SECCOMP}"

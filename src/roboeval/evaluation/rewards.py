@@ -130,12 +130,10 @@ class Rewards:
 
 def judged(suite: Suite, task: str, program: str) -> float:
     """The reward of a program, in a thread that has a worker."""
-    worker = shared_pool().here()
-    shares = []
-    for scenario in suite.tasks[task].scenarios:
-        outcome = worker.run(program, partial(SimulatedRobot, scenario.world, suite.rules))
-        shares.append(Share.of(outcome, scenario))
-    return total(shares)
+    scenarios = suite.tasks[task].scenarios
+    robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario in scenarios]
+    (outcomes,) = shared_pool().here().run_all([(program, robots)])
+    return total([Share.of(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
 
 
 REWARDS = Rewards()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome, Status
-from codebotler.core.world import World
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
@@ -20,9 +20,9 @@ from roboeval.suites.load import Scenario, Suite, Task
 from roboeval.suites.solutions import equivalent_mutants
 
 WORLDS = 200  # to draw by default
+AT_ONCE = 16  # worlds in which a mutant runs before its outcomes are looked at
 CRASHED = frozenset({Status.PYTHON_ERROR, Status.KILLED})
 
-Run: TypeAlias = Callable[[str, World], Outcome]
 Watch: TypeAlias = Callable[[Iterable[Any], str, int], Iterator[Any]]  # passes on a number of items
 
 
@@ -43,17 +43,23 @@ def mutation_score(
     """
     scenarios = worlds_of(suite, task, worlds, seed)
 
-    def run(program: str, world: World) -> Outcome:
-        return pool.here().run(program, lambda: SimulatedRobot(world, suite.rules))
+    robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario in scenarios]
 
-    def outcomes(original: Original) -> tuple[Outcome, ...]:
-        return tuple(run(original.program, scenario.world) for scenario in scenarios)
+    def run(program: str) -> Iterator[Outcome]:
+        for start in range(0, len(robots), AT_ONCE):
+            yield from pool.here().run_all([(program, robots[start : start + AT_ONCE])])[0]
+
+    def outcomes(some: Sequence[Original]) -> list[tuple[Outcome, ...]]:
+        return [tuple(run(original.program)) for original in some]
 
     def result(mutant: Mutant) -> Result:
-        found = result_of(mutant.program, before[mutant.original], scenarios, run)
+        found = result_of(run(mutant.program), before[mutant.original], scenarios)
         if found.status is MutantStatus.SURVIVED and mutant.key in equivalent:
             return Result(MutantStatus.EQUIVALENT, why=equivalent[mutant.key])
         return found
+
+    def results_of(some: Sequence[Mutant]) -> list[Result]:
+        return [result(mutant) for mutant in some]
 
     equivalent = equivalent_mutants(task)
     programs = originals(task, further)
@@ -63,7 +69,7 @@ def mutation_score(
     right = tuple(original for original in programs if faults[original] is None)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
     made = drawn(mutants(right, context), most, seed)
-    tried = pool.map_distinct(result, made, name=lambda mutant: digest(mutant.program))
+    tried = pool.map_distinct(results_of, made, name=lambda mutant: digest(mutant.program))
     results = watched(tried, f"mutating {task.name}", len(made))
     return MutationScore(
         task=task.name,
@@ -92,15 +98,17 @@ def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> Resu
     return next((_killed(verdict) for verdict in verdicts if not verdict.satisfied), None)
 
 
-def result_of(program: str, before: Sequence[Outcome], scenarios: Sequence[Scenario], run: Run) -> Result:
-    """The result of one mutant, tried until a check kills it.
+def result_of(
+    outcomes: Iterable[Outcome], before: Sequence[Outcome], scenarios: Sequence[Scenario]
+) -> Result:
+    """The result of one mutant, whose outcomes are read until a check kills it.
 
     One that crashes is tried further: if it crashes in each world, no check is needed to find it wrong.
     """
     crashes: list[Verdict] = []
     changed = False
-    for outcome, scenario in zip(before, scenarios, strict=True):
-        verdict = judge(run(program, scenario.world), scenario)
+    for now, outcome, scenario in zip(outcomes, before, scenarios, strict=True):
+        verdict = judge(now, scenario)
         if verdict.outcome.status in CRASHED:
             crashes.append(verdict)
         elif not verdict.satisfied:

@@ -248,10 +248,11 @@ def test_waiting_at_several_lines_is_one_problem(checks: Checks) -> None:
 
 def test_what_waits_for_ever_without_a_look_is_run_once(monkeypatch: pytest.MonkeyPatch) -> None:
     worker = Worker()
-    run = Mock(side_effect=worker.run)
-    monkeypatch.setattr(worker, "run", run)
+    run = Mock(side_effect=worker.run_alone)
+    monkeypatch.setattr(worker, "run_alone", run)
+    loop = "class A: pass\n" + START + "while True:\n        time.sleep(1)\n"
     try:
-        found = check_on(worker, START + "while True:\n        time.sleep(1)\n", RoomMap(ROOMS, ROOMS[0]))
+        found = check_on(worker, loop, RoomMap(ROOMS, ROOMS[0]))
     finally:
         worker.close()
     assert run.call_count == 1

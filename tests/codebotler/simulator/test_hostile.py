@@ -71,6 +71,8 @@ def task_program():
     say(str([sys.getrecursionlimit(), sys.get_int_max_str_digits(), gc.get_threshold(), gc.isenabled()]))
 """
 
+TAME = "def task_program():\n    pass\n"
+
 
 @dataclass(frozen=True)
 class Declared:
@@ -300,7 +302,8 @@ def reach(
     libc = ctypes.CDLL(None)
     os.environ["SECRET_OF_THE_ENGINE"] = SECRET
     reach = Reach(folder, Worker(), bystander, listeners)
-    reach.run(HONEST)  # by now all processes are there
+    for program in (TAME, f"class A: pass\n{TAME}", HONEST):
+        reach.run(program)  # by now all processes are there
     before = {number: signal.signal(number, lambda n, _: reach.signals.append(n)) for number in COUNTED}
     assert libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0
     with pytest.MonkeyPatch.context() as patch:

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,7 +24,7 @@ from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine
 from roboeval.evaluation.engines import Local, Work
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.ray import LARGEST, VERSIONS, RayCluster, run_shard, shard_size
+from roboeval.evaluation.ray import VERSIONS, RayCluster, run_shard
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.evaluation.runs.rows import Row
 from roboeval.suites.load import Suite
@@ -56,20 +56,15 @@ def numbered(numbers: range) -> Iterator[Work]:
     return (("", str(number)) for number in numbers)
 
 
+def numbers_of(_worker: object, works: Sequence[Work]) -> list[int]:
+    return [int(number) for _, number in works]
+
+
 # --- without a cluster
 
 
-def test_shards_are_small_at_first() -> None:
-    sizes: list[int] = []
-    for _ in range(60):
-        sizes.append(shard_size(sum(sizes), 4))
-    assert sizes[:8] == [1] * 8
-    assert sizes == sorted(sizes)
-    assert sizes[-1] == LARGEST
-
-
 def test_another_version_does_not_judge() -> None:
-    functions = (lambda _, work: work, list)
+    functions = (lambda _, works: works, list)
     with pytest.raises(EngineError, match=r"has codebotler .*, and not codebotler 0\.0\.1"):
         run_shard(functions, [], "codebotler 0.0.1 with Python 3.9", require_isolation=False)
 
@@ -79,7 +74,7 @@ def test_missing_isolation_is_warned_of_once_or_refused(
 ) -> None:
     monkeypatch.setattr(rayengine, "Worker", lambda: SimpleNamespace(has_seccomp=False, close=lambda: None))
     monkeypatch.setattr(rayengine, "own_worker", rayengine.own_worker.__wrapped__)
-    functions, works = (lambda _, work: int(work[1]), abs), list(numbered(range(2)))
+    functions, works = (numbers_of, abs), list(numbered(range(2)))
     with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
         run_shard(functions, works, VERSIONS, require_isolation=True)
     result = run_shard(functions, works, VERSIONS, require_isolation=False)
@@ -96,7 +91,7 @@ with RayCluster() as cluster:
     import ray
     import psutil  # which comes with it
     works = [("", "1"), ("", "2"), ("", "1")]
-    print(list(cluster.map_distinct(lambda worker, work: int(work[1]), works, abs)))
+    print(list(cluster.map_distinct(lambda worker, works: [int(n) for _, n in works], works, abs)))
     print([node["NodeManagerAddress"] for node in ray.nodes()])
     ours = {process.pid for process in psutil.Process().children(recursive=True)}
     sockets = [one for one in psutil.net_connections("tcp") if one.pid in ours and one.status == "LISTEN"]
@@ -216,7 +211,9 @@ def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluste
             read.append(number)
             yield "", str(number % 3000)
 
-    results = cluster.map_distinct(lambda _, work: (int(work[1]), time.time_ns()), works(), tuple)
+    results = cluster.map_distinct(
+        lambda _, some: [(n, time.time_ns()) for n in numbers_of(_, some)], works(), tuple
+    )
     first = [next(results) for _ in range(50)]
     assert [number for number, _ in first] == list(range(50))
     assert len(read) <= 50 + MOST_AHEAD
@@ -227,14 +224,16 @@ def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluste
 
 
 def test_what_a_call_raises_is_raised_here(cluster: RayCluster) -> None:
-    results = cluster.map_distinct(lambda _, work: 1 // (int(work[1]) - 1), numbered(range(2)), abs)
+    results = cluster.map_distinct(
+        lambda _, works: [1 // (int(number) - 1) for _, number in works], numbered(range(2)), abs
+    )
     with pytest.raises(ZeroDivisionError):
         list(results)
 
 
 def test_results_that_are_not_wanted_do_no_harm(cluster: RayCluster) -> None:
     for number in range(40):  # a shard that was cancelled when just done would abort this process soon
-        results = cluster.map_distinct(lambda _, work: int(work[1]), numbered(range(500)), abs)
+        results = cluster.map_distinct(numbers_of, numbered(range(500)), abs)
         assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
         del results
 
@@ -285,4 +284,4 @@ def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
     nodes.kill()
     monkeypatch.setattr(rayengine, "PATIENCE_S", 1)
     with pytest.raises(EngineError, match="no free core"):
-        list(cluster.map_distinct(lambda _, work: work[1], numbered(range(2)), int))
+        list(cluster.map_distinct(numbers_of, numbered(range(2)), int))

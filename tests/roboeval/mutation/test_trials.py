@@ -5,17 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from codebotler.core.errors import UserError
+from codebotler.core.trace import Outcome
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.mutation.mutants import Mutant, Original
 from roboeval.mutation.report import to_yaml
 from roboeval.mutation.score import MutantStatus, MutationScore, Result, TriedMutant
-from roboeval.mutation.trials import Run, mutation_score, result_of, worlds_of
+from roboeval.mutation.trials import mutation_score, result_of, worlds_of
 from roboeval.suites.load import Suite, Task, load_suite
 from roboeval.suites.solutions import equivalent_mutants
 from small_suite import a_suite
@@ -64,8 +66,9 @@ def program(body: str) -> str:
     return "def task_program():\n" + "".join(f"    {line}\n" for line in body.split("; "))
 
 
-def runner(suite: Suite, pool: WorkerPool) -> Run:
-    return lambda source, world: pool.here().run(source, lambda: SimulatedRobot(world, suite.rules))
+def outcomes_of(source: str, suite: Suite, pool: WorkerPool) -> list[Outcome]:
+    robots = [partial(SimulatedRobot, one.world, suite.rules) for one in suite.task("T").scenarios]
+    return pool.here().run_all([(source, robots)])[0]
 
 
 @pytest.mark.parametrize(
@@ -84,9 +87,8 @@ def runner(suite: Suite, pool: WorkerPool) -> Run:
     ],
 )
 def test_what_becomes_of_a_mutant(body: str, result: Result, suite: Suite, pool: WorkerPool) -> None:
-    scenarios, run = suite.task("T").scenarios, runner(suite, pool)
-    before = [run(RIGHT.program, scenario.world) for scenario in scenarios]
-    assert result_of(program(body), before, scenarios, run) == result
+    before, now = (outcomes_of(source, suite, pool) for source in (RIGHT.program, program(body)))
+    assert result_of(now, before, suite.task("T").scenarios) == result
 
 
 def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, pool: WorkerPool) -> None:

@@ -8,8 +8,9 @@ page of memory makes each fork dearer.
 # The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings.
 FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
 
-# Roles: compiles programs; forks runs; forks runs that import something; forks runs on a robot.
-PREPARER, FORK_SERVER = "preparer", "fork-server"
+# Roles: compiles programs; forks batches of tame programs; forks runs; forks runs that import something;
+# forks runs on a robot.
+PREPARER, BATCH_SERVER, FORK_SERVER = "preparer", "batch-fork-server", "fork-server"
 LIBRARY_SERVER, LIVE_SERVER = "library-fork-server", "live-fork-server"
 
 CHANNEL = 3  # the descriptor by which a closed process and the engine talk
@@ -25,12 +26,14 @@ MAX_CODE = 10_000_000  # bytes of a program's compiled code
 PROGRAM = "<program>"  # the file that a program's code says it comes from
 
 # Names of the functions that programs call without knowing; no source text can spell them.
-FUEL, ENTRY, ENTER, BY_NAME = "<fuel>", "<entry>", "<enter>", "<by-name>"
+FUEL, CAUGHT, ENTRY, ENTER, BY_NAME = "<fuel>", "<caught>", "<entry>", "<enter>", "<by-name>"
 
 # How a skill is called: waiting for its result; not waiting, since there is none and it cannot fail; and
 # waiting only until the result is known, which then stays the same until the robot acts.
 ACTS, TELLS, LOOKS = 0, 1, 2
 
-# First byte of the preparer's answer: before code, before code that imports more than is always there, and
-# before the reason why there is no code.
-PLAIN, IMPORTING, REFUSED = b"p", b"i", b"-"
+ONLY_TIME = -1  # in a transcript, in the place of a call where only the clock is told
+
+# First byte of the preparer's answer: before code, before that of a tame program, before code that imports
+# more than is always there, and before the reason why there is no code.
+PLAIN, TAME, IMPORTING, REFUSED = b"p", b"t", b"i", b"-"

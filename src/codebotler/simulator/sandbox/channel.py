@@ -31,7 +31,12 @@ def send(text: str) -> None:
 
 def send_bytes(data: bytes) -> None:
     """Write one frame."""
-    data = len(data).to_bytes(HEADER, "big") + data
+    send_frames([data])
+
+
+def send_frames(frames: list[bytes]) -> None:
+    """Write frames at once."""
+    data = b"".join([len(frame).to_bytes(HEADER, "big") + frame for frame in frames])
     written = write(CHANNEL, data)
     while written < len(data):
         data = data[written:]

@@ -11,7 +11,7 @@ from marshal import loads
 from sys import _getframe as getframe
 from sys import setrecursionlimit
 
-from codebotler.simulator.sandbox import ACTS, BY_NAME, ENTER, ENTRY, FUEL, LOOKS, PROGRAM, TELLS
+from codebotler.simulator.sandbox import ACTS, BY_NAME, CAUGHT, ENTER, ENTRY, FUEL, LOOKS, PROGRAM, TELLS
 from codebotler.simulator.sandbox.channel import receive, send
 
 TYPE_CHECKING = False
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from typing import Any, TypeAlias
 
     Skills: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
+    Limits: TypeAlias = tuple[int, float, int, int, int, float, bool]
 
 # Functions below look here for `len` and the like, and not where a program can write.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
@@ -35,6 +36,8 @@ UNAWAITED = "task_program is a coroutine, which nobody awaits; write def, not as
 class ProgramRun:
     """One run of one program; all that can be is made before the fork, in the fork server."""
 
+    recursion_limit = RECURSION_LIMIT
+
     def __init__(self) -> None:
         self.skills: Skills = ()  # name, parameters (name, and type `str` or `list`) and way of calling
         self.now = 0.0
@@ -46,10 +49,7 @@ class ProgramRun:
         self.sure: tuple[str, ...] = ()  # requests that succeed and return nothing, whenever they are made
         self.known: dict[str, Any] = {}  # what looking shows now, by request
         self.namespace = types.ModuleType("__main__")
-        # One call deeper than a skill goes before it lifts the recursion limit: this meets the limit first.
-        use_fuel = self.fuel_counter()
-        counters = {FUEL: use_fuel, ENTRY: lambda: use_fuel(), ENTER: self.enter, BY_NAME: self.start_task}  # noqa: PLW0108 - see above
-        vars(builtins).update(counters)
+        vars(builtins).update(self.counters())
 
     def provide(self, skills: Skills) -> None:
         """Give the program what it can use without an import: the skills, and `sys` and `time`."""
@@ -62,25 +62,25 @@ class ProgramRun:
 
     def execute(
         self,
-        code: bytes,
-        limits: tuple[int, float, int, int, int, float, bool],
+        code: bytes | types.CodeType,
+        limits: Limits,
         sure: tuple[str, ...],
         known: dict[str, Any],
     ) -> str:
-        """Run the program to its end; how it ended, as JSON."""
+        """Run the program, marshalled or not, to its end; how it ended, as JSON."""
         self.fuel, self.seconds, self.calls, self.longest, self.room, self.start, self.is_live = limits
         self.sure, self.known = sure, known
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
         try:
-            exec(loads(code), names)  # noqa: S102, S302 - this is what the sandbox is for
+            exec(loads(code) if type(code) is bytes else code, names)  # noqa: S102, S302 - this is what the sandbox is for
             task = names.get("task_program")
             if not self.has_entered(task):
                 eval(call_task.__code__, names)  # noqa: S307 - the same
             if self.is_unawaited(task):
                 raise TypeError(UNAWAITED)  # noqa: TRY301 - a function more, and recursion goes less deep
         except BaseException as error:  # noqa: BLE001 - whatever ends a program is an outcome
-            setrecursionlimit(RECURSION_LIMIT + HEADROOM)
+            setrecursionlimit(self.recursion_limit + HEADROOM)
             return self.ended_by(error)
         return '{"end":"timeout","line":null}' if self.spent else '{"end":"finished"}'
 
@@ -117,6 +117,18 @@ class ProgramRun:
         name = str.__getitem__(NAME_OF(kind), slice(100))
         return f'{{"end":"python-error","kind":{quoted(name)},"message":{quoted(message)},{where}}}'
 
+    def counters(self) -> dict[str, Callable[[], None]]:
+        """The functions that programs call without knowing, by name."""
+        use_fuel = self.fuel_counter()
+        return {
+            FUEL: use_fuel,
+            CAUGHT: self.catcher(use_fuel),
+            # One call deeper than a skill goes before it lifts the recursion limit: this meets it first.
+            ENTRY: lambda: use_fuel(),  # noqa: PLW0108 - see above
+            ENTER: self.enter,
+            BY_NAME: self.start_task,
+        }
+
     def enter(self) -> None:
         """Note that the program has entered a function of its module."""
         code = getframe(1).f_code
@@ -150,6 +162,10 @@ class ProgramRun:
 
         return use_fuel
 
+    def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
+        """What is called where the program has caught something, and at the head of `finally`."""
+        return use_fuel
+
     def refuel(self) -> None:
         """Count fuel from the start."""
         self.count = itertools.count(1).__next__
@@ -167,9 +183,9 @@ class ProgramRun:
         }
         exec(  # noqa: S102 - of trusted text
             f"def {name}({names}):\n"
-            f"    limit({RECURSION_LIMIT + HEADROOM})\n"
+            f"    limit({self.recursion_limit + HEADROOM})\n"
             f"    try: return perform({arguments})\n"
-            f"    finally: limit({RECURSION_LIMIT})\n",
+            f"    finally: limit({self.recursion_limit})\n",
             scope,
         )
         return scope[name]

@@ -17,17 +17,22 @@ from codebotler.simulator.sandbox.isolation import die_with_parent, enclose, giv
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from typing import NoReturn
+    from collections.abc import Callable
+    from typing import NoReturn, TypeVar
 
     from codebotler.simulator.sandbox.isolation import Filter
+
+    Run = TypeVar("Run", bound=ProgramRun)
 
 DOOR, REPORT = 5, 6  # descriptors: by which runs are asked for, and on which numbers are reported
 PID = 8  # bytes of a process id: as an int, a small one would take no memory and a large one some
 DESCRIPTOR = 4  # bytes of one descriptor on its way through a socket
 
 
-def serve(role: str) -> None:
-    """Serve runs, one at a time, until the engine closes its end."""
+def get_ready(
+    role: str,
+) -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
+    """Make all that runs need and share, and return what `serve` takes."""
     library, seconds = role != FORK_SERVER, LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
     door = socket(fileno=DOOR)
     run = ProgramRun()
@@ -45,10 +50,17 @@ def serve(role: str) -> None:
     give_up_rights()
     seccomp = usable_filter()
     warm_up(run, door, lessons)
+    return door, run, execute, seccomp, seconds
+
+
+def serve(
+    door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
+) -> None:
+    """Fork children that execute what the engine asks for, one at a time, until it closes its end."""
     gc.collect()
     gc.freeze()
     report(0 if seccomp is None else 1)
-    while one_run(door, run, seccomp, seconds):
+    while one_run(door, run, execute, seccomp, seconds):
         pass
 
 
@@ -83,7 +95,9 @@ class MoreInTheLibrary:
         os._exit(0)
 
 
-def one_run(door: socket, run: ProgramRun, seccomp: Filter | None, seconds: int) -> bool:
+def one_run(
+    door: socket, run: Run, execute: Callable[[Run], None], seccomp: Filter | None, seconds: int
+) -> bool:
     """Fork the child of one run and report its process id and, at its end, its wait status.
 
     The dead child is reaped only when the next run is asked for, so that until then its id stays its own.

@@ -6,7 +6,8 @@ import ast
 import types
 from collections.abc import Iterator
 
-from codebotler.simulator.sandbox import BY_NAME, ENTER, ENTRY, FUEL, PROGRAM
+from codebotler.simulator.sandbox import BY_NAME, CAUGHT, ENTER, ENTRY, FUEL, PROGRAM
+from codebotler.simulator.sandbox.tame import is_tame
 
 TASK = "task_program"
 TOO_LARGE = "the program is too large, or nested too deeply"
@@ -16,8 +17,13 @@ BLOCKS = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, as
 SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 
-def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset[str]]:
-    """A program's code, which uses fuel, and the names of the modules that it imports."""
+def prepared(
+    source: str, *, lowercase: bool, skills: frozenset[str] | None = None
+) -> tuple[types.CodeType, frozenset[str], bool]:
+    """A program's code, which uses fuel, the modules that it imports, and whether it is tame.
+
+    It is looked at for that only where the skills are given that it may call.
+    """
     if "\0" in source:
         line = source.count("\n", 0, source.index("\0")) + 1
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
@@ -27,11 +33,12 @@ def prepared(source: str, *, lowercase: bool) -> tuple[types.CodeType, frozenset
         imports = frozenset(name for node in nodes for name in imported(node))
         if lowercase:
             lower_literals(nodes)
+        tame = skills is not None and is_tame(tree, nodes, skills)
         for node in nodes:
             use_fuel(node)
         for node in tree.body:
             note_entries(node)
-        return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), imports
+        return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), imports, tame
     except (RecursionError, MemoryError):
         raise MemoryError(TOO_LARGE) from None
 
@@ -81,11 +88,13 @@ def use_fuel(node: ast.AST) -> None:
     match node:
         case ast.FunctionDef() | ast.AsyncFunctionDef():
             insert_head(node, ENTRY)
-        case ast.For() | ast.AsyncFor() | ast.While() | ast.ExceptHandler():
+        case ast.For() | ast.AsyncFor() | ast.While():
             node.body.insert(0, call(FUEL, node.body[0]))
+        case ast.ExceptHandler():
+            node.body.insert(0, call(CAUGHT, node.body[0]))
         case ast.Try() | ast.TryStar():
             if node.finalbody:
-                node.finalbody.insert(0, call(FUEL, node.finalbody[0]))
+                node.finalbody.insert(0, call(CAUGHT, node.finalbody[0]))
         case ast.Lambda():
             spend = call(ENTRY, node.body).value
             node.body = ast.copy_location(ast.BoolOp(ast.Or(), [spend, node.body]), node.body)

@@ -18,34 +18,45 @@ from codebotler.simulator.sandbox import (
     MAX_CODE,
     PLAIN,
     REFUSED,
+    TAME,
     WITHOUT_REFERENCES,
 )
 from codebotler.simulator.sandbox.channel import receive, send_bytes
 from codebotler.simulator.sandbox.fuel import TOO_LARGE, prepared
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import NoReturn
+
 DOOR = 5
 ALWAYS_THERE = frozenset({"sys", "time", "__future__"})
 REHEARSAL = "def task_program():\n    for room in get_all_rooms():\n        say(f'in {room}')\n"
 
 
-def serve() -> None:
-    """Prepare one program after the other until the engine closes its end."""
+def get_ready(_role: str) -> tuple[()]:
+    """Isolate this process."""
     give_up_rights()
     seccomp = usable_filter()
-    answer(REHEARSAL, lowercase=True)
+    answer(REHEARSAL, lowercase=True, skills=("get_all_rooms", "say"))
     os.dup2(DOOR, CHANNEL)
     os.closerange(CHANNEL + 1, 256)
     enclose(seccomp, CPU_SECONDS)
+    return ()
+
+
+def serve() -> NoReturn:
+    """Prepare one program after the other until the engine closes its end."""
     while True:
-        source, lowercase = receive()
-        send_bytes(answer(source, lowercase=lowercase))
+        source, lowercase, skills = receive()
+        send_bytes(answer(source, lowercase=lowercase, skills=skills))
 
 
-def answer(source: str, *, lowercase: bool) -> bytes:
-    """PLAIN or IMPORTING and a program's code, or REFUSED and why there is none, as JSON."""
+def answer(source: str, *, lowercase: bool, skills: tuple[str, ...] | None = None) -> bytes:
+    """PLAIN, TAME or IMPORTING and a program's code, or REFUSED and why there is none, as JSON."""
     try:
-        code, imports = prepared(source, lowercase=lowercase)
+        names = None if skills is None else frozenset(skills)
+        code, imports, tame = prepared(source, lowercase=lowercase, skills=names)
         data = dumps(code, WITHOUT_REFERENCES)
         if len(data) > MAX_CODE:
             raise MemoryError(TOO_LARGE)  # noqa: TRY301 - the same as if the compiler had
@@ -54,4 +65,4 @@ def answer(source: str, *, lowercase: bool) -> bytes:
         message = error.msg if isinstance(error, SyntaxError) else str(error)
         kind = quoted(type(error).__name__)
         return REFUSED + f"[{kind},{quoted(message[:1000])},{'null' if line is None else line}]".encode()
-    return (PLAIN if imports <= ALWAYS_THERE else IMPORTING) + data
+    return (TAME if tame else PLAIN if imports <= ALWAYS_THERE else IMPORTING) + data

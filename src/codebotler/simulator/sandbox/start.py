@@ -1,4 +1,4 @@
-"""Starts every isolated process: fixes memory layout and limits, then its role: preparer or fork server."""
+"""Starts every isolated process: fixes memory layout and limits, then lets it serve in its role."""
 
 from __future__ import annotations
 
@@ -18,22 +18,16 @@ STACK = 8 * 1024 * 1024
 ADDR_NO_RANDOMIZE = 0x0040000
 
 
-def main(role: str, descriptors: list[str]) -> None:
-    """Start the interpreter again if there are descriptors, then take on a role."""
+def main(module: str, role: str, descriptors: list[str]) -> None:
+    """Start the interpreter again if there are descriptors, then take on a role, which a module knows."""
     if descriptors:
         start_again(list(map(int, descriptors)))
     if role != "preparer":  # bytecode, there in one start and not in the next, would move the heap
         sys.pycache_prefix = os.devnull
     sys.meta_path.insert(0, CompiledModules(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
     os.close(CODES)
-    if role == "preparer":
-        from codebotler.simulator.sandbox import preparer  # noqa: PLC0415 - only now it can be found
-
-        preparer.serve()
-    else:
-        from codebotler.simulator.sandbox import fork_server  # noqa: PLC0415 - the same
-
-        fork_server.serve(role)
+    taken_on = __import__(module, fromlist=["serve"])
+    taken_on.serve(*taken_on.get_ready(role))
 
 
 class CompiledModules:
@@ -94,4 +88,4 @@ def forget_the_shell() -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2:])
+    main(sys.argv[1], sys.argv[2], sys.argv[3:])

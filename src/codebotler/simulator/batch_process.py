@@ -1,0 +1,244 @@
+"""Runs tame programs in a closed child, each in all of its worlds, and writes a transcript of each run.
+
+The child has a copy of each robot and of its ledger, so that a program waits for nobody. The engine does not
+believe what it writes: it replays each transcript on its own robot, which must give the same answers.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from marshal import loads
+from pickle import loads as unpickled
+from socket import socket
+from types import CodeType, ModuleType
+from typing import Any, NoReturn
+
+from codebotler.core.trace import Option
+from codebotler.simulator.ledger import STOP, RememberingLedger
+from codebotler.simulator.robot import Argument, SimulatedRobot
+from codebotler.simulator.sandbox import CPU_SECONDS, MAX_FRAME, ONLY_TIME
+from codebotler.simulator.sandbox.channel import receive, send_frames
+from codebotler.simulator.sandbox.environment import simulate_environment
+from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
+from codebotler.simulator.sandbox.fork_server import DOOR, serve
+from codebotler.simulator.sandbox.isolation import give_up_rights, usable_filter
+from codebotler.simulator.sandbox.tame import GIVEN
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from codebotler.simulator.sandbox.execution import Skills
+    from codebotler.simulator.sandbox.isolation import Filter
+
+__all__ = ["get_ready", "serve"]
+
+# In a process of its own, a program may call itself far deeper; what is too deep here is run again there.
+RECURSION_LIMIT = 400
+LONGEST_CALL = 50_000  # characters of what a skill is given; as one frame, more might be too long
+ODD = b"null"  # in the place of a transcript that a process of its own must decide
+
+
+def get_ready(
+    _role: str,
+) -> tuple[socket, TranscribedRun, Callable[[TranscribedRun], None], Filter | None, int]:
+    """Make all that batches need and share, and return what `serve` takes."""
+    door = socket(fileno=DOOR)
+    run = TranscribedRun()
+    simulate_environment(run)
+    rehearsal, lessons = loads(receive_setup(door))  # noqa: S302 - from the engine
+    sys.meta_path.clear()
+    give_up_rights()
+    seccomp = usable_filter()
+    for _ in range(lessons):
+        transcripts(run, rehearsal)
+    return door, run, execute, seccomp, CPU_SECONDS
+
+
+def receive_setup(door: socket) -> bytes:
+    """Read the one message that the engine sends before any run."""
+    length = int.from_bytes(door.recv(4), "big")
+    data = b""
+    while len(data) < length:
+        data += door.recv(length - len(data))
+    return data
+
+
+def execute(run: TranscribedRun) -> None:
+    """Run a batch of programs that the engine sends, and send their transcripts."""
+    transcripts(run, receive(), send_frames)
+
+
+def transcripts(
+    run: TranscribedRun,
+    batch: tuple[Skills, tuple[str, ...], bytes, list[tuple[bytes, list[int]]]],
+    send: Callable[[list[bytes]], None] = len,  # type: ignore[assignment]  # nobody listens to a rehearsal
+) -> None:
+    """Run programs, each in all of its worlds, and send the transcripts of each program."""
+    skills, elsewhere, pickled, programs = batch
+    run.provide(skills)
+    run.elsewhere = frozenset(elsewhere)
+    robots = unpickled(pickled)  # noqa: S301 - from the engine
+    for code, numbers in programs:
+        compiled = loads(code)  # noqa: S302 - from the engine
+        send([run.transcript(compiled, *robots[number]) for number in numbers])
+
+
+class TranscribedRun(ProgramRun):
+    """Runs one tame program after the other, and writes down what each asks of its robot."""
+
+    recursion_limit = RECURSION_LIMIT
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.elsewhere: frozenset[str] = frozenset()  # skills that only the engine's own robot can perform
+        self.provided: dict[str, Any] = {}
+        given = {name: vars(sys.modules["builtins"])[name] for name in GIVEN}
+        self.builtins = {**given, **self.counters(), "__import__": the_clock}
+
+    def provide(self, skills: Skills) -> None:
+        """Give programs the skills, `time`, and the builtins of tame programs."""
+        self.skills = skills
+        self.provided = {name: self.skill(name, parameters, way) for name, parameters, way in skills}
+        self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
+
+    def transcript(self, code: CodeType, kind: type[SimulatedRobot], arguments: tuple[Any, ...]) -> bytes:
+        """Run a program with a robot, and return the transcript."""
+        self._begin(kind(*arguments))
+        robot = self.ledger.robot
+        limits = robot.rules.limits
+        bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
+        start = robot.rules.clock_starts.timestamp()
+        sys.setrecursionlimit(RECURSION_LIMIT)
+        end = self.execute(code, (*bounds, start, False), (), {})
+        data = ODD if self.is_odd else self._written(end)
+        return data if len(data) <= MAX_FRAME else ODD
+
+    def _begin(self, robot: SimulatedRobot) -> None:
+        """Be as before any run."""
+        self.ledger = RememberingLedger(robot)
+        self.namespace = ModuleType("__main__")
+        vars(self.namespace).update(self.provided)
+        self.now = self._told = 0.0
+        self.spent = self.entered = self.is_odd = False
+        self.codes.clear()
+        self.refuel()
+        self._forget_calls()
+
+    def _forget_calls(self) -> None:
+        self._numbers: dict[tuple[object, ...], int] = {}
+        self._calls: list[tuple[object, ...]] = []
+        self._order: list[int] = []
+        self._moments: list[tuple[int, float]] = []
+
+    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
+        """Let the copy of the robot execute a skill."""
+        given = [tuple(map(option, value)) if type(value) is list else value for value in arguments]
+        try:
+            self.ledger.let_time_pass(self.now)
+            if self.ledger.limit is not None:
+                self._stop()
+            self._expect_short(given)
+            if name in self.elsewhere:
+                return self._ask_engine(name, given)
+            answer = self.ledger.perform(name, given)
+        except BaseException:  # nothing that a program does, unless it has reached a limit
+            self.is_odd = self.is_odd or not self.spent
+            raise
+        kind, value, _ = answer
+        if kind == "error":
+            self._note(name, given, kind, value[1:])
+            raise robot_error(*value)
+        self._note(name, given, kind, value)
+        if answer is STOP:
+            self._stop(is_noted=True)
+        return value.copy() if type(value) is list else value
+
+    def _expect_short(self, given: list[Argument]) -> None:
+        texts = [
+            text for each in given for text in ([each] if isinstance(each, str) else (o.text for o in each))
+        ]
+        if sum(map(len, texts)) > LONGEST_CALL:
+            raise MemoryError
+
+    def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
+        """End the run, since its time is up."""
+        self.ledger.let_time_pass(self.now)
+        self._stop()
+
+    def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
+        """Notice where a program has caught what depends on the process that it runs in."""
+
+        def caught() -> None:
+            error = sys.exc_info()[0]
+            if error is not None and issubclass(error, RecursionError | MemoryError):
+                self.is_odd = True
+            use_fuel()
+
+        return caught
+
+    def ended_by(self, error: BaseException) -> str:
+        """Describe what ended the program."""
+        try:
+            str(error)
+        except (RecursionError, MemoryError):
+            self.is_odd = True
+        self.is_odd = self.is_odd or isinstance(error, RecursionError | MemoryError)
+        return super().ended_by(error)
+
+    def _stop(self, *, is_noted: bool = False) -> NoReturn:
+        if not is_noted:
+            self._note_time()
+            self._order.append(ONLY_TIME)
+        self.spent = True
+        raise LimitReachedError
+
+    def _note(self, name: str, given: list[Argument], kind: str, value: object) -> None:
+        """Write down a call and how it was answered."""
+        self._note_time()
+        key = (name, *given, kind, tuple(value) if type(value) is list else value)
+        number = self._numbers.get(key)
+        if number is None:
+            number = self._numbers[key] = len(self._calls)
+            self._calls.append((name, [data_of(each) for each in given], kind, value))
+        self._order.append(number)
+
+    def _note_time(self) -> None:
+        if self.now != self._told:
+            self._told = self.now
+            self._moments.append((len(self._order), float(self.now)))
+
+    def _written(self, end: str) -> bytes:
+        calls = encoded([self._calls, self._order, self._moments])
+        return f"[{calls[1:-1]},{end}]".encode("ascii")
+
+    def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - what a skill returns
+        """Let the engine's robot execute a skill, once it has done all that was asked of it before."""
+        self._note(name, given, "ask", None)
+        send_frames([self._written("null")])
+        self._forget_calls()
+        kind, value = receive()
+        if kind == "error":
+            raise robot_error(*value)
+        if kind == "stop":
+            self.spent = True
+            raise LimitReachedError
+        return value
+
+
+def the_clock(*_: object) -> ModuleType:
+    """What `import time` imports; tame programs import nothing else."""
+    return sys.modules["time"]
+
+
+def option(value: object) -> Option:
+    """An option as the robot takes it."""
+    return Option(str(value), isinstance(value, str))
+
+
+def data_of(argument: Argument) -> object:
+    """An argument as JSON has it."""
+    return argument if isinstance(argument, str) else [(each.text, each.is_text) for each in argument]
+
+
+encoded = json.JSONEncoder(separators=(",", ":")).encode
