@@ -22,7 +22,7 @@ from codebotler.core.world import Room, World
 from codebotler.simulator import isolated_process
 from codebotler.simulator.engine import digest, run
 from codebotler.simulator.fork_server import BatchServer
-from codebotler.simulator.isolated_process import SIMULATION, IsolatedProcess, compiled_file
+from codebotler.simulator.isolated_process import SIMULATION, compiled_file
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
