@@ -36,7 +36,7 @@ AGAIN = "That cannot be used: {fault}. Answer again, with only the JSON object."
 TRIES = 3  # replies that are requested until one can be used
 RETRIES = 2  # of each request that finds no server, or a busy one
 LONGEST_REPLY = 20_000  # characters
-FENCED = re.compile(r"```(?:json)?\s*\n(.*)\n\s*```", re.DOTALL)
+FENCED = re.compile(r"```(?:json)?[^\S\n]*\n(.*)\n[^\S\n]*```", re.DOTALL)
 
 
 class ChatDetector:
