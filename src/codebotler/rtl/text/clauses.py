@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from codebotler.rtl.text.polarity import denies_something
 
-_HALF_DAY = re.compile(r"\b([ap])\.\s?m\.?", re.IGNORECASE)
+_HALF_DAY = re.compile(r"(?<![^\W\d])([ap])\.\s?m\.?", re.IGNORECASE)  # a digit may touch it
 _END = re.compile(r"(?<=\?)(?!\?)|[!;\n]+|\.(?!\d)")
 _JOINT = re.compile(
     r",(?!\d)|(?<!\d),|\b(?:and|(?<!anything )but|while|whereas|however|although|though)\b", re.IGNORECASE

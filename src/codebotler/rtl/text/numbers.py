@@ -17,8 +17,8 @@ _NEAR = 60  # characters within which words belong together; without a limit, lo
 
 # What a number may be glued to; a single F or C needs two digits or more, because 3C may be a room.
 _GLUED = (
-    r"x|[ap]m|h|hrs?|hours?|mins?|minutes?|s|secs?|seconds?|k?g|lbs?|oz|m?l|[kcm]m|m|ft|degrees?|percent"
-    r"|pcs?|pieces?|people|(?<=\d\d)[fc]"
+    r"x|[ap]m|h|hrs?|hours?|days?|mins?|minutes?|s|secs?|seconds?|k?g|lbs?|oz|m?l|[kcm]m|m|ft|degrees?|percent"
+    r"|pcs?|pieces?|people|(?:deg|\u00ba)[fc]?|fahrenheit|celsius|(?<=\d\d)[fc]"
 )
 _UNITS = "|".join(_ONES[1:10])
 _NUMBER = re.compile(

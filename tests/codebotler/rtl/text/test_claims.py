@@ -69,6 +69,25 @@ def test_a_long_text_is_read_to_its_end() -> None:
 
 
 @pytest.mark.parametrize(
+    "unit",
+    [
+        "F",
+        "\N{DEGREE SIGN}",
+        "\N{DEGREE SIGN}F",
+        "\u00baF",
+        "degF",
+        "deg",
+        "fahrenheit",
+        "days",
+        "p.m.",
+        "min",
+    ],
+)
+def test_a_unit_may_touch_its_number(unit: str) -> None:
+    assert Number(72, "degrees?").given(f"It is 72{unit} now") == {72}
+
+
+@pytest.mark.parametrize(
     ("text", "given"),
     [
         ("60% said yes", {60}),
@@ -110,6 +129,8 @@ TIMES = [
     ("around one", [(60, 780)]),
     ("13:00", [(780,)]),
     ("1:30 p.m.", [(810,)]),
+    ("at 12p.m. or 11:30a.m.", [(720,), (690,)]),
+    ("in room 1a. Maybe 12 pm", [(720,)]),
     ("half past twelve", [(30, 750)]),
     ("quarter to 12 pm", [(705,)]),
     ("twelve o'clock", [(0, 720)]),
