@@ -4,6 +4,7 @@ import random
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -14,17 +15,7 @@ from roboeval.suites.load import SUITES, read_task
 from roboeval.suites.schema import SuiteFile
 from roboeval.suites.solutions import SolutionsFile
 
-WORLD = """\
-about: second floor, after lunch
-robot: start_loc
-rooms:
-  - start_loc
-  - alice's office
-  - {name: kitchen, footprint: [[6, 0], [9, 0], [9, 4], [6, 4]], stand_at: [7.5, 1]}
-objects: {kitchen: [mug, bottle of water]}
-people: {alice's office: [{name: alice, answers: ["yes", tea]}, {name: .*}]}
-may_wait_forever: true
-"""
+WORLD = (Path(__file__).parents[1] / "examples" / "office.yaml").read_text()
 SUITE = """\
 name: mine
 version: 1

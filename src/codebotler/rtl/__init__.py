@@ -1,7 +1,7 @@
 """The Robot Temporal Logic of the paper: parse a formula, test it on a trace, and say why it fails."""
 
 from codebotler.rtl.explanation import Explanation, explain
-from codebotler.rtl.formula import (
+from codebotler.rtl.formulas import (
     ActAtFirst,
     ActAtSome,
     And,

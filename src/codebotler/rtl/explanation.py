@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from codebotler.core.trace import Trace
 from codebotler.core.words import listed, times
-from codebotler.rtl import formula as rtl
+from codebotler.rtl import formulas
 from codebotler.rtl.semantics import (
     Inconclusive,
     bound,
@@ -33,12 +33,12 @@ class Explanation:
         sentence: the reason for a reader, counting steps from 1.
     """
 
-    clause: rtl.Formula
+    clause: formulas.Formula
     event: int | None
     sentence: str
 
 
-def explain(formula: rtl.Formula, trace: Trace) -> Explanation | None:
+def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
     """Why a formula fails on a trace; None if it holds.
 
     Args:
@@ -64,28 +64,30 @@ def explain(formula: rtl.Formula, trace: Trace) -> Explanation | None:
     return Explanation(clause, event, " ".join(f"the robot {text}".split()))
 
 
-def _failing_part(formula: rtl.Formula, trace: Trace) -> rtl.Formula:
+def _failing_part(formula: formulas.Formula, trace: Trace) -> formulas.Formula:
     match formula:
-        case rtl.And(parts):
+        case formulas.And(parts):
             return _failing_part(next(part for part in parts if not holds(part, trace)), trace)
-        case rtl.Not(rtl.Not(part)):
+        case formulas.Not(formulas.Not(part)):
             return _failing_part(part, trace)
-        case rtl.Not(rtl.Or(parts)):
-            return _failing_part(rtl.Not(next(part for part in parts if holds(part, trace))), trace)
+        case formulas.Not(formulas.Or(parts)):
+            return _failing_part(formulas.Not(next(part for part in parts if holds(part, trace))), trace)
     return formula
 
 
-def _deciding(formula: rtl.Formula, trace: Trace, *, is_true: bool) -> Iterator[tuple[rtl.Test, bool]]:
+def _deciding(
+    formula: formulas.Formula, trace: Trace, *, is_true: bool
+) -> Iterator[tuple[formulas.Test, bool]]:
     """The tests that make a formula true or false, each with whether it is true itself."""
     mention = _as_mention(formula)
     if mention is not None and not is_true and not holds(mention, trace):
         yield mention, False
         return
     match formula:
-        case rtl.Not(part):
+        case formulas.Not(part):
             yield from _deciding(part, trace, is_true=not is_true)
-        case rtl.And(parts) | rtl.Or(parts):
-            needs_all = isinstance(formula, rtl.And) == is_true
+        case formulas.And(parts) | formulas.Or(parts):
+            needs_all = isinstance(formula, formulas.And) == is_true
             deciding = parts if needs_all else [next(one for one in parts if holds(one, trace) == is_true)]
             for part in deciding:
                 yield from _deciding(part, trace, is_true=is_true)
@@ -93,10 +95,12 @@ def _deciding(formula: rtl.Formula, trace: Trace, *, is_true: bool) -> Iterator[
             yield formula, is_true
 
 
-def _as_mention(formula: rtl.Formula) -> rtl.Test | None:
+def _as_mention(formula: formulas.Formula) -> formulas.Test | None:
     """The one test that `ask(t, ".*") or ask(".*", t)` comes to."""
     match formula:
-        case rtl.Or((one, other)) if isinstance(one, rtl.Presence) and isinstance(other, rtl.Presence):
+        case formulas.Or((one, other)) if isinstance(one, formulas.Presence) and isinstance(
+            other, formulas.Presence
+        ):
             a, b = one.element, other.element
             if a.options is None or b.options is None or (a.text, a.options) != (b.options, b.text):
                 return None
@@ -116,30 +120,30 @@ class _Fact(NamedTuple):
     detail: str = ""  # what came nearest
 
 
-def _fact(test: rtl.Test, trace: Trace, *, is_true: bool) -> _Fact:
+def _fact(test: formulas.Test, trace: Trace, *, is_true: bool) -> _Fact:
     match test:
-        case rtl.Count(element, 0):
-            return _fact(rtl.Exists(element, test.scopes), trace, is_true=not is_true)
-        case rtl.AtLeast(element, 1):
-            return _fact(rtl.Exists(element, test.scopes), trace, is_true=is_true)
-        case rtl.Count() | rtl.AtLeast():
+        case formulas.Count(element, 0):
+            return _fact(formulas.Exists(element, test.scopes), trace, is_true=not is_true)
+        case formulas.AtLeast(element, 1):
+            return _fact(formulas.Exists(element, test.scopes), trace, is_true=is_true)
+        case formulas.Count() | formulas.AtLeast():
             return _number(test, trace, is_true=is_true)
     return _presence(test, trace) if is_true else _absence(test, trace)
 
 
-def _presence(test: rtl.Presence, trace: Trace) -> _Fact:
+def _presence(test: formulas.Presence, trace: Trace) -> _Fact:
     element, here = test.element, _positions(test, trace)
     at = next(at for at in here if matches(element, trace, at))
     done, did = f"{verb(element.kind).past} {happening(trace[at], element)}", deed(element, "past")
-    place = "" if isinstance(test, rtl.Exists) else f" in {room(test.arrival.text)}"
+    place = "" if isinstance(test, formulas.Exists) else f" in {room(test.arrival.text)}"
     text = f"{did}{place} at step {at + 1}{_where(test.scopes, trace)}"
     return _Fact(at, text, ", which it must not do", "" if done == did else f": it {done}")
 
 
-def _absence(test: rtl.Presence, trace: Trace) -> _Fact:
+def _absence(test: formulas.Presence, trace: Trace) -> _Fact:
     element, where = test.element, _where(test.scopes, trace)
     here = [*_positions(test, trace)]
-    if isinstance(test, rtl.Exists):
+    if isinstance(test, formulas.Exists):
         event, detail = _instead(element, trace, here)
         return _Fact(event, f"never {deed(element, 'past', negated=True)}{where}", detail=detail)
     span = scoped(test.scopes, trace)
@@ -148,7 +152,7 @@ def _absence(test: rtl.Presence, trace: Trace) -> _Fact:
         _, detail = _instead(test.arrival, trace, span)
         text = f"never {deed(test.arrival, 'past', negated=True)}{where}"
         return _Fact(None, text, f", where it was to {deed(element, 'base')}", detail)
-    first = isinstance(test, rtl.ActAtFirst)
+    first = isinstance(test, formulas.ActAtFirst)
     there = "during that stay" if first and len(arrivals) > 1 else "there"
     event, detail = _instead(element, trace, here)
     if not detail:
@@ -162,8 +166,8 @@ def _absence(test: rtl.Presence, trace: Trace) -> _Fact:
     return _Fact(arrivals[0] if event is None else event, text, detail=detail)
 
 
-def _number(test: rtl.Count | rtl.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
-    where, number, exactly = _where(test.scopes, trace), test.number, isinstance(test, rtl.Count)
+def _number(test: formulas.Count | formulas.AtLeast, trace: Trace, *, is_true: bool) -> _Fact:
+    where, number, exactly = _where(test.scopes, trace), test.number, isinstance(test, formulas.Count)
     span = scoped(test.scopes, trace)
     found = [at for at in span if _is_match(test.element, trace, at)]
     if found:
@@ -184,15 +188,15 @@ def _number(test: rtl.Count | rtl.AtLeast, trace: Trace, *, is_true: bool) -> _F
     return _Fact(found[number] if len(found) > number else None, text, ending)
 
 
-def _positions(test: rtl.Presence, trace: Trace) -> Iterable[int]:
+def _positions(test: formulas.Presence, trace: Trace) -> Iterable[int]:
     """The positions of the events that a test looks at."""
     span = scoped(test.scopes, trace)
-    if isinstance(test, rtl.ActAtSome):
+    if isinstance(test, formulas.ActAtSome):
         return during_stays(test, trace, span)
-    return span if isinstance(test, rtl.Exists) else first_stay(test, trace, span) or ()
+    return span if isinstance(test, formulas.Exists) else first_stay(test, trace, span) or ()
 
 
-def _where(scopes: tuple[rtl.Scope, ...], trace: Trace) -> str:
+def _where(scopes: tuple[formulas.Scope, ...], trace: Trace) -> str:
     """Scopes in English, such as ` after going to the lobby (step 1)`."""
     span, parts = range(len(trace)), []
     for scope in scopes:
@@ -207,7 +211,7 @@ def _where(scopes: tuple[rtl.Scope, ...], trace: Trace) -> str:
     return " and".join(parts)
 
 
-def _instead(element: rtl.EventPattern, trace: Trace, here: Sequence[int]) -> tuple[int | None, str]:
+def _instead(element: formulas.EventPattern, trace: Trace, here: Sequence[int]) -> tuple[int | None, str]:
     """What the robot did instead of an element: the same elsewhere, or other things of this kind here."""
     done = [at for at in range(len(trace)) if _is_match(element, trace, at)]
     if done:
@@ -224,7 +228,7 @@ def _instead(element: rtl.EventPattern, trace: Trace, here: Sequence[int]) -> tu
     ], f"{only} {listed(few([f'{happening(trace[at], element)} (step {at + 1})' for at in alike]))}"
 
 
-def _is_match(element: rtl.EventPattern, trace: Trace, at: int) -> bool:
+def _is_match(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
     try:
         return matches(element, trace, at)
     except Inconclusive:

@@ -11,7 +11,7 @@ from itertools import islice
 from typing import assert_never
 
 from codebotler.core.trace import Event, Option, Trace
-from codebotler.rtl import formula as rtl
+from codebotler.rtl import formulas
 
 
 class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a third verdict
@@ -34,7 +34,7 @@ class Inconclusive(Exception):  # noqa: N818 - not a mistake of the caller but a
         return type(self), (self.event, self.number, self.option), vars(self)
 
 
-def holds(formula: rtl.Formula, trace: Trace) -> bool:
+def holds(formula: formulas.Formula, trace: Trace) -> bool:
     """Whether a formula is true of a trace.
 
     Args:
@@ -45,33 +45,33 @@ def holds(formula: rtl.Formula, trace: Trace) -> bool:
         Inconclusive: an option that is no text had to be compared.
     """
     match formula:
-        case rtl.And(parts):
+        case formulas.And(parts):
             return all(holds(part, trace) for part in parts)
-        case rtl.Or(parts):
+        case formulas.Or(parts):
             return any(holds(part, trace) for part in parts)
-        case rtl.Not(part):
+        case formulas.Not(part):
             return not holds(part, trace)
     return _test_holds(formula, trace)
 
 
-def _test_holds(test: rtl.Test, trace: Trace) -> bool:
+def _test_holds(test: formulas.Test, trace: Trace) -> bool:
     span = scoped(test.scopes, trace)
     match test:
-        case rtl.Exists(element):
+        case formulas.Exists(element):
             return first(element, trace, span) is not None
-        case rtl.ActAtFirst(_, element):
+        case formulas.ActAtFirst(_, element):
             stay = first_stay(test, trace, span)
             return stay is not None and first(element, trace, stay) is not None
-        case rtl.ActAtSome(_, element):
+        case formulas.ActAtSome(_, element):
             return any(matches(element, trace, at) for at in during_stays(test, trace, span))
-        case rtl.AtLeast(element, number):
+        case formulas.AtLeast(element, number):
             return at_least(element, number, trace, span) == number
-        case rtl.Count(element, number):
+        case formulas.Count(element, number):
             return at_least(element, number + 1, trace, span) == number
     assert_never(test)
 
 
-def matches(element: rtl.EventPattern, trace: Trace, at: int) -> bool:
+def matches(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
     """Whether an element matches the event at a position.
 
     Raises:
@@ -91,7 +91,7 @@ def matches(element: rtl.EventPattern, trace: Trace, at: int) -> bool:
     return element.text.matches(event.text)
 
 
-def _offers(element: rtl.EventPattern, event: Event, at: int) -> bool:
+def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
     assert element.options is not None
     for number, option in enumerate(event.options):
         if not option.is_text:
@@ -101,22 +101,22 @@ def _offers(element: rtl.EventPattern, event: Event, at: int) -> bool:
     return False
 
 
-def occurrences(element: rtl.EventPattern, trace: Trace, span: range) -> Iterator[int]:
+def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> Iterator[int]:
     """The positions of all events that match, each found when it is asked for."""
     return (at for at in span if matches(element, trace, at))
 
 
-def first(element: rtl.EventPattern, trace: Trace, span: range) -> int | None:
+def first(element: formulas.EventPattern, trace: Trace, span: range) -> int | None:
     """The position of the first event that matches."""
     return next(occurrences(element, trace, span), None)
 
 
-def at_least(element: rtl.EventPattern, number: int, trace: Trace, span: range) -> int:
+def at_least(element: formulas.EventPattern, number: int, trace: Trace, span: range) -> int:
     """How many events match, up to a number at which counting stops."""
     return sum(1 for _ in islice(occurrences(element, trace, span), min(number, len(span))))
 
 
-def scoped(scopes: tuple[rtl.Scope, ...], trace: Trace) -> range:
+def scoped(scopes: tuple[formulas.Scope, ...], trace: Trace) -> range:
     """The positions of a trace that are within all scopes."""
     span = range(len(trace))
     for scope in scopes:
@@ -124,20 +124,20 @@ def scoped(scopes: tuple[rtl.Scope, ...], trace: Trace) -> range:
     return span
 
 
-def bound(scope: rtl.Scope, trace: Trace, span: range) -> int | None:
+def bound(scope: formulas.Scope, trace: Trace, span: range) -> int | None:
     """The position of the event that bounds a scope."""
     found = occurrences(scope.element, trace, span)
     return next(found, None) if scope.name.endswith("First") else max(found, default=None)
 
 
-def narrowed(scope: rtl.Scope, at: int | None, span: range) -> range:
+def narrowed(scope: formulas.Scope, at: int | None, span: range) -> range:
     """What is left of a span by a scope whose bound is at a position; all of it without a bound."""
     if at is None:
         return span
     return range(span.start, at) if scope.name.startswith("Before") else range(at + 1, span.stop)
 
 
-def first_stay(test: rtl.ActAtFirst | rtl.ActAtSome, trace: Trace, span: range) -> range | None:
+def first_stay(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> range | None:
     """The positions between the first arrival at the place of a test and the next departure."""
     arrival = first(test.arrival, trace, span)
     if arrival is None:
@@ -147,7 +147,7 @@ def first_stay(test: rtl.ActAtFirst | rtl.ActAtSome, trace: Trace, span: range) 
     return after if departure is None else range(arrival + 1, departure)
 
 
-def during_stays(test: rtl.ActAtFirst | rtl.ActAtSome, trace: Trace, span: range) -> Iterator[int]:
+def during_stays(test: formulas.ActAtFirst | formulas.ActAtSome, trace: Trace, span: range) -> Iterator[int]:
     """The positions of the events during all stays at the place of a test.
 
     The move that ends a stay is not among them; the one that begins it only if it is part of an earlier stay.

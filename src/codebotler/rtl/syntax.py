@@ -11,11 +11,11 @@ from typing import get_args
 
 from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS, SkillTable
-from codebotler.rtl import formula as rtl
+from codebotler.rtl import formulas
 from codebotler.rtl.pattern import compile_regex, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time, minutes
 
-SCOPES: dict[str, rtl.ScopeName] = {name: name for name in get_args(rtl.ScopeName)}
+SCOPES: dict[str, formulas.ScopeName] = {name: name for name in get_args(formulas.ScopeName)}
 TESTS = ("Exists", "ActAtFirst", "ActAtSome", "Count", "AtLeast")
 TEXTS = ("words", "without", "number", "othernumber", "time", "othertime", "affirms", "denies")
 QUESTIONS = ("mention", "answered")
@@ -43,7 +43,7 @@ class RtlSyntaxError(ValueError):
         return type(self), (self.column, self.problem), vars(self)
 
 
-def parse(text: str, *, skills: SkillTable = SKILLS) -> rtl.Formula:
+def parse(text: str, *, skills: SkillTable = SKILLS) -> formulas.Formula:
     """The formula that a text writes.
 
     Args:
@@ -64,7 +64,7 @@ class _Parser:
         self.recordings = skills.recordings
         self.question = next((kind for kind, row in self.recordings.items() if row.options is not None), None)
 
-    def formula(self) -> rtl.Formula:
+    def formula(self) -> formulas.Formula:
         if not self.text:
             raise RtlSyntaxError(1, "expected a formula, found nothing")
         try:
@@ -81,20 +81,20 @@ class _Parser:
             raise self.error(end, "RTL has no comments, but one starts after this")
         return self.constraint(tree, 0)
 
-    def constraint(self, node: ast.expr, depth: int) -> rtl.Formula:
+    def constraint(self, node: ast.expr, depth: int) -> formulas.Formula:
         if depth > DEEPEST:
             raise self.error(node, f"this is nested more than {DEEPEST} deep")
         match node:
             case ast.BoolOp(op, values):
                 parts = tuple(self.constraint(value, depth + 1) for value in values)
-                return rtl.And(parts) if isinstance(op, ast.And) else rtl.Or(parts)
+                return formulas.And(parts) if isinstance(op, ast.And) else formulas.Or(parts)
             case ast.UnaryOp(ast.Not(), operand):
-                return rtl.Not(self.constraint(operand, depth + 1))
+                return formulas.Not(self.constraint(operand, depth + 1))
             case ast.Call(ast.Attribute() as function):
                 return self.test(node, function)
         raise self.expected('a test such as tr.Exists(goto("lobby"))', node)
 
-    def test(self, node: ast.Call, function: ast.Attribute) -> rtl.Test:
+    def test(self, node: ast.Call, function: ast.Attribute) -> formulas.Test:
         name = function.attr
         if name in SCOPES:
             raise self.error(
@@ -105,19 +105,19 @@ class _Parser:
         scopes = self.scopes(function.value)
         if name == "Exists":
             (element,) = self.arguments(node, function, name, 1)
-            return rtl.Exists(self.element(element), scopes)
+            return formulas.Exists(self.element(element), scopes)
         one, other = self.arguments(node, function, name, 2)
         match name:
             case "ActAtFirst":
-                return rtl.ActAtFirst(self.word(one), self.element(other), scopes)
+                return formulas.ActAtFirst(self.word(one), self.element(other), scopes)
             case "ActAtSome":
-                return rtl.ActAtSome(self.word(one), self.element(other), scopes)
+                return formulas.ActAtSome(self.word(one), self.element(other), scopes)
             case "Count":
-                return rtl.Count(self.element(one), self.number(other), scopes)
-        return rtl.AtLeast(self.element(one), self.number(other), scopes)
+                return formulas.Count(self.element(one), self.number(other), scopes)
+        return formulas.AtLeast(self.element(one), self.number(other), scopes)
 
-    def scopes(self, node: ast.expr) -> tuple[rtl.Scope, ...]:
-        scopes: list[rtl.Scope] = []
+    def scopes(self, node: ast.expr) -> tuple[formulas.Scope, ...]:
+        scopes: list[formulas.Scope] = []
         while True:
             match node:
                 case ast.Name("tr"):
@@ -128,12 +128,12 @@ class _Parser:
                     if name not in SCOPES:
                         raise self.unknown(function, "scope", name, SCOPES)
                     (element,) = self.arguments(node, function, name, 1)
-                    scopes.append(rtl.Scope(SCOPES[name], self.element(element)))
+                    scopes.append(formulas.Scope(SCOPES[name], self.element(element)))
                     node = inner
                 case _:
                     raise self.expected("tr or a scope such as tr.AfterFirst(...)", node)
 
-    def element(self, node: ast.expr) -> rtl.EventPattern:
+    def element(self, node: ast.expr) -> formulas.EventPattern:
         match node:
             case ast.Call(ast.Name("at")):
                 place, inner = self.arguments(node, node, "at", 2)
@@ -144,29 +144,29 @@ class _Parser:
             case ast.Call(ast.Name(kind)) if kind in self.recordings:
                 if self.recordings[kind].options is None:
                     (text,) = self.arguments(node, node, kind, 1)
-                    return rtl.EventPattern(kind, self.matched(text))
+                    return formulas.EventPattern(kind, self.matched(text))
                 text, options = self.arguments(node, node, kind, 2)
-                return rtl.EventPattern(kind, self.matched(text), self.matched(options))
+                return formulas.EventPattern(kind, self.matched(text), self.matched(options))
             case ast.Call(ast.Name(kind)) if kind in QUESTIONS and self.question is not None:
                 (text,) = self.arguments(node, node, kind, 1)
                 if kind == "mention":
-                    return rtl.EventPattern(self.question, self.matched(text), mention=True)
-                return rtl.EventPattern(self.question, rtl.Regex(".*"), answer=self.matched(text))
+                    return formulas.EventPattern(self.question, self.matched(text), mention=True)
+                return formulas.EventPattern(self.question, formulas.Regex(".*"), answer=self.matched(text))
             case ast.Call(ast.Name(kind)):
                 raise self.unknown(node, "element", kind, [*self.recordings, *QUESTIONS, "at"])
         raise self.expected('an element such as goto("lobby")', node)
 
-    def matched(self, node: ast.expr) -> rtl.Text:
+    def matched(self, node: ast.expr) -> formulas.Text:
         match node:
             case ast.Constant(str()):
-                return rtl.Regex(self.regex(node))
+                return formulas.Regex(self.regex(node))
             case ast.Call(ast.Name(name)) if name not in TEXTS:
                 raise self.unknown(node, "text helper", name, TEXTS)
             case ast.Call(ast.Name("words")):
                 arguments = self.arguments(node, node, "words")
                 if not arguments:
                     raise self.error(node, "words needs at least one text")
-                return rtl.Words(tuple(map(self.matched, arguments)))
+                return formulas.Words(tuple(map(self.matched, arguments)))
             case ast.Call(ast.Name(name)) if name.endswith("number"):
                 arguments = self.arguments(node, node, name)
                 if len(arguments) < 2:  # noqa: PLR2004 - the number and the thing
@@ -179,7 +179,7 @@ class _Parser:
             case ast.Call(ast.Name(name)):
                 (argument,) = self.arguments(node, node, name, 1)
                 word = self.word(argument)
-                return rtl.Without(word) if name == "without" else Claim(word, name == "denies")
+                return formulas.Without(word) if name == "without" else Claim(word, name == "denies")
         raise self.expected("a string, words(...) or without(...)", node)
 
     def time(self, node: ast.expr) -> str:

@@ -10,7 +10,7 @@ from typing import Literal, TypeAlias
 from codebotler.core.skills import SKILLS, Verb
 from codebotler.core.trace import Event
 from codebotler.core.words import listed
-from codebotler.rtl.formula import EventPattern, Regex, Text, Without, Words
+from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
 from codebotler.rtl.text.claims import Claim, Number, Time
 
 Form: TypeAlias = Literal["base", "past", "ing"]

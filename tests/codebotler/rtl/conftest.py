@@ -6,28 +6,8 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from codebotler import rtl
 from codebotler.core.trace import Event, Option, Trace
-from codebotler.rtl import (
-    ActAtFirst,
-    ActAtSome,
-    And,
-    AtLeast,
-    Claim,
-    Count,
-    EventPattern,
-    Exists,
-    Formula,
-    Not,
-    Number,
-    Or,
-    Regex,
-    Scope,
-    Test,
-    Text,
-    Time,
-    Without,
-    Words,
-)
 
 NAMES = st.sampled_from(["a", "b", "ab", "a b", "No"])
 PATTERNS = st.sampled_from([".*", "a", "b", "ab", "a|b", "^b", r"\bb\b", "no", "[", ""]).map(
@@ -36,54 +16,54 @@ PATTERNS = st.sampled_from([".*", "a", "b", "ab", "a|b", "^b", r"\bb\b", "no", "
 PLAIN = ("goto", "goto", "say", "check", "pick", "place")
 
 
-def texts_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
-    leaves: SearchStrategy[Text] = patterns.map(Regex) | patterns.map(Without)
+def texts_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Text]:
+    leaves: SearchStrategy[rtl.Text] = patterns.map(rtl.Regex) | patterns.map(rtl.Without)
     return st.recursive(
-        leaves, lambda inner: st.lists(inner, min_size=1, max_size=3).map(tuple).map(Words), max_leaves=3
+        leaves, lambda inner: st.lists(inner, min_size=1, max_size=3).map(tuple).map(rtl.Words), max_leaves=3
     )
 
 
-def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[EventPattern]:
+def elements_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.EventPattern]:
     texts = texts_from(patterns) | claims_from(patterns)
-    plain = st.builds(EventPattern, st.sampled_from(PLAIN), texts)
-    asked = st.builds(EventPattern, st.just("ask"), texts, texts)
-    mentioned = st.builds(EventPattern, st.just("ask"), texts, st.none(), st.just(value=True))
-    answered = st.builds(lambda text: EventPattern("ask", Regex(".*"), answer=text), texts)
+    plain = st.builds(rtl.EventPattern, st.sampled_from(PLAIN), texts)
+    asked = st.builds(rtl.EventPattern, st.just("ask"), texts, texts)
+    mentioned = st.builds(rtl.EventPattern, st.just("ask"), texts, st.none(), st.just(value=True))
+    answered = st.builds(lambda text: rtl.EventPattern("ask", rtl.Regex(".*"), answer=text), texts)
     anywhere = plain | asked | mentioned | answered
     return anywhere | st.builds(lambda element, p: replace(element, place=p), anywhere, patterns)
 
 
-def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[Text]:
+def claims_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Text]:
     others = st.lists(patterns, max_size=2).map(tuple)
     return st.one_of(
-        st.builds(Number, st.integers(0, 3), patterns, others, st.booleans()),
+        st.builds(rtl.Number, st.integers(0, 3), patterns, others, st.booleans()),
         st.builds(
-            Time, st.sampled_from(["0:30", "11:00"]), st.sampled_from(["12:00", "13:30"]), st.booleans()
+            rtl.Time, st.sampled_from(["0:30", "11:00"]), st.sampled_from(["12:00", "13:30"]), st.booleans()
         ),
-        st.builds(Claim, patterns, st.booleans()),
+        st.builds(rtl.Claim, patterns, st.booleans()),
     )
 
 
-def tests_from(patterns: SearchStrategy[str]) -> SearchStrategy[Test]:
+def tests_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Test]:
     elements = elements_from(patterns)
     names = st.sampled_from(["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"])
-    scopes = st.lists(st.builds(Scope, names, elements), max_size=3).map(tuple)
+    scopes = st.lists(st.builds(rtl.Scope, names, elements), max_size=3).map(tuple)
     numbers = st.integers(0, 3)
     return st.one_of(
-        st.builds(Exists, elements, scopes),
-        st.builds(ActAtFirst, patterns, elements, scopes),
-        st.builds(ActAtSome, patterns, elements, scopes),
-        st.builds(Count, elements, numbers, scopes),
-        st.builds(AtLeast, elements, numbers, scopes),
+        st.builds(rtl.Exists, elements, scopes),
+        st.builds(rtl.ActAtFirst, patterns, elements, scopes),
+        st.builds(rtl.ActAtSome, patterns, elements, scopes),
+        st.builds(rtl.Count, elements, numbers, scopes),
+        st.builds(rtl.AtLeast, elements, numbers, scopes),
     )
 
 
-def formulas_from(patterns: SearchStrategy[str]) -> SearchStrategy[Formula]:
-    leaves: SearchStrategy[Formula] = tests_from(patterns)
+def formulas_from(patterns: SearchStrategy[str]) -> SearchStrategy[rtl.Formula]:
+    leaves: SearchStrategy[rtl.Formula] = tests_from(patterns)
 
-    def larger(inner: SearchStrategy[Formula]) -> SearchStrategy[Formula]:
+    def larger(inner: SearchStrategy[rtl.Formula]) -> SearchStrategy[rtl.Formula]:
         parts = st.lists(inner, min_size=2, max_size=3).map(tuple)
-        return parts.map(And) | parts.map(Or) | inner.map(Not)
+        return parts.map(rtl.And) | parts.map(rtl.Or) | inner.map(rtl.Not)
 
     return st.recursive(leaves, larger, max_leaves=4)
 
@@ -97,22 +77,22 @@ def traces_from(options: SearchStrategy[Option]) -> SearchStrategy[Trace]:
 
 
 @pytest.fixture(scope="session")
-def elements() -> SearchStrategy[EventPattern]:
+def elements() -> SearchStrategy[rtl.EventPattern]:
     return elements_from(PATTERNS)
 
 
 @pytest.fixture(scope="session")
-def formulas() -> SearchStrategy[Formula]:
+def formulas() -> SearchStrategy[rtl.Formula]:
     return formulas_from(PATTERNS)
 
 
 @pytest.fixture(scope="session")
-def single_tests() -> SearchStrategy[Test]:
+def single_tests() -> SearchStrategy[rtl.Test]:
     return tests_from(PATTERNS)
 
 
 @pytest.fixture(scope="session")
-def strange_formulas() -> SearchStrategy[Formula]:
+def strange_formulas() -> SearchStrategy[rtl.Formula]:
     """Formulas whose regexes hold anything a string may hold."""
     return formulas_from(st.text(max_size=6).map(_escaped))
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from codebotler.core.trace import Event, Trace
 from codebotler.rtl import And, Formula, Not, Regex, Without, Words, holds, parse
-from codebotler.rtl.formula import ScopeName
+from codebotler.rtl.formulas import ScopeName
 from codebotler.rtl.reasoning import (
     Reasoner,
     Undecided,

@@ -7,7 +7,7 @@ several, also for the rooms of one world; `satisfiability.py` is the search behi
 from __future__ import annotations
 
 from codebotler.core.trace import Trace
-from codebotler.rtl.formula import Formula, Not
+from codebotler.rtl.formulas import Formula, Not
 from codebotler.rtl.reasoning.automaton import Undecided
 from codebotler.rtl.reasoning.satisfiability import Reasoner
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from codebotler.core.trace import Event, Option
-from codebotler.rtl.formula import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
+from codebotler.rtl.formulas import ActAtFirst, ActAtSome, And, EventPattern, Formula, Not, Or, Regex, Text
 from codebotler.rtl.reasoning.sample_strings import distinct_strings
 
 

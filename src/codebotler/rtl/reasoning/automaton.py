@@ -8,13 +8,13 @@ from functools import lru_cache
 from typing import Any, NamedTuple, TypeAlias, assert_never
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.rtl import formula as rtl
+from codebotler.rtl import formulas
 
 MOST_STATES = 1_000
 """States that an automaton may have before it is minimized."""
 
 State: TypeAlias = Hashable
-Letter: TypeAlias = frozenset[rtl.EventPattern]
+Letter: TypeAlias = frozenset[formulas.EventPattern]
 """The elements of a formula that match an event."""
 
 
@@ -31,7 +31,7 @@ class Automaton:
 
     @classmethod
     @lru_cache(maxsize=1_000)  # worlds of a task have most requirements in common
-    def of(cls, formula: rtl.Formula, letters: tuple[Letter, ...]) -> Automaton:
+    def of(cls, formula: formulas.Formula, letters: tuple[Letter, ...]) -> Automaton:
         """The automaton of a formula, reading these letters."""
         machine = _machine(formula)
         number: dict[State, int] = {machine.start: 0}
@@ -81,28 +81,32 @@ class _Machine(NamedTuple):
     accepts: Callable[[Any], bool]
 
 
-def _machine(formula: rtl.Formula) -> _Machine:
+def _machine(formula: formulas.Formula) -> _Machine:
     match formula:
-        case rtl.And(parts) | rtl.Or(parts):
-            return _together([*map(_machine, parts)], all if isinstance(formula, rtl.And) else any)
-        case rtl.Not(part):
+        case formulas.And(parts) | formulas.Or(parts):
+            return _together([*map(_machine, parts)], all if isinstance(formula, formulas.And) else any)
+        case formulas.Not(part):
             start, step, accepts = _machine(part)
             return _Machine(start, step, lambda state: not accepts(state))
-        case rtl.ActAtFirst():
+        case formulas.ActAtFirst():
             arrival = formula.arrival
             stay = (
                 *formula.scopes,
-                rtl.Scope("AfterFirst", arrival),
-                rtl.Scope("BeforeFirst", formula.departure),
+                formulas.Scope("AfterFirst", arrival),
+                formulas.Scope("BeforeFirst", formula.departure),
             )
-            return _machine(rtl.And((rtl.Exists(arrival, formula.scopes), rtl.Exists(formula.element, stay))))
-        case rtl.ActAtSome():
+            return _machine(
+                formulas.And(
+                    (formulas.Exists(arrival, formula.scopes), formulas.Exists(formula.element, stay))
+                )
+            )
+        case formulas.ActAtSome():
             machine = _during_stays(formula)
-        case rtl.Exists(element):
+        case formulas.Exists(element):
             machine = _counter(element, 1, 1)
-        case rtl.AtLeast(element, number):
+        case formulas.AtLeast(element, number):
             machine = _counter(element, number, number)
-        case rtl.Count(element, number):
+        case formulas.Count(element, number):
             machine = _counter(element, number, number + 1)
         case _:
             assert_never(formula)
@@ -119,11 +123,11 @@ def _together(machines: Sequence[_Machine], join: Callable[[list[bool]], bool]) 
     )
 
 
-def _counter(element: rtl.EventPattern, number: int, most: int) -> _Machine:
+def _counter(element: formulas.EventPattern, number: int, most: int) -> _Machine:
     return _Machine(0, lambda n, letter: min(n + (element in letter), most), lambda n: n == number)
 
 
-def _during_stays(test: rtl.ActAtSome) -> _Machine:
+def _during_stays(test: formulas.ActAtSome) -> _Machine:
     def step(state: str, letter: Letter) -> State:
         stays = state == "there" and test.departure not in letter
         if state == "done" or (stays and test.element in letter):
@@ -133,7 +137,7 @@ def _during_stays(test: rtl.ActAtSome) -> _Machine:
     return _Machine("away", step, lambda state: state == "done")
 
 
-def _within(scope: rtl.Scope, inner: _Machine) -> _Machine:
+def _within(scope: formulas.Scope, inner: _Machine) -> _Machine:
     """The machine that lets an inner one read only the events in a scope."""
     at, (start, step, accepts) = scope.element, inner
     match scope.name:

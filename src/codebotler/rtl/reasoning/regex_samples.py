@@ -10,7 +10,7 @@ from itertools import chain, zip_longest
 from random import Random
 from typing import Any
 
-from codebotler.rtl.formula import Regex
+from codebotler.rtl.formulas import Regex
 
 Tree = Any
 """A parsed regex or a part of one: pairs of an operation and its arguments, of private classes of `re`."""

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from itertools import chain, combinations, islice, permutations, product
 
-from codebotler.rtl.formula import Regex, Text, Without, Words
+from codebotler.rtl.formulas import Regex, Text, Without, Words
 from codebotler.rtl.reasoning.regex_samples import counter_samples, samples
 from codebotler.rtl.text.claims import Claim, Number, Time
 

@@ -14,7 +14,7 @@ from operator import getitem
 from typing import TypeAlias
 
 from codebotler.core.trace import Event, Trace
-from codebotler.rtl.formula import Formula, Not
+from codebotler.rtl.formulas import Formula, Not
 from codebotler.rtl.reasoning.alphabet import alphabet, elements
 from codebotler.rtl.reasoning.automaton import Automaton, Undecided
 from codebotler.rtl.semantics import holds, matches
