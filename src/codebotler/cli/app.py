@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from codebotler import __version__
 from codebotler.cli import options
 from codebotler.cli.ending import obey
 from codebotler.core.terminal import note, noting_all, print_text
@@ -16,7 +15,9 @@ from codebotler.core.terminal import note, noting_all, print_text
 if TYPE_CHECKING:
     from codebotler.models.base import Model
 
-app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+app = options.command_line(
+    "codebotler", "Turn instructions into robot programs, check them, and run them on robots."
+)
 
 
 def robot_names(incomplete: str) -> list[str]:
@@ -32,19 +33,6 @@ RobotOption = Annotated[
         help="Which robot: sim, or another that `codebotler robots` lists.", autocompletion=robot_names
     ),
 ]
-
-
-@app.callback(invoke_without_command=True)
-def codebotler(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
-) -> None:
-    """Turn instructions into robot programs, check them, and run them on robots."""
-    if version:
-        print_text(f"codebotler {__version__}")
-        raise typer.Exit
-    if context.invoked_subcommand is None:
-        print_text(context.get_help())
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""Options shared by several commands."""
+"""Options shared by several commands, and what both command lines begin with."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from codebotler import __version__
+from codebotler.core.terminal import print_text
 
 ModelOption = Annotated[
     str,
@@ -44,3 +47,21 @@ TokenOption = Annotated[str | None, typer.Option(help="The token that opens the 
 NoTokenOption = Annotated[
     bool, typer.Option("--no-token", help="Let everybody on this machine in; not with --host.")
 ]
+
+
+def command_line(name: str, about: str) -> typer.Typer:
+    """A command line without commands yet, which shows its version, or else what there is."""
+    app = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+
+    @app.callback(invoke_without_command=True, help=about)
+    def show(
+        context: typer.Context,
+        version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    ) -> None:
+        if version:
+            print_text(f"{name} {__version__}")
+            raise typer.Exit
+        if context.invoked_subcommand is None:
+            print_text(context.get_help())
+
+    return app

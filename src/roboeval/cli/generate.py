@@ -6,7 +6,7 @@ import re
 from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,16 +35,16 @@ from roboeval.cli.options import (
     WorkersOption,
     command,
     load,
+    with_options_of,
 )
 from roboeval.cli.output import fail, metered, note
 from roboeval.cli.report import report
 
 if TYPE_CHECKING:
-    from codebotler.models.base import SamplingSettings
-    from roboeval.evaluation.generate import Pace, Progress
+    from roboeval.evaluation.generate import Progress
 
 
-def generate(
+def completed(
     model: ModelOption = "recorded",
     out: OutOption = None,
     num_completions: NumOption = 50,
@@ -59,54 +59,63 @@ def generate(
     token_budget: BudgetOption = None,
     timeout: TimeoutOption = 60.0,
     base_url: BaseUrlOption = None,
-) -> None:
+) -> Path:
+    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
+    from codebotler.models.base import SamplingSettings
+    from codebotler.models.open import open_model
+    from roboeval.evaluation.generate import Pace, generate_run
+    from roboeval.evaluation.requests import GenerationPlan
+    from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+
+    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
+    pace = Pace(concurrency, requests_per_minute, token_budget)
+    known = load(suite)
+    plan = GenerationPlan(known, tasks_to_judge(known, tasks, ablated=False)[0], num_completions)
+    opened = open_model(model, settings)
+    run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", opened.name).strip("-.")))
+    meter = Meter()
+    try:
+        with meter:
+            progress = generate_run(run, plan, opened, settings, pace, on_progress=meter.show)
+    except KeyboardInterrupt:
+        note(f"roboeval: {meter.after_a_stop()}")
+        raise SystemExit(STOPPED) from None
+    if progress.missing is not None:
+        note(f"roboeval: {progress.missing}; the same command continues where it stopped")
+        raise SystemExit(1)
+    return run.path
+
+
+@with_options_of(completed)
+def generate(*, suite: SuiteOption = "paper", **options: Any) -> None:  # noqa: ANN401 - of several kinds
     """Have a model write programs for a suite.
 
     After an interruption, the same command continues.
     """
-    from codebotler.models.base import SamplingSettings
-    from roboeval.evaluation.generate import Pace
-
-    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
-    pace = Pace(concurrency, requests_per_minute, token_budget)
-    path = complete(model, out, suite, tasks, num_completions, settings, pace)
+    path = completed(suite=suite, **options)
     note(f"the completions are in {path}; `{command('evaluate', path, suite=suite)}` judges them")
 
 
+@with_options_of(completed)
 def run(
-    model: ModelOption = "recorded",
-    out: OutOption = None,
-    num_completions: NumOption = 50,
-    temperature: TemperatureOption = 0.2,
-    top_p: TopPOption = 0.95,
-    max_tokens: MaxTokensOption = 512,
-    seed: SeedOption = None,
+    *,
     suite: SuiteOption = "paper",
     tasks: TasksOption = None,
-    concurrency: ConcurrencyOption = 8,
-    requests_per_minute: RateOption = None,
-    token_budget: BudgetOption = None,
-    timeout: TimeoutOption = 60.0,
-    base_url: BaseUrlOption = None,
     workers: WorkersOption = None,
     require_isolation: IsolationOption = False,
     with_report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write the report, to the folder report of the run.")
     ] = True,
     json: JsonOption = False,
+    **options: Any,  # noqa: ANN401 - of several kinds
 ) -> None:
     """Have a model write programs, judge them, and write a report.
 
     It prints the tables. After an interruption, the same command continues.
     """
-    from codebotler.models.base import SamplingSettings
-    from roboeval.evaluation.generate import Pace
-
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
         fail("the report needs matplotlib; `pip install 'codebotler[report]'` brings it, or add --no-report")
-    settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
-    pace = Pace(concurrency, requests_per_minute, token_budget)
-    path = complete(model, out, suite, tasks, num_completions, settings, pace)
+    path = completed(suite=suite, tasks=tasks, **options)
     evaluate(
         str(path), suite=suite, tasks=tasks, workers=workers, require_isolation=require_isolation, json=json
     )
@@ -119,38 +128,6 @@ def run(
         again = command("report", path, "--out", folder, suite=suite)
         note(f"roboeval: stopped; verdicts are in {path}; `{again}` writes the report")
         raise SystemExit(STOPPED) from None
-
-
-def complete(
-    name: str,
-    out: Path | None,
-    suite_name: str,
-    tasks: str | None,
-    num_completions: int,
-    settings: SamplingSettings,
-    pace: Pace,
-) -> Path:
-    """Make or complete a run, and return its folder; exit with status 1 if completions are missing."""
-    from codebotler.models.open import open_model
-    from roboeval.evaluation.generate import generate_run
-    from roboeval.evaluation.requests import GenerationPlan
-    from roboeval.evaluation.runs.folder import Run, tasks_to_judge
-
-    suite = load(suite_name)
-    plan = GenerationPlan(suite, tasks_to_judge(suite, tasks, ablated=False)[0], num_completions)
-    model = open_model(name, settings)
-    run = Run(out or Path("runs", re.sub(r"[^\w.]+", "-", model.name).strip("-.")))
-    meter = Meter()
-    try:
-        with meter:
-            progress = generate_run(run, plan, model, settings, pace, on_progress=meter.show)
-    except KeyboardInterrupt:
-        note(f"roboeval: {meter.after_a_stop()}")
-        raise SystemExit(STOPPED) from None
-    if progress.missing is not None:
-        note(f"roboeval: {progress.missing}; the same command continues where it stopped")
-        raise SystemExit(1)
-    return run.path
 
 
 class Meter(ExitStack):

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Callable
+from inspect import Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeVar
 
 import typer
 
@@ -104,6 +105,21 @@ RateOption = Annotated[
 BudgetOption = Annotated[
     int | None, typer.Option(min=1, help="Stop when this command has used this many tokens.")
 ]
+
+
+Command = TypeVar("Command", bound=Callable[..., None])
+
+
+def with_options_of(called: Callable[..., object]) -> Callable[[Command], Command]:
+    """Give a command all options of a function to which it passes them on as `**options`."""
+
+    def extended(command: Command) -> Command:
+        inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
+        more = [one for name, one in own.items() if name not in inherited and one.kind is one.KEYWORD_ONLY]
+        command.__signature__ = Signature([*inherited.values(), *more])  # type: ignore[attr-defined]
+        return command
+
+    return extended
 
 
 # --- what a user names
