@@ -10,7 +10,6 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from codebotler.core.words import counted
 from roboeval.analysis.metrics import Estimate, by_formula
 from roboeval.analysis.statistics import (
     DIFFERENCE,
@@ -20,7 +19,8 @@ from roboeval.analysis.statistics import (
     needed,
     p_by_signs,
 )
-from roboeval.suites.load import Suite
+from roboeval.evaluation.runs.completions import how_many
+from roboeval.evaluation.runs.results import Results
 
 LEVEL = 0.05  # a larger p may well be chance
 PromptScores = Mapping[tuple[str, int], float]  # pass@1 by task and prompt
@@ -110,19 +110,16 @@ def verdict(comparison: Comparison, names: tuple[str, str]) -> str:
     return f"{better} passes more often than {other} by {by}, which may well be chance."
 
 
-def told_of(about: Mapping[str, Any], head: Mapping[str, Any]) -> dict[str, Any]:
-    """How completions were asked for, of a run.json, and judged, of a KEY.json."""
-    return {**about, **{name: head.get(name) for name in ("python", "codebotler")}}
-
-
-def unlike(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
+def unlike(first: Results, second: Results) -> list[str]:
     """What differs between two runs, other than the model, and may explain a difference."""
+    judged_with = ("python", "codebotler")  # of generation, run.json has these as well
+    runs = [{**one.about, **{name: one.head.get(name) for name in judged_with}} for one in (first, second)]
     told = []
     for name, words in WORDS.items():
-        a, b = first.get(name), second.get(name)
+        a, b = (run.get(name) for run in runs)
         if a is not None and b is not None and a != b:
             told.append(f"{words} differ: {_said(a)} and {_said(b)}")
-    settings = [found if isinstance(found := one.get("settings"), dict) else {} for one in (first, second)]
+    settings = [found if isinstance(found := run.get("settings"), dict) else {} for run in runs]
     if bool(settings[0]) != bool(settings[1]):
         told.append("the settings of one of them were not recorded")
     for name in sorted({*settings[0], *settings[1]} if all(settings) else ()):
@@ -141,20 +138,6 @@ WORDS = {
 
 def _said(value: object) -> str:
     return "none" if value is None else visible(str(value))[:12]
-
-
-def expect_same_suite(heads: Mapping[str, Mapping[str, Any]], suite: Suite, again: Mapping[str, str]) -> None:
-    """Raise UserError if runs were judged by suites of different content."""
-    digests = {path: str(head.get("digest")) for path, head in heads.items()}
-    if len({*digests.values()}) < 2:  # noqa: PLR2004 - two that differ
-        return
-    stale = next(path for path, digest in digests.items() if digest != suite.digest)
-    other = next(path for path, digest in digests.items() if digest != digests[stale])
-    hashes = f"{digests[stale][:8]} and {digests[other][:8]}"
-    raise UserError(
-        f"{stale} and {other} were judged by different versions of a suite ({hashes}); "
-        f"`{again[stale]} --redo` judges it by the current suite"
-    )
 
 
 def comparison_data(comparison: Comparison, names: tuple[str, str]) -> dict[str, Any]:
@@ -180,17 +163,12 @@ def _ends(estimate: Estimate) -> dict[str, float]:
     return {"low": estimate.low, "high": estimate.high}
 
 
-def prompts(count: int) -> str:
-    """How many: `1 prompt`, `20 prompts`."""
-    return counted(count, "prompt")
-
-
 def to_tell(comparison: Comparison) -> list[str]:
     """How much it would take to tell the two apart, in sentences."""
     much = comparison.needed
     if much.completions is None:
         return ["They do not differ, so no number of completions would show a difference."]
-    each = f"{much.completions:,} completion{'s' * (much.completions != 1)}"
+    each = how_many(much.completions)
     here = (
         f"Detecting a difference of this size on these prompts, four times in five, takes {each} of each "
         f"model for each prompt ({much.completions * comparison.prompts:,} of each in all)."

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import accumulate
+from operator import mul
 from typing import TypeAlias
 
 import polars as pl
@@ -212,16 +214,9 @@ def t_quantile(p: float, df: int) -> float:
 
 def _within(angle: float, df: int) -> float:
     """The chance that |t| stays below sqrt(df) * tan(angle) (Abramowitz and Stegun, 26.7.3 and 26.7.4)."""
-    if df % 2 == 0:
-        return math.sin(angle) * math.fsum(_terms(angle, 1.0, range(2, df, 2)))
-    series = math.fsum(_terms(angle, math.cos(angle), range(3, df, 2))) if df > 1 else 0.0
-    return 2 / math.pi * (angle + math.sin(angle) * series)
-
-
-def _terms(angle: float, first: float, factors: range) -> Iterator[float]:
-    """A first term, and one more for each factor i: the one before times cos(angle)**2 * (i - 1) / i."""
-    term = first
-    yield term
-    for i in factors:
-        term *= math.cos(angle) ** 2 * (i - 1) / i
-        yield term
+    if df == 1:
+        return 2 / math.pi * angle
+    is_odd = df % 2
+    factors = (math.cos(angle) ** 2 * (i - 1) / i for i in range(2 + is_odd, df, 2))
+    series = math.fsum(accumulate(factors, mul, initial=math.cos(angle) if is_odd else 1.0))
+    return 2 / math.pi * (angle + math.sin(angle) * series) if is_odd else math.sin(angle) * series

@@ -40,8 +40,6 @@ class Chances:
 
 def chances(trials: Sequence[Trial], retries: int) -> Chances:
     """What is to be expected of a prompt, exactly, where each completion is drawn as often as any other."""
-    if not trials or retries < 0:
-        raise ValueError(f"there is nothing to expect of {len(trials)} completions and {retries} retries")
     accepted = [trial for trial in trials if trial.accepted]
     rejected = [trial for trial in trials if not trial.accepted]
     none = (len(rejected) / len(trials)) ** (retries + 1)

@@ -43,8 +43,6 @@ class Search:
 
     def __init__(self, question: Question, *, workers: int = 1) -> None:
         self._question, self._workers = question, workers
-        if question.formula is not None:
-            parse(question.formula)  # a wrong one is refused before anything is read
         self._lines: list[bytes] = []
         self._pool: ProcessPoolExecutor | None = None
         self._waiting: list[Future[list[Found]]] = []

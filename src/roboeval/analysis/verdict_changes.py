@@ -15,7 +15,6 @@ from roboeval.analysis.metrics import pass_at_1
 from roboeval.analysis.statistics import ROUNDING
 from roboeval.evaluation.runs.completions import Key, how_many
 from roboeval.evaluation.runs.results import Results
-from roboeval.suites.load import Suite
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
     programs = first.programs
     return VerdictChanges(
         name=name,
-        suites=(_suite(first).name, _suite(second).name),
+        suites=(first.known_suite.name, second.known_suite.name),
         comparison=compared(_pass_at_1(first, second), _pass_at_1(second, first)),
         tasks=tuple(_by_task(first, second, both)),
         first_only=tuple(clusters(groups((second.failed[key] for key in lost), programs), second)),
@@ -71,11 +70,6 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
         programs=len({(key[0], programs.get(key)) for key in lost + won}),
         left_out=len(first.places.keys() | second.places.keys()) - len(both),
     )
-
-
-def _suite(results: Results) -> Suite:
-    assert results.suite is not None, "verdicts are compared by suites that are at hand"
-    return results.suite
 
 
 def _pass_at_1(results: Results, other: Results) -> PromptScores:
@@ -87,7 +81,7 @@ def _pass_at_1(results: Results, other: Results) -> PromptScores:
 def _by_task(first: Results, second: Results, keys: Iterable[Key]) -> Iterator[TaskChanges]:
     counts = Counter((key[0], key not in first.failed, key not in second.failed) for key in keys)
     there = {task for task, *_ in counts}
-    for task in dict.fromkeys([*_suite(first).tasks, *sorted(there)]):
+    for task in dict.fromkeys([*first.known_suite.tasks, *sorted(there)]):
         if task in there:
             yield TaskChanges(
                 task,
@@ -134,6 +128,11 @@ def _sign(difference: float) -> int:
 
 
 # --- in sentences
+
+
+def sentences(found: Sequence[VerdictChanges]) -> list[str]:
+    """What changes for each run, and for the order of all."""
+    return [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
 
 
 def said(found: VerdictChanges) -> str:

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from codebotler.core.words import counted
 from roboeval.cli.options import (
     AblationOption,
     EngineOption,
     JsonOption,
-    Opened,
     RunArgument,
     SuiteOption,
     WorkersOption,
     engine_named,
+    expect_same_suite,
     named,
     open_current,
 )
@@ -65,18 +66,18 @@ PAIR = 2
 
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print by how much the second of two runs is better."""
-    from roboeval.analysis.compare import compared, comparison_data, prompts, told_of, unlike
+    from roboeval.analysis.compare import compared, comparison_data, unlike
     from roboeval.analysis.metrics import pass_at_1
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
-    expect_alike(paths, opened)
+    expect_same_suite(opened)
     result = compared(*(pass_at_1(one.results.table) for one in opened))
-    warnings = unlike(*(told_of(one.results.about, one.results.head) for one in opened))
+    warnings = unlike(*(one.results for one in opened))
     for warning in warnings:
         note(f"warning: {warning}")
     if result.left_out:
-        note(f"left out, since only one of the runs has them: {prompts(result.left_out)}")
+        note(f"left out, since only one of the runs has them: {counted(result.left_out, 'prompt')}")
     names = str(paths[0]), str(paths[1])
     if as_json:
         print_json({**comparison_data(result, names), "warnings": warnings})
@@ -106,15 +107,6 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
         print_json(changes_data(found))
     else:
         print_rich(changes_view(found, most=most))
-
-
-def expect_alike(paths: Sequence[Path], opened: Sequence[Opened]) -> None:
-    """Refuse runs that were judged by suites of different content."""
-    from roboeval.analysis.compare import expect_same_suite
-
-    named_heads = {str(path): one.results.head for path, one in zip(paths, opened, strict=True)}
-    again = {str(path): one.again for path, one in zip(paths, opened, strict=True)}
-    expect_same_suite(named_heads, opened[0].suite, again)
 
 
 def resample(
@@ -154,8 +146,7 @@ def checked(results: Results, *, samples: int = 5, seed: int = 0, engine: OpenEn
     from roboeval.evaluation.checks import check_programs
     from roboeval.evaluation.runs.table import with_answers
 
-    assert results.suite is not None, "it judged them"
     judged = [results.completions[key] for key in results.places]
     different = {(completion.task, completion.program) for completion in judged}
-    checking = check_programs(results.run, results.suite, judged, engine, samples=samples, seed=seed)
+    checking = check_programs(results.run, results.known_suite, judged, engine, samples=samples, seed=seed)
     return with_answers(results.table, dict(watched(checking, "checking", len(different))))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,8 +56,9 @@ def evaluate(
     json: JsonOption = False,
 ) -> None:
     """Judge whether each completion does what was asked."""
-    from roboeval.analysis.summary import summary
-    from roboeval.evaluation.runs.folder import Run, open_source, tasks_to_judge
+    from roboeval.analysis.summary import judged_count, summary
+    from roboeval.evaluation.runs.completions import how_many, name_of
+    from roboeval.evaluation.runs.folder import Run, tasks_to_judge
     from roboeval.evaluation.runs.results import Scope
     from roboeval.evaluation.runs.table import TableBuilder
 
@@ -68,39 +69,54 @@ def evaluate(
     wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
     if left:
         note(f"not judged, since they have no ablation: {', '.join(left)}")
-    tally = Tally()
+    builder = TableBuilder()
     run = None if out is None else Run(out)
     try:
-        opened = open_source(source, judged_by)
+        opened = opened_source(source, judged_by)
         run = run or opened.run
         scope = Scope.of(opened.completions, wanted)
-        if opened.left_aside is not None:
-            note(opened.left_aside)
         if scope.total == 0:
             fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
         if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
             run.keep(opened.completions)
         rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
-        builder = TableBuilder()
-        for row in watched(tally.of(rows), "judging", scope.total):
+        for row in watched(rows, "judging", scope.total):
             builder.add(row)
-        counted = summary(builder.table(), judged_by, scope, ablated=ablation)
+        table = builder.table()
+        counted = summary(table, judged_by, scope, ablated=ablation)
         print_summary(counted, title=source, as_json=json)
     except KeyboardInterrupt:
-        note(f"roboeval: {tally.after_a_stop(is_kept=run is not None, redo=redo)}")
+        is_started = not builder.table().is_empty()
+        note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
         raise SystemExit(STOPPED) from None
     if run is not None:
-        tally.say_how_to_look(run.path, suite, ablated=ablation)
-    _exit_if_left_out(scope.total - tally.count, scope.total, is_kept=run is not None)
-
-
-def _exit_if_left_out(left_out: int, total: int, *, is_kept: bool) -> None:
-    from roboeval.evaluation.runs.completions import how_many
-
-    if left_out > 0:
-        again = "the same command tries again" if is_kept else "the others are judged"
-        note(f"roboeval: not judged: {how_many(left_out)} of {total:,}; {again}")
+        failed = table.filter(~table["passed"]).select("task", "prompt", "index").head(1)
+        again = command("show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablation)
+        does = "says why that program fails" if failed.height else "prints these tables again"
+        note(f"verdicts are in {run.path}; `{again}` {does}")
+    if (left_out := scope.total - judged_count(counted.prompts)) > 0:
+        again = "the others are judged" if run is None else "the same command tries again"
+        note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
         raise SystemExit(1)
+
+
+def opened_source(text: str, suite: Suite) -> Source:
+    """Completions that a user names; note which files were left aside."""
+    from roboeval.evaluation.runs.folder import open_source
+
+    source = open_source(text, suite)
+    if source.left_aside is not None:
+        note(source.left_aside)
+    return source
+
+
+def after_a_stop(*, is_kept: bool, is_started: bool, redo: bool) -> str:
+    """What Ctrl-C leaves behind, and how to go on."""
+    if not is_kept:
+        return "stopped; nothing is kept (add --out RUN to keep verdicts)"
+    if not is_started:
+        return "stopped before judging; run the same command again"
+    return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
 
 
 def _judged(
@@ -135,43 +151,11 @@ def import_(
 ) -> None:
     """Make a run from completions written elsewhere."""
     from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run, open_source
+    from roboeval.evaluation.runs.folder import Run
 
-    known = load(suite)
-    opened = open_source(path, known)
-    Run(out).keep(opened.completions)
-    if opened.left_aside is not None:
-        note(opened.left_aside)
-    count = len(opened.completions)
+    completions = opened_source(path, load(suite)).completions
+    Run(out).keep(completions)
+    count = len(completions)
     again = command("evaluate", out, suite=suite)
     they = ("is", "it") if count == 1 else ("are", "them")
     note(f"{how_many(count)} {they[0]} in {out}; `{again}` judges {they[1]}")
-
-
-class Tally:
-    """Counts the rows that it passes on."""
-
-    count = 0
-    first_failed: tuple[str, ...] = ()  # its name, if any has failed
-
-    def of(self, rows: Iterable[JudgedRow]) -> Iterator[JudgedRow]:
-        """Pass rows on."""
-        for row in rows:
-            self.count += 1
-            if not row.passed and not self.first_failed:
-                self.first_failed = (f"{row.task}/{row.prompt}/{row.index}",)
-            yield row
-
-    def after_a_stop(self, *, is_kept: bool, redo: bool) -> str:
-        """What Ctrl-C leaves behind, and how to go on."""
-        if not is_kept:
-            return "stopped; nothing is kept (add --out RUN to keep verdicts)"
-        if self.count == 0:
-            return "stopped before judging; run the same command again"
-        return f"stopped; the same command {'without --redo ' * redo}continues where it stopped"
-
-    def say_how_to_look(self, run: Path, suite: str, *, ablated: bool) -> None:
-        """Note where the verdicts are, and the command that shows more of them."""
-        again = command("show", run, *self.first_failed, suite=suite, ablated=ablated)
-        does = "says why that program fails" if self.first_failed else "prints these tables again"
-        note(f"verdicts are in {run}; `{again}` {does}")

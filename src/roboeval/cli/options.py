@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeVar
@@ -144,39 +144,46 @@ class Opened(NamedTuple):
     """A judged run that a user names."""
 
     results: Results
-    suite: Suite  # with the worlds in which the run was judged
     again: str  # the command that goes on with judging it
+
+
+def expect_same_suite(opened: Sequence[Opened]) -> None:
+    """Raise UserError if runs were judged by suites of different content."""
+    from codebotler.core.errors import UserError
+
+    digests = [str(one.results.head.get("digest")) for one in opened]
+    if len({*digests}) == 1:
+        return
+    now = opened[0].results.known_suite.digest
+    stale = next(at for at, digest in enumerate(digests) if digest != now)
+    other = next(at for at, digest in enumerate(digests) if digest != digests[stale])
+    paths = " and ".join(str(opened[at].results.run.path) for at in (stale, other))
+    hashes = " and ".join(digests[at][:8] for at in (stale, other))
+    raise UserError(
+        f"{paths} were judged by different versions of a suite ({hashes}); "
+        f"`{opened[stale].again} --redo` judges it by the current suite"
+    )
 
 
 def open_run(
     run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
 ) -> Opened:
     """Read a judged run; `see` is called with each line of its verdicts."""
-    from codebotler.core.errors import UserError
-    from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key
-    from roboeval.evaluation.runs.results import read_results
+    from roboeval.evaluation.runs.results import open_results
 
-    folder = Run(run)
-    suite = as_judged(folder, load(suite_name), ablated=ablated)
-    key = evaluation_key(suite, ablated=ablated)
-    if not folder.completions.is_file():
-        raise UserError("is not a run: it has no completions.jsonl", file=run)
-    if not folder.rows(key).is_file():
-        others = folder.judged_by()
-        if others and suite.name not in others:
-            judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
-            raise UserError(
-                f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=run
-            )
-        again = command("evaluate", run, suite=suite_name, ablated=ablated)
-        raise UserError(f"has not been judged; run `{again}`", file=run)
-    results = read_results(
-        folder, key, suite, see=see, watch=lambda lines, total: watched(lines, "reading", total)
+    results = open_results(
+        run,
+        load(suite_name),
+        ablated=ablated,
+        again=command("evaluate", run, suite=suite_name, ablated=ablated),
+        see=see,
+        watch=lambda lines, total: watched(lines, "reading", total),
     )
+    suite = results.known_suite
     if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     again = command("evaluate", run, *_to_go_on(results, suite), suite=suite_name, ablated=ablated)
-    return Opened(results, suite, again)
+    return Opened(results, again)
 
 
 def open_current(

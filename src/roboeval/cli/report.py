@@ -7,12 +7,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.compare import checked, expect_alike
-from roboeval.cli.options import Opened, SuiteOption, WorkersOption, command, cores, named, open_current
+from roboeval.cli.compare import checked
+from roboeval.cli.options import (
+    SuiteOption,
+    WorkersOption,
+    command,
+    cores,
+    expect_same_suite,
+    named,
+    open_current,
+)
 from roboeval.cli.output import fail, note, watched
 
 if TYPE_CHECKING:
     from roboeval.evaluation.engines import OpenEngine
+    from roboeval.evaluation.runs.results import Results
     from roboeval.report.runs import JudgedRun
 
 
@@ -55,9 +64,9 @@ def report(
     if beside == suite:
         fail(f'--beside needs another suite than "{suite}", which the report itself uses')
     opened = [open_current(run, suite, ablated=False) for run in runs]
-    expect_alike(runs, opened)
+    expect_same_suite(opened)
     engine = Local(workers or cores()) if check else None
-    read = named_apart([judged_run(one, suite, beside=beside, engine=engine) for one in opened])
+    read = named_apart([judged_run(one.results, suite, beside=beside, engine=engine) for one in opened])
     expect_known(prices, read)
     options: list[object] = ["--out", out, *["--published"] * published]
     options += [] if beside is None else ["--beside", beside]
@@ -72,7 +81,7 @@ def report(
     note(f"the report is in {out / 'index.html'}")
 
 
-def judged_run(opened: Opened, suite: str, *, beside: str | None, engine: OpenEngine | None) -> JudgedRun:
+def judged_run(results: Results, suite: str, *, beside: str | None, engine: OpenEngine | None) -> JudgedRun:
     """A run with its ablation, if that was judged, and its verdicts by the suite `beside`.
 
     Programs are checked on `engine`; without one, earlier answers of the check are left out, too.
@@ -82,10 +91,9 @@ def judged_run(opened: Opened, suite: str, *, beside: str | None, engine: OpenEn
     from roboeval.evaluation.runs.folder import evaluation_key
     from roboeval.report.runs import JudgedRun
 
-    results = opened.results
     run = results.run
     ablated = other = None
-    if run.rows(evaluation_key(opened.suite, ablated=True)).is_file():
+    if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
         ablated = open_current(run.path, suite, ablated=True).results
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))

@@ -45,11 +45,11 @@ def show(
     from roboeval.analysis.summary import summary
     from roboeval.analysis.tasks import parse_selection
 
-    results, judged_by, again = open_run(run, suite, ablated=ablation)
-    selection = parse_selection(what, judged_by)
+    results, again = open_run(run, suite, ablated=ablation)
+    selection = parse_selection(what, results.known_suite)
     if selection.task is None:
         ks = sorted({1, *(k or [])})
-        counted = summary(results.table, judged_by, results.scope, k=ks, ablated=ablation)
+        counted = summary(results.table, results.known_suite, results.scope, k=ks, ablated=ablation)
         print_summary(counted, title=str(run), as_json=json, stale=results.stale)
     else:
         if k:

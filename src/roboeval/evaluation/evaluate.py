@@ -27,13 +27,11 @@ def evaluate_run(
     tasks: frozenset[str] | None,  # None for all
     redo: bool,
     workers: int = 1,
-    require_isolation: bool = False,
     engine: OpenEngine | None = None,
     completions: Iterable[Completion] | None = None,  # those of the run, if they were read before
 ) -> Iterator[JudgedRow]:
     """Judge a run's completions, going on where an earlier evaluation stopped; yield all rows in order."""
     key = evaluation_key(suite, ablated=ablated)
-    chosen = engine or Local(workers, require_isolation=require_isolation)
     with run.writing():
         run.rows(key).parent.mkdir(exist_ok=True)
         if redo:
@@ -49,7 +47,9 @@ def evaluate_run(
             left = [*left_out.waiting.values(), *islice(selected, 1)]
             if is_sealed(was) and (left or seal.is_broken(was)):
                 write_whole(run.head(key), to_text({**about, **left_out.data()}))
-            judged = judgements(chain(left, selected), suite, ablated=ablated, engine=chosen)
+            judged = judgements(
+                chain(left, selected), suite, ablated=ablated, engine=engine or Local(workers)
+            )
             is_whole = yield from _judge(judged, rows, seal, left_out)
             finished = {**about, **left_out.data(), **seal.data()}
             if is_whole and finished != was:

@@ -27,8 +27,6 @@ EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or
 def reason(row: Mapping[str, Any], suite: Suite | None, *, ablated: bool) -> dict[str, Any]:
     """Why a completion fails: the world that decided, and its error or failed check, explained."""
     why = row["failure"]
-    if why is None:
-        return {"passed": True, "failure": None}
     verdict = row["verdicts"][why["world"]]
     told = {key: verdict[key] for key in ("world", "error", "line")}
     if why["check"] is None:

@@ -6,14 +6,7 @@ from collections.abc import Sequence
 
 from roboeval.analysis.cluster import Cluster, clusters, groups
 from roboeval.analysis.summary import ALL, Causes, causes
-from roboeval.analysis.verdict_changes import (
-    VerdictChanges,
-    place,
-    said,
-    said_of_order,
-    said_of_prompts,
-    verdict_changes,
-)
+from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences, verdict_changes
 from roboeval.evaluation.runs.completions import how_many, name_of
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun
@@ -104,9 +97,8 @@ def _cells(one: Cluster) -> list[Cell]:
 def beside(runs: Sequence[JudgedRun]) -> Section:
     """What the verdicts of another suite change."""
     found = [verdict_changes(run.name, run.results, run.beside) for run in runs if run.beside is not None]
-    sentences = [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
     sheets = changes_sheet(found), changed_tasks_sheet(found), reversals_sheet(found)
-    return section("beside", Prose(sentences), *sheets)
+    return section("beside", Prose(sentences(found)), *sheets)
 
 
 def changes_sheet(found: Sequence[VerdictChanges]) -> Sheet:

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import polars as pl
 
 from codebotler.core.cachedproperty import cached_property
-from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import TaskScore, completions_of, task_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
+from roboeval.report.drawing import brief
 from roboeval.suites.load import Suite
 
 LONGEST_NAME = 100
@@ -31,8 +31,7 @@ class JudgedRun:
     @property
     def suite(self) -> Suite:
         """The suite that judged it."""
-        assert self.results.suite is not None, "a report reads runs with their suite"
-        return self.results.suite
+        return self.results.known_suite
 
     @property
     def folder(self) -> str:
@@ -94,16 +93,11 @@ def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
     """The same runs, each named by its model and, where that is not unique, by its folder, too."""
-    plain = [_readable(run.model or run.folder) for run in runs]
+    plain = [brief(run.model or run.folder, LONGEST_NAME) for run in runs]
     names = _apart(plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)])
     while len({*names}) < len(names):
         names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])
     return [replace(run, name=name) for run, name in zip(runs, names, strict=True)]
-
-
-def _readable(name: str) -> str:
-    name = visible(name)
-    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 30]}…{name[-29:]}"
 
 
 def _apart(names: Sequence[str], longer: Sequence[str]) -> list[str]:

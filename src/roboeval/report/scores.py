@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, combinations
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.compare import compared, told_of, unlike, verdict
+from roboeval.analysis.compare import compared, unlike, verdict
 from roboeval.analysis.metrics import by_formula, share_at_least, threshold_curve
 from roboeval.analysis.statistics import FEW, by_bootstrap
 from roboeval.report import figures, paper
@@ -93,7 +93,7 @@ def differences(runs: Sequence[JudgedRun]) -> Section:
             continue
         if len(said) < MOST_PAIRS:
             said.append(verdict(found, (first.name, second.name)))
-            if apart := unlike(*(told_of(run.results.about, run.results.head) for run in (first, second))):
+            if apart := unlike(first.results, second.results):
                 notes.append(f"{first.name} and {second.name}: {'; '.join(apart)}.")
         over = found.over_prompts, found.over_tasks
         ends = [end for estimate in over for end in (estimate.low, estimate.high)]

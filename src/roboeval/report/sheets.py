@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from codebotler.core.yaml_files import Loader
 from roboeval.analysis.cluster import Cluster
 from roboeval.evaluation.failures import label_of
-from roboeval.evaluation.runs.table import write_table
+from roboeval.evaluation.runs.table import storable, write_table
 
 Kind: TypeAlias = Literal["text", "class", "share", "difference", "count", "number"]
 Cell: TypeAlias = str | int | float | None
@@ -115,7 +115,7 @@ def write_csv(table: Sheet, folder: Path) -> None:
     types = {"text": pl.String, "class": pl.String, "count": pl.Int64}
     kinds = [types.get(column.kind, pl.Float64) for column in table.columns]
     schema = dict(zip(_heads(table.columns), kinds, strict=True))
-    rows = [list(map(_plain, row)) for row in table.rows]
+    rows = [[storable(cell) if isinstance(cell, str) else cell for cell in row] for row in table.rows]
     frame = pl.DataFrame(rows, schema=schema, orient="row", strict=False)
     write_table(frame, folder / f"{table.name}.csv", "csv")
 
@@ -124,7 +124,7 @@ def _heads(columns: Sequence[Column]) -> list[str]:
     """The heads of columns, made unique by numbers: a model may be named `task`."""
     heads: list[str] = []
     for column in columns:
-        plain = str(_plain(column.head))
+        plain = storable(column.head)
         if plain.startswith(
             ("=", "+", "-", "@", "\t", "\r", "\n")
         ):  # lest a spreadsheet takes it for a formula
@@ -132,10 +132,6 @@ def _heads(columns: Sequence[Column]) -> list[str]:
         others = (f"{plain} #{number}" for number in count(2))
         heads.append(plain if plain not in heads else next(head for head in others if head not in heads))
     return heads
-
-
-def _plain(cell: Cell) -> Cell:
-    return cell.encode(errors="backslashreplace").decode() if isinstance(cell, str) else cell
 
 
 def told(cell: Cell, kind: Kind) -> str:

@@ -2,21 +2,21 @@
 
 import json
 import re
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from codebotler.core.errors import UserError
 from command_line import refused, roboeval
-from roboeval.analysis.compare import (
-    compared,
-    comparison_data,
-    expect_same_suite,
-    to_tell,
-    unlike,
-    verdict,
-)
+from made_results import results_of
+from roboeval.analysis.compare import compared, comparison_data, to_tell, unlike, verdict
+from roboeval.cli.options import Opened, expect_same_suite
 from roboeval.cli.views.comparison import comparison_view
+from roboeval.evaluation.runs.folder import Run
+from roboeval.evaluation.runs.results import Results
 from small_run import HOSTILE, SHOWN, SUITE, printed
 
 FIRST = {("A", 0): 0.5, ("A", 1): 0.5, ("B", 0): 0.2, ("C", 0): 1.0}
@@ -76,14 +76,15 @@ def test_names_are_text() -> None:
     assert json.loads(json.dumps(comparison_data(found, (HOSTILE, "b"))))["prompts"] == 3
 
 
+def a_run(about: Mapping[str, Any], head: Mapping[str, Any]) -> Results:
+    return replace(results_of([], SUITE, head=head), about=about)
+
+
 def test_what_is_unlike() -> None:
-    one = {
-        "python": "3.11",
-        "codebotler": "1",
-        "template": "a",
-        "settings": {"temperature": 0.2, "seed": None},
-    }
-    two = {"python": "3.12", "codebotler": "1", "template": "b", "settings": {"temperature": 0.8, "seed": 1}}
+    settings = {"temperature": 0.2, "seed": None}
+    judged = {"python": "3.11", "codebotler": "1"}
+    one = a_run({"template": "a", "settings": settings}, judged)
+    two = a_run({"template": "b", "settings": {"temperature": 0.8, "seed": 1}}, {**judged, "python": "3.12"})
     assert unlike(one, one) == []
     for sentence, (name, values) in zip(
         unlike(one, two),
@@ -97,17 +98,20 @@ def test_what_is_unlike() -> None:
     ):
         assert name in sentence
         assert sentence.endswith(values)
-    (unknown,) = unlike(one, {"python": "3.11"})
+    (unknown,) = unlike(one, a_run({"python": "3.9"}, {"python": "3.11"}))
     assert "settings" in unknown
     for wrong in ([1, 2], "abc", 3):
-        assert unlike(one, {**one, "settings": wrong}) == [unknown]
+        assert unlike(one, a_run({"template": "a", "settings": wrong}, judged)) == [unknown]
 
 
 def test_other_suites_are_refused() -> None:
-    again = {"a": "roboeval evaluate a", "b": "roboeval evaluate b --suite mine"}
-    expect_same_suite({"a": {"digest": "1"}, "b": {"digest": "1"}}, SUITE, again)
+    def opened(name: str, digest: str) -> Opened:
+        results = replace(a_run({}, {"digest": digest}), run=Run(Path(name)))
+        return Opened(results, f"roboeval evaluate {name} --suite mine")
+
+    expect_same_suite([opened("a", "1"), opened("b", "1")])
     with pytest.raises(UserError, match=r"\bb and a\b.* \(1 and 0\)") as e:
-        expect_same_suite({"a": {"digest": SUITE.digest}, "b": {"digest": "1"}}, SUITE, again)
+        expect_same_suite([opened("a", SUITE.digest), opened("b", "1")])
     assert "`roboeval evaluate b --suite mine --redo`" in str(e.value)
 
 

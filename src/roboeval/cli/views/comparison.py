@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich import box
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
+from codebotler.core.words import counted
 from roboeval.analysis.cluster import Cluster
-from roboeval.analysis.compare import Comparison, prompts, to_tell, verdict
+from roboeval.analysis.compare import Comparison, to_tell, verdict
 from roboeval.analysis.statistics import FEW
-from roboeval.analysis.verdict_changes import VerdictChanges, place, said, said_of_order, said_of_prompts
+from roboeval.analysis.verdict_changes import VerdictChanges, place, sentences
 from roboeval.cli.views.groups import cluster_view
+from roboeval.cli.views.results import ruled
 
 SMALL = 0.0001
 
@@ -26,7 +27,7 @@ def comparison_view(comparison: Comparison, names: tuple[str, str]) -> Renderabl
     rows = grid("left", "right", "left")
     rows.add_row(f"pass@1 of {a}", f"{comparison.first:.3f}")
     rows.add_row(f"pass@1 of {b}", f"{comparison.second:.3f}")
-    over = f"over {prompts(comparison.prompts)} that both have"
+    over = f"over {counted(comparison.prompts, 'prompt')} that both have"
     rows.add_row("difference", f"{comparison.over_tasks.mean:+.3f}", over)
     few = "too narrow for so few tasks" if len(comparison.tasks) < FEW else ""
     for name, estimate, told in (
@@ -35,10 +36,7 @@ def comparison_view(comparison: Comparison, names: tuple[str, str]) -> Renderabl
         ("the same by bootstrap", comparison.bootstrap, few),
     ):
         rows.add_row(name, f"{estimate.low:+.3f} to {estimate.high:+.3f}", told)
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("task", overflow="fold")
-    for head in (a, b, "difference", "adds", "prompts"):
-        table.add_column(Text(head), justify="right")
+    table = ruled("task", a, b, "difference", "adds", "prompts")
     for task in comparison.tasks:
         cells = (f"{task.first:.3f}", f"{task.second:.3f}", f"{task.difference:+.3f}", f"{task.share:+.3f}")
         table.add_row(Text(visible(task.task)), *cells, str(task.prompts))
@@ -52,8 +50,7 @@ def _p(value: float) -> str:
 
 def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableType:
     """What a second suite changes, with at most `most` groups of programs for each run and direction."""
-    sentences = [*map(said, found), *said_of_order(found), *said_of_prompts(found)]
-    parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences]
+    parts: list[RenderableType] = [Text(visible(sentence), "bold") for sentence in sentences(found)]
     parts += [Text(), _scores(found)]
     for one in found:
         parts += [Text(), _tasks(one)]
@@ -63,16 +60,9 @@ def changes_view(found: Sequence[VerdictChanges], *, most: int) -> RenderableTyp
     return Group(*parts)
 
 
-def _table(*heads: str) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for number, head in enumerate(heads):
-        table.add_column(Text(head), justify="right" if number else "left", overflow="fold")
-    return table
-
-
 def _scores(found: Sequence[VerdictChanges]) -> Table:
     first, second = found[0].suites
-    table = _table("pass@1", first, second, "difference", "95% over prompts", "place")
+    table = ruled("pass@1", first, second, "difference", "95% over prompts", "place")
     scores = [{one.name: one.pass_at_1[side] for one in found} for side in (0, 1)]
     for one in found:
         before, after = one.pass_at_1
@@ -86,7 +76,7 @@ def _scores(found: Sequence[VerdictChanges]) -> Table:
 
 def _tasks(one: VerdictChanges) -> Table:
     first, second = one.suites
-    table = _table(visible(one.name), "both", f"{first} only", f"{second} only", "neither")
+    table = ruled(visible(one.name), "both", f"{first} only", f"{second} only", "neither")
     for task in one.tasks:
         counts = task.both, task.first_only, task.second_only, task.neither
         table.add_row(Text(visible(task.task)), *(f"{count:,}" for count in counts))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 
-from rich import box
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
@@ -15,7 +14,7 @@ from codebotler.core.terminal import shortened, visible
 from roboeval.analysis.cluster import Cluster
 from roboeval.analysis.resample import THRESHOLDS, CheckedPrompt, resampled
 from roboeval.analysis.search import Found
-from roboeval.cli.views.results import kind_view
+from roboeval.cli.views.results import kind_view, ruled
 from roboeval.evaluation.explanation import GONE
 from roboeval.evaluation.runs.completions import how_many, name_of
 
@@ -37,10 +36,7 @@ def found_view(
 
 
 def _by_task(found: Sequence[Found]) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    table.add_column("task", overflow="fold")
-    table.add_column("found", justify="right")
-    table.add_column("passed", justify="right")
+    table = ruled("task", "found", "passed")
     table.add_column("such as")
     by_task: defaultdict[str, list[Found]] = defaultdict(list)
     for one in found:
@@ -75,10 +71,8 @@ def cluster_view(cluster: Cluster) -> RenderableType:
 
 def resample_view(prompts: Sequence[CheckedPrompt], limits: Sequence[int], *, title: str) -> RenderableType:
     """The results of asking again, by limit of retries."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    heads = ("retries", "pass@1", *(f"pass@1\n≥ {t:g}" for t in THRESHOLDS), "accepted", "run at all")
-    for name in heads:
-        table.add_column(name, justify="right", no_wrap=True)
+    reaching = (f"pass@1\n≥ {t:g}" for t in THRESHOLDS)
+    table = ruled("retries", "pass@1", *reaching, "accepted", "run at all", first="right")
     for limit in (resampled(prompts, retries) for retries in limits):
         shares = (*limit.prompts.values(), limit.accepted, limit.ran)
         table.add_row(f"{limit.retries}", f"{limit.passed.mean:.3f}", *(f"{share:.1%}" for share in shares))

@@ -8,7 +8,7 @@ from typing import Any
 
 from rich import box
 from rich.columns import Columns
-from rich.console import Console, ConsoleOptions, Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -21,6 +21,14 @@ from roboeval.evaluation.failures import label_of, plural_of
 from roboeval.evaluation.runs.completions import how_many
 
 ALL_GONE = "the judged programs are no longer in this run"
+
+
+def ruled(*heads: str, first: JustifyMethod = "left") -> Table:
+    """A table with a line below its heads; all columns but perhaps the first are numbers."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for number, head in enumerate(heads):
+        table.add_column(Text(head), justify="right" if number else first, overflow="fold")
+    return table
 
 
 def summary_view(summary: Summary, *, title: str) -> RenderableType:
@@ -73,10 +81,7 @@ class _TaskTable:
             yield self._table(*passes[:count])
 
     def _table(self, *columns: str) -> Table:
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-        table.add_column("task", overflow="fold")
-        for name in columns:
-            table.add_column(name, justify="right", no_wrap=True)
+        table = ruled("task", *columns)
         first = self.summary.k[0]
         for task in self.summary.tasks:
             shares = {f"pass@{k}": task.pass_at(k).mean for k in self.summary.k}

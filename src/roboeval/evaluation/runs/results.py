@@ -58,27 +58,12 @@ def load_results(
     Raises:
         UserError: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
     """
-    known, folder = load_suite(suite), Run(Path(run))
-    key = evaluation_key(known, ablated=ablation)
-    expect_judged(folder, key)
-    known = as_judged(folder, known, ablated=ablation)
-    results = read_results(folder, key, known, keep_failed=False)
+    results = open_results(Path(run), load_suite(suite), ablated=ablation, keep_failed=False)
     if price is None:
         return results.table
     return results.table.with_columns(
         cost=(pl.col("input_tokens") * price[0] + pl.col("output_tokens") * price[1]) / 1e6
     )
-
-
-def expect_judged(run: Run, key: str) -> None:
-    """Raise UserError if a folder is no run, or lacks an evaluation."""
-    if not run.completions.is_file():
-        raise UserError("is not a run: it has no completions.jsonl", file=run.path)
-    if not run.rows(key).is_file():
-        there = ", ".join(run.judged_by()) or "nothing"
-        raise UserError(
-            f'has no evaluation "{key}" (there is {there}); `roboeval evaluate` makes it', file=run.path
-        )
 
 
 @dataclass(frozen=True)
@@ -124,6 +109,12 @@ class Results:
     failed: Mapping[Key, RowData] = field(repr=False)  # without traces of worlds that did not decide
     places: Mapping[Key, tuple[int, int]] = field(repr=False)  # first byte and size of each row in the file
     faults: tuple[UserError, ...] = ()
+
+    @property
+    def known_suite(self) -> Suite:
+        """Its suite, where it was read with one."""
+        assert self.suite is not None, "only pages show runs whose suite is not at hand"
+        return self.suite
 
     @property
     def tasks(self) -> frozenset[str] | None:
@@ -181,6 +172,29 @@ def selected_tasks(head: Mapping[str, Any], path: Path) -> frozenset[str] | None
     if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) for task in tasks)):
         raise UserError('"tasks" is not a list of names; --redo starts over', file=path)
     return None if tasks is None else frozenset(tasks)
+
+
+def open_results(
+    path: Path,
+    suite: Suite,
+    *,
+    ablated: bool,
+    again: str = "roboeval evaluate",  # the command that judges the run
+    **reading: Any,  # noqa: ANN401 - see `read_results`
+) -> Results:
+    """Read what a suite says of a run, in the worlds of then; UserError if it has not judged the run."""
+    run = Run(path)
+    suite = as_judged(run, suite, ablated=ablated)
+    key = evaluation_key(suite, ablated=ablated)
+    if not run.completions.is_file():
+        raise UserError("is not a run: it has no completions.jsonl", file=path)
+    if not run.rows(key).is_file():
+        others = run.judged_by()
+        if not others or suite.name in others:
+            raise UserError(f"has not been judged; run `{again}`", file=path)
+        judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
+        raise UserError(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=path)
+    return read_results(run, key, suite, **reading)
 
 
 def read_results(
