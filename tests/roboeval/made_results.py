@@ -11,7 +11,7 @@ import polars as pl
 from codebotler.core.files import to_line
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.folder import Run
-from roboeval.evaluation.runs.results import FailedRows, Results
+from roboeval.evaluation.runs.results import Results, without_other_traces
 from roboeval.evaluation.runs.rows import JudgedRow, RowData, judged_row, key_of
 from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.suites.load import Suite
@@ -73,11 +73,11 @@ def results_of(
         written[task, prompt, index] = Completion(task=task, prompt=prompt, index=index, program=program)
     judged = judged_rows(rows, {key: one.program for key, one in written.items()})
     builder = TableBuilder(written)
-    failed = FailedRows()
+    failed = {}
     for row in judged:
         builder.add(row)
-        if not row.passed:
-            failed.add(row)
+        if row.failure is not None:
+            failed[row.key] = without_other_traces(row, row.failure.world)
     return Results(
         run=Run(Path("nowhere")),
         key=f"paper{'-ablation' * ablated}",

@@ -46,7 +46,7 @@ def coming_back(results: Results) -> pl.DataFrame:
     reports = pl.col("task").is_in([name for name, task in suite.tasks.items() if REPORTS in task.abilities])
     table = results.table.with_columns(reports=reports)
     scores = prompt_scores(table).group_by(reports=reports).agg("pass@1")
-    away = [key for key, row in results.failed.items() if never_returned(row, suite)]
+    away = [key for key in results.failed if never_returned(results.failed_row(key), suite)]
     keys = ["task", "prompt", "index"]
     gone = pl.DataFrame(away, schema={name: table.schema[name] for name in keys}, orient="row")
     found = (

@@ -57,7 +57,7 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
 def _reason(results: Results, key: Key) -> dict[str, Any]:
     if key not in results.failed:
         return {"passed": True, "failure": None}
-    return reason(results.failed[key], results.suite, ablated=results.is_ablated)
+    return reason(results.failed_row(key), results.suite, ablated=results.is_ablated)
 
 
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:

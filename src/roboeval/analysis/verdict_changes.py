@@ -65,8 +65,8 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
         suites=(first.known_suite.name, second.known_suite.name),
         comparison=compared(_pass_at_1(first, second), _pass_at_1(second, first)),
         tasks=tuple(_by_task(first, second, both)),
-        first_only=tuple(clusters(groups((second.failed[key] for key in lost), programs), second)),
-        second_only=tuple(clusters(groups((first.failed[key] for key in won), programs), first)),
+        first_only=tuple(clusters(groups(map(second.failed_row, lost), programs), second)),
+        second_only=tuple(clusters(groups(map(first.failed_row, won), programs), first)),
         programs=len({(key[0], programs.get(key)) for key in lost + won}),
         left_out=len(first.places.keys() | second.places.keys()) - len(both),
     )

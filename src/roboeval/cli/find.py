@@ -65,7 +65,7 @@ def find(
     results = open_current(run, suite, ablated=ablation, see=searching.see).results
     every = list(watched(searching.found(), "looking", len(results.places)))
     found = [one for one in every if one.worlds]
-    failed = [results.failed[one.key] for one in found if not one.passed]
+    failed = [results.failed_row(one.key) for one in found if not one.passed]
     total = sum(question.task in {None, one.key[0]} for one in every)
     together = groups(failed, results.programs)
     shown = together if json else together[:most]

@@ -154,12 +154,9 @@ class _Generation:
     on_progress: Callable[[Progress], None]
     error: ModelError | None = None
     _failures_in_a_row: int = 0
-    _written: int = 0
-    _synced: int = 0
 
     def __post_init__(self) -> None:
         self._paced = RateLimited(_LoggedModel(self.model, self.log), **asdict(self.pace))
-        self._syncing = asyncio.Lock()
 
     async def generate(self, keys: list[Key]) -> None:
         waiting = iter(keys)
@@ -210,19 +207,9 @@ class _Generation:
         self.file.append(line)
         self.log.kept(key)
         try:
-            await self._sync()
+            await asyncio.to_thread(self.file.sync)
         finally:  # after an interrupt, too: the file is synced when it is closed
             add_usage(self.progress.usage, usage)
             self.progress.done += 1
         self._failures_in_a_row = 0
         self.on_progress(self.progress)
-
-    async def _sync(self) -> None:
-        """Sync the file, once for all lines that wait for it at the same time."""
-        self._written += 1
-        line = self._written
-        async with self._syncing:
-            if self._synced < line:
-                written = self._written
-                await asyncio.to_thread(self.file.sync)
-                self._synced = written

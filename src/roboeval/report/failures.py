@@ -68,7 +68,7 @@ def alike(runs: Sequence[JudgedRun]) -> Section:
     shown: list[tuple[str, Cluster]] = []
     notes: list[str] = []
     for run in runs:
-        together = groups(run.results.failed.values(), run.results.programs)
+        together = groups(map(run.results.failed_row, run.results.failed), run.results.programs)
         shown += [(run.name, one) for one in clusters(together[:most], run.results)]
         if left := together[most:]:
             those = f"{len(left):,} smaller groups with {how_many(sum(map(len, left)))}"

@@ -70,7 +70,7 @@ def told(program: str = GOES.format("lab")) -> Any:  # noqa: ANN401 - one group
     programs = {("Visit", 0, 0): "pass", ("Visit", 0, 1): program, ("Visit", 0, 2): program}
     programs["Visit", 4, 0] = RIGHT
     results = results_of([*rows, {**row(4, 0), "passed": True}], SUITE, programs)
-    (one,) = clusters([[*results.failed.values()]], results)
+    (one,) = clusters([[*map(results.failed_row, results.failed)]], results)
     return one
 
 
@@ -99,7 +99,7 @@ def test_a_group_for_people_shows_what_models_write_as_it_is() -> None:
 def test_programs_that_are_gone() -> None:
     rows = [failed(0, 0), failed(0, 1)]
     results = results_of(rows, SUITE)
-    (group,) = groups(results.failed.values(), results.programs)
+    (group,) = groups(map(results.failed_row, results.failed), results.programs)
     (one,) = clusters([group], results)
     assert one.program is None
     assert one.fix is None
@@ -107,6 +107,5 @@ def test_programs_that_are_gone() -> None:
 
 
 def test_only_the_world_that_decides_keeps_its_trace() -> None:
-    (kept,) = results_of([failed(0, 0)]).failed.values()
-    assert kept["verdicts"][0] == {"world": "w"}
-    assert kept["verdicts"][1]["trace"] == [["goto", "hall"]]
+    kept = results_of([failed(0, 0)]).failed_row(("Visit", 0, 0))
+    assert [verdict["trace"] for verdict in kept["verdicts"]] == [[], [["goto", "hall"]]]

@@ -152,7 +152,7 @@ def test_a_completion_counts_only_once_it_is_on_the_disk(
         lines = file.path.read_bytes().count(b"\n")
         sync(file)
         if file.path == run.completions:
-            on_disk[0] = lines
+            on_disk[0] = max(on_disk[0], lines)
 
     def check(progress: Progress) -> None:
         assert on_disk[0] >= progress.done

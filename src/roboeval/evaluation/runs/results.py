@@ -106,7 +106,7 @@ class Results:
     about: Mapping[str, Any]  # run.json: how the completions were asked for
     completions: Mapping[Key, Completion]  # those in the run now, in order
     table: pl.DataFrame  # as `load_results` gives it
-    failed: Mapping[Key, RowData] = field(repr=False)  # without traces of worlds that did not decide
+    failed: Mapping[Key, bytes] = field(repr=False)  # rows as JSON, see `failed_row`
     places: Mapping[Key, tuple[int, int]] = field(repr=False)  # first byte and size of each row in the file
     faults: tuple[UserError, ...] = ()
 
@@ -150,6 +150,11 @@ class Results:
         """The programs that were judged, but those that have changed or are gone since."""
         stale = set(self.stale)
         return {key: c.program for key, c in self.completions.items() if key not in stale}
+
+    def failed_row(self, key: Key) -> RowData:
+        """The row of a completion that failed, without traces of worlds that did not decide."""
+        row: RowData = json.loads(self.failed[key])
+        return row
 
     def row(self, key: Key) -> Row:
         """Read a row again, with all its traces; raises UserError if the file was written anew."""
@@ -218,13 +223,13 @@ def read_results(
     total = sum(tasks is None or task in tasks for task, _, _ in completions)
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
     places: dict[Key, tuple[int, int]] = {}
-    failed = FailedRows()
+    failed: dict[Key, bytes] = {}
     lines = iter(()) if key is None else read_lines_of(run.rows(key), head, see=see, faults=faults)
     for line in watch(lines, total):
         builder.add(line.row)
         places[line.row.key] = line.at, line.size
-        if keep_failed and not line.row.passed:
-            failed.add(line.row)
+        if keep_failed and line.row.failure is not None:
+            failed[line.row.key] = without_other_traces(line.row, line.row.failure.world)
     return Results(
         run=run,
         key=key,
@@ -247,34 +252,13 @@ def _head(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:
         return {}
 
 
-class FailedRows(Mapping[Key, RowData]):
-    """Rows of completions that failed, with the deciding verdict only, decoded on demand."""
-
-    def __init__(self) -> None:
-        self._kept: dict[Key, tuple[JudgedRow, bytes]] = {}
-
-    def add(self, row: JudgedRow) -> None:
-        """Keep a row that failed."""
-        assert row.failure is not None, "it failed"
-        trace = b"[%b]" % b",".join(map(bytes, row.verdicts[row.failure.world].trace))
-        bare = tuple(msgspec.structs.replace(verdict, trace=()) for verdict in row.verdicts)
-        self._kept[row.key] = msgspec.structs.replace(row, verdicts=bare), trace
-
-    def __getitem__(self, key: Key) -> RowData:
-        row, trace = self._kept[key]
-        plain: dict[str, Any] = msgspec.to_builtins(row)
-        world = plain["failure"]["world"]
-        verdicts = [{"world": verdict["world"]} for verdict in plain["verdicts"]]
-        deciding = plain["verdicts"][world]
-        checks = list(deciding["failed_checks"])
-        verdicts[world] = {**deciding, "failed_checks": checks, "trace": json.loads(trace)}
-        return {**plain, "verdicts": verdicts}
-
-    def __iter__(self) -> Iterator[Key]:
-        return iter(self._kept)
-
-    def __len__(self) -> int:
-        return len(self._kept)
+def without_other_traces(row: JudgedRow, world: int) -> bytes:
+    """A row as JSON, with the trace of one world only: a run may fail often, with long traces."""
+    verdicts = [
+        verdict if number == world else msgspec.structs.replace(verdict, trace=())
+        for number, verdict in enumerate(row.verdicts)
+    ]
+    return msgspec.json.encode(msgspec.structs.replace(row, verdicts=tuple(verdicts)))
 
 
 def _categories(suite: Suite | None) -> Mapping[tuple[str, str], str]:
