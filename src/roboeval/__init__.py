@@ -31,14 +31,11 @@ else:  # each name is imported when it is first used
     __getattr__, __dir__ = facade(
         __name__,
         {
-            "Completion": "evaluation.runs.completions",
-            "Row": "evaluation.runs.rows",
-            "Suite": "suites.load",
-            "evaluate": "evaluation.judge",
-            "load_results": "evaluation.runs.results",
-            "load_suite": "suites.load",
-            "read_completions": "evaluation.runs.completions",
-            "recorded_completions": "evaluation.runs.completions",
-            "reward": "evaluation.rewards",
+            "evaluation.judge": ["evaluate"],
+            "evaluation.rewards": ["reward"],
+            "evaluation.runs.completions": ["Completion", "read_completions", "recorded_completions"],
+            "evaluation.runs.results": ["load_results"],
+            "evaluation.runs.rows": ["Row"],
+            "suites.load": ["Suite", "load_suite"],
         },
     )

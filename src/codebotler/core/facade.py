@@ -4,11 +4,14 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # what type checkers take for true; importing `typing` would cost what this saves
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
 
-def facade(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """The `__getattr__` and `__dir__` of a package, from its name and the module of each public name."""
+def facade(
+    package: str, public: Mapping[str, Sequence[str]]
+) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """The `__getattr__` and `__dir__` of a package, from its name and the public names of its modules."""
+    homes = {name: module for module, names in public.items() for name in names}
 
     def get(name: str) -> object:
         if name not in homes:
