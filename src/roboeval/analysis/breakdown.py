@@ -9,6 +9,7 @@ import polars as pl
 from codebotler.simulator.robot import resolve_room
 from roboeval.analysis.metrics import Estimate, by_formula, completions_of, prompt_scores, task_scores
 from roboeval.evaluation.failures import CLASSES
+from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import RowData
 from roboeval.suites.load import Suite
@@ -47,11 +48,10 @@ def coming_back(results: Results) -> pl.DataFrame:
     table = results.table.with_columns(reports=reports)
     scores = prompt_scores(table).group_by(reports=reports).agg("pass@1")
     away = [key for key in results.failed if never_returned(results.failed_row(key), suite)]
-    keys = ["task", "prompt", "index"]
-    gone = pl.DataFrame(away, schema={name: table.schema[name] for name in keys}, orient="row")
+    gone = pl.DataFrame(away, schema={name: table.schema[name] for name in KEY}, orient="row")
     found = (
         completions_of(table)
-        .join(gone.with_columns(away=True), on=keys, how="left")
+        .join(gone.with_columns(away=True), on=KEY, how="left")
         .group_by("reports")
         .agg(
             completions=pl.len(),

@@ -11,7 +11,7 @@ from functools import cache
 from typing import Any, TypeAlias
 
 from codebotler.core.program import TASK, names_bound, parsed
-from roboeval.evaluation.explanation import reason
+from roboeval.evaluation.explanation import error_sentence, reason
 from roboeval.evaluation.runs.completions import Key, name_of
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import RowData, key_of
@@ -51,9 +51,7 @@ class Cluster:
         """Why the representative fails, in a sentence."""
         if self.told["explanation"] is not None:
             return str(self.told["explanation"])
-        error = self.told["error"]
-        where = "" if self.told["line"] is None else f"line {self.told['line']}: "
-        return f"{where}{error['message']}" if error else ""
+        return error_sentence(self.told) if self.told["error"] else ""
 
     @property
     def prompts(self) -> list[int]:

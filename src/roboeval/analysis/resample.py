@@ -15,6 +15,7 @@ from typing import Any
 import polars as pl
 
 from roboeval.analysis.metrics import Estimate, by_formula, share_at_least
+from roboeval.evaluation.runs.completions import KEY
 
 LIMITS = (0, 2, 4, 8, 100)
 THRESHOLDS = (0.25, 0.5, 0.75, 1.0)
@@ -64,7 +65,7 @@ def trials_by_prompt(table: pl.DataFrame) -> tuple[CheckedPrompt, ...]:
     """The completions of each prompt, which were all checked, in the order of tasks and prompts."""
     # One that waits where it may wait for ever has not erred: there the requirements were looked at.
     judged = pl.col("satisfied") | pl.col("failed_checks").is_not_null()
-    completions = table.group_by("task", "prompt", "index", maintain_order=True).agg(
+    completions = table.group_by(KEY, maintain_order=True).agg(
         pl.col("accepted").first(),
         ((pl.col("status") == "finished") | ((pl.col("status") == "timeout") & judged)).all().alias("ran"),
         pl.col("passed").first(),

@@ -13,7 +13,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
 from roboeval.analysis.metrics import completions_of, pass_at_k
 from roboeval.evaluation.explanation import reason
-from roboeval.evaluation.runs.completions import Completion, Key
+from roboeval.evaluation.runs.completions import KEY, Completion, Key
 from roboeval.evaluation.runs.results import Results
 from roboeval.suites.load import Suite
 
@@ -61,7 +61,7 @@ def _reason(results: Results, key: Key) -> dict[str, Any]:
 
 
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
-    keys = [*of_prompt.filter(~pl.col("stale")).select("task", "prompt", "index").iter_rows()]
+    keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
     return {
         "prompt": of_prompt["prompt"][0],

@@ -57,7 +57,7 @@ def evaluate(
 ) -> None:
     """Judge whether each completion does what was asked."""
     from roboeval.analysis.summary import judged_count, summary
-    from roboeval.evaluation.runs.completions import how_many, name_of
+    from roboeval.evaluation.runs.completions import KEY, how_many, name_of
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
     from roboeval.evaluation.runs.results import Scope
     from roboeval.evaluation.runs.table import TableBuilder
@@ -90,7 +90,7 @@ def evaluate(
         note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
         raise SystemExit(STOPPED) from None
     if run is not None:
-        failed = table.filter(~table["passed"]).select("task", "prompt", "index").head(1)
+        failed = table.filter(~table["passed"]).select(KEY).head(1)
         again = command("show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablation)
         does = "says why that program fails" if failed.height else "prints these tables again"
         note(f"verdicts are in {run.path}; `{again}` {does}")

@@ -7,11 +7,12 @@ from functools import cache, partial
 from typing import Any
 
 from codebotler.checking.storyboard import steps_of
+from codebotler.core.terminal import shortened
 from codebotler.core.trace import Event, Trace, trace_from
 from codebotler.core.words import counted
 from codebotler.rtl import explain
 from codebotler.simulator.robot import located, resolve_room
-from roboeval.evaluation.runs.completions import Completion
+from roboeval.evaluation.runs.completions import KEY, Completion
 from roboeval.suites.load import Scenario, Suite
 
 NOT_RECORDED = "instruction not recorded"
@@ -20,6 +21,7 @@ CHANGED = "the suite has changed since this was judged"
 CUT = "the trace was too long to keep, so this cannot be explained"
 TOO_LONG = "the traces of this program are too long to explain this as well"
 
+MOST_LINES = 1_000  # of a program that is shown
 MOST_COMPARED = 1_000_000  # of the traces of a completion, to explain it, by these weights:
 EVENT, SPOKEN, OTHER = 20, 10, 1  # an event, a character that is said, asked or offered, and any other one
 
@@ -42,7 +44,7 @@ def completion_data(
     """A completion: its instruction, its program, and each world with every step and failed check."""
     patience = Patience()
     return {
-        **{key: row[key] for key in ("task", "prompt", "index", "passed", "failure")},
+        **{key: row[key] for key in (*KEY, "passed", "failure")},
         **{key: getattr(completion, key, None) for key in ("model", "instruction", "program")},
         "worlds": [
             _world_data(verdict, _scenario(suite, row, number, ablated=ablated), patience)
@@ -111,6 +113,19 @@ def _explained(
     if why is None:
         return {"explanation": f"{CHANGED}; by now this is satisfied", "step": None}
     return {"explanation": why.sentence, "step": None if why.event is None else why.event + 1}
+
+
+def error_sentence(verdict: Mapping[str, Any]) -> str:
+    """The line and the message of the error by which a run ended; either may be unknown."""
+    where = "" if verdict["line"] is None else f"line {verdict['line']}"
+    return ": ".join(filter(None, (where, verdict["error"]["message"])))
+
+
+def shown_lines(program: str) -> tuple[str, int]:
+    """A program for people, in short lines without tabs, and how many lines are left out at its end."""
+    lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
+    shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
+    return shown, max(0, len(lines) - MOST_LINES)
 
 
 def cut_told(cut: Mapping[str, Any]) -> str:

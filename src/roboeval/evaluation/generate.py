@@ -30,7 +30,7 @@ from roboeval.evaluation.requests import (
     run_metadata,
     timestamp,
 )
-from roboeval.evaluation.runs.completions import Key, how_many
+from roboeval.evaluation.runs.completions import KEY, Key, how_many
 from roboeval.evaluation.runs.folder import Run
 
 FAILURES_IN_A_ROW = 3  # after so many, or one for each request under way, a model is given up
@@ -192,7 +192,7 @@ class _Generation:
     async def _keep(self, key: Key, reply: Reply) -> None:
         usage = asdict(reply.usage)
         row = {
-            **dict(zip(("task", "prompt", "index"), key, strict=True)),
+            **dict(zip(KEY, key, strict=True)),
             "instruction": self.plan.instruction(key),
             "model": self.model.name,
             "program": reply.program,

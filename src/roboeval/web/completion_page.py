@@ -17,7 +17,7 @@ from codebotler.web.floorplan import floorplan
 from codebotler.web.frame import PlainText
 from codebotler.web.storyboard import draw_scene, scenes
 from roboeval.analysis.tasks import by_hand
-from roboeval.evaluation.explanation import NOT_RECORDED, cut_told
+from roboeval.evaluation.explanation import NOT_RECORDED, cut_told, error_sentence
 from roboeval.evaluation.failures import label_of
 from roboeval.evaluation.runs.completions import Key, name_of
 from roboeval.suites.task import describe_person
@@ -115,7 +115,9 @@ def _draw_world(data: Mapping[str, Any], world: World | None) -> None:
     steps, cut = data["steps"], data.get("cut")
     wrong = {check["step"] for check in data["failed_checks"]} - {None}
     if data["error"] is not None:
-        PlainText("p", _error_text(data), "quiet" if data["satisfied"] else "trouble")
+        allowed = " A program may wait for ever in this world, so this is allowed." * data["satisfied"]
+        told = f"{shortened(data['error']['kind'])}: {shortened(error_sentence(data))}{allowed}"
+        PlainText("p", told, "quiet" if data["satisfied"] else "trouble")
     with ui.element("ul").classes("failed-checks"):
         for check in data["failed_checks"]:
             _draw_check(check)
@@ -132,12 +134,6 @@ def _draw_world(data: Mapping[str, Any], world: World | None) -> None:
         _draw_folded(f"{kept}, {len(steps):,} in all", lambda: _draw_steps(steps))
     if world is not None:
         _draw_folded("The world", lambda: _draw_rooms(world))
-
-
-def _error_text(data: Mapping[str, Any]) -> str:
-    error, line = data["error"], "" if data["line"] is None else f"line {data['line']}: "
-    allowed = " A program may wait for ever in this world, so this is allowed." if data["satisfied"] else ""
-    return f"{shortened(error['kind'])}: {line}{shortened(error['message'])}{allowed}"
 
 
 def _draw_check(check: Mapping[str, Any]) -> None:

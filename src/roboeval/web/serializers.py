@@ -14,10 +14,10 @@ from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import GONE, completion_data
-from roboeval.evaluation.runs.completions import Key, how_many, name_of
+from roboeval.evaluation.runs.completions import KEY, Key, how_many, name_of
 from roboeval.suites.load import Suite
 from roboeval.web.run_store import RunStore
-from roboeval.web.snapshot import KEY, Filter, Snapshot
+from roboeval.web.snapshot import Filter, Snapshot
 
 MOST_FAULTS, MOST_NAME, MOST_REASON = 5, 120, 300
 

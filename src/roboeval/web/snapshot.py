@@ -13,12 +13,11 @@ from fastapi import Query
 from codebotler.core.cachedproperty import cached_property
 from roboeval.analysis.metrics import Estimate, TaskScore, overall, task_scores
 from roboeval.analysis.summary import Failures, failures
-from roboeval.evaluation.runs.completions import Key
+from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.table import storable
 from roboeval.suites.load import Suite
 
-KEY = ("task", "prompt", "index")
 # How a program did in a world: + satisfied, - not, ! ended by an error.
 SIGN = (
     pl.when("satisfied")

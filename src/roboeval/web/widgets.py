@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from keyword import kwlist
@@ -15,12 +14,13 @@ from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.web.frame import Frame, PlainText
+from roboeval.evaluation.explanation import shown_lines
 from roboeval.web.heat_map import NONE
 from roboeval.web.serializers import State
 
 STYLE = '<link rel="stylesheet" href="/static/benchmark/benchmark.css">'
 EVERY = 1.0  # seconds after which a page looks whether something has changed
-MOST_TITLE, MOST_LINES = 80, 1_000
+MOST_TITLE = 80
 
 
 @contextmanager
@@ -73,9 +73,7 @@ class ProgramView(Element, component="static/code.js"):
 
     def __init__(self, program: str, marked: Iterable[int]) -> None:
         super().__init__()
-        lines = re.split("\r\n|\r|\n", program.rstrip("\n"))
-        shown = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
-        self.left_out = max(0, len(lines) - MOST_LINES)
+        shown, self.left_out = shown_lines(program)
         self._props.update(program=shown, marked=sorted(set(marked)), keywords=kwlist, skills=list(SKILLS))
 
 

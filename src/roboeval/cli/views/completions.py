@@ -14,10 +14,10 @@ from codebotler.checking.storyboard import grid, storyboard
 from codebotler.core.terminal import shortened, visible
 from roboeval.analysis.tasks import by_hand
 from roboeval.cli.views.results import kind_view, prompt_lines
-from roboeval.evaluation.explanation import GONE, NOT_RECORDED, cut_told
+from roboeval.evaluation.explanation import GONE, NOT_RECORDED, cut_told, error_sentence, shown_lines
 from roboeval.evaluation.runs.completions import name_of
 
-MOST_LINES, EXPLANATION = 1_000, 2_000
+EXPLANATION = 2_000
 
 
 def prompt_view(data: Mapping[str, Any]) -> RenderableType:
@@ -39,16 +39,10 @@ def _program_line(program: Mapping[str, Any]) -> Text:
         return often.append("passed", "green")
     text = Text.assemble(often, kind_view(program["failure"]), f' in "{visible(program["world"])}"')
     if program["explanation"] is None:
-        why = _error_sentence(program)
+        why = shortened(error_sentence(program))
     else:
         why = f"{visible(program['failure']['check'])}: {shortened(program['explanation'], EXPLANATION)}"
     return text.append(f"\n{why}" if why else "")
-
-
-def _error_sentence(verdict: Mapping[str, Any]) -> str:
-    """The line and the message of an error, of which either may be unknown."""
-    where = "" if verdict["line"] is None else f"line {verdict['line']}"
-    return ": ".join(filter(None, [where, shortened(verdict["error"]["message"])]))
 
 
 def completion_view(data: Mapping[str, Any]) -> RenderableType:
@@ -75,8 +69,7 @@ def _completion_head(data: Mapping[str, Any]) -> Text:
 
 
 def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
-    lines = program.replace("\r\n", "\n").replace("\r", "\n").rstrip("\n").split("\n")
-    source = "\n".join(shortened(line.expandtabs(4)) for line in lines[:MOST_LINES])
+    source, left = shown_lines(program)
     syntax = Syntax(
         source,
         "python",
@@ -86,8 +79,7 @@ def _program(program: str, marked: set[int | None]) -> list[RenderableType]:
         highlight_lines={line for line in marked if line is not None},
         word_wrap=True,
     )
-    left = len(lines) - MOST_LINES
-    return [syntax, Text(f"... {left:,} more lines", "dim")] if left > 0 else [syntax]
+    return [syntax, Text(f"... {left:,} more lines", "dim")] if left else [syntax]
 
 
 def _world(world: Mapping[str, Any], name: str) -> list[RenderableType]:
@@ -111,5 +103,5 @@ def _ending(world: Mapping[str, Any]) -> Text:
     if world["error"] is None:
         return text
     allowed = " (allowed here)" if world["satisfied"] else ""
-    told = ", ".join(filter(None, [visible(world["error"]["kind"]), _error_sentence(world)]))
+    told = ", ".join(filter(None, [visible(world["error"]["kind"]), shortened(error_sentence(world))]))
     return text.append(f"{allowed}: {told}")

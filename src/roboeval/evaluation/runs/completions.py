@@ -22,10 +22,10 @@ COMPLETIONS = "completions.jsonl"
 EXAMPLE = '{"task": "LunchTime", "prompt": 0, "index": 0, "program": "def task_program(): ..."}'
 
 MOST = 1_000_000_000
-REQUIRED = ("task", "prompt", "index", "program")
-FIELDS = (*REQUIRED, "instruction", "model")
-
 Key: TypeAlias = tuple[str, int, int]
+KEY = ("task", "prompt", "index")  # as columns of tables and names in rows
+REQUIRED = (*KEY, "program")
+FIELDS = (*REQUIRED, "instruction", "model")
 
 
 @dataclass(frozen=True, kw_only=True)

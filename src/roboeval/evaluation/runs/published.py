@@ -15,7 +15,7 @@ from typing import TypeAlias
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, read_text, text_of
 from codebotler.core.program import parse
-from roboeval.evaluation.runs.completions import Completion, Key, check_length, name_of, unknown
+from roboeval.evaluation.runs.completions import KEY, Completion, Key, check_length, name_of, unknown
 from roboeval.suites.load import Suite
 
 MAX_UNPACKED = 1_000_000_000
@@ -37,7 +37,7 @@ def published_completions(path: Path, suite: Suite | None = None) -> Iterator[Co
             if suite is not None and (problem := unknown(key, suite)):
                 raise UserError(problem, file=name)
             texts = _assigned(read(), name)
-            row = dict(zip(("task", "prompt", "index"), key, strict=True))
+            row = dict(zip(KEY, key, strict=True))
             row |= {"program": texts["completion"], "instruction": texts.get("prompt")}
             completion = Completion.of(row)
             check_length(completion.row, name)

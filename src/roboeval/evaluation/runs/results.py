@@ -15,7 +15,7 @@ import msgspec
 import polars as pl
 
 from codebotler.core.errors import UserError
-from roboeval.evaluation.runs.completions import Completion, Key, read_completions
+from roboeval.evaluation.runs.completions import KEY, Completion, Key, read_completions
 from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import (
     JudgedRow,
@@ -143,7 +143,7 @@ class Results:
 
     def _keys(self, condition: pl.Expr) -> list[Key]:
         rows = self.table.filter(condition, pl.col("world_number") == 0)
-        return [*rows.select("task", "prompt", "index").iter_rows()]
+        return [*rows.select(KEY).iter_rows()]
 
     @property
     def programs(self) -> Mapping[Key, str]:
