@@ -150,7 +150,7 @@ def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
     """The mean pass@k over all prompts of all tasks, with its 95 % interval.
 
     Raises:
-        ValueError: a prompt, which is named, has fewer than k completions; or there is no prompt.
+        ValueError: a prompt, which is named, has fewer than k completions.
     """
     return by_formula([[prompt.pass_at(k)] for task in tasks for prompt in task.prompts])
 
@@ -184,27 +184,13 @@ def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Es
 
 
 def mean_of(clusters: Clusters) -> float:
-    """The mean of all values; raises ValueError where there is none."""
-    if not clusters or not all(clusters):
-        raise ValueError("there is no mean where there is no value")
+    """The mean of all values, of which there is one at least."""
     return math.fsum(value for values in clusters for value in values) / sum(map(len, clusters))
 
 
 @lru_cache(maxsize=1024)
 def t_quantile(p: float, df: int) -> float:
-    """The value that Student's t stays below with probability p.
-
-    Args:
-        p: between 0 and 1.
-        df: degrees of freedom, at least 1.
-
-    Raises:
-        ValueError: p or df is out of range.
-    """
-    if not 0 < p < 1 or df < 1:
-        raise ValueError(f"Student's t has no quantile {p} with {df} degrees of freedom")
-    if p < 1 / 2:
-        return -t_quantile(1 - p, df)
+    """The value that Student's t, with so many degrees of freedom, stays below with probability p >= 1/2."""
     # With angle = atan(t / sqrt(df)) the probability is a finite sum, and the range to search is bounded.
     low, high = 0.0, math.pi / 2
     while low < (angle := (low + high) / 2) < high:

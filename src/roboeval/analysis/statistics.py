@@ -57,7 +57,6 @@ def p_by_signs(clusters: Clusters, *, seed: int = SEED, draws: int = 100_000) ->
     of them together. Up to 20 clusters, all signs are tried, and the answer is exact; else signs are drawn.
     It is at least 2 / 2**G for G clusters, so that few clusters cannot tell.
     """
-    mean_of(clusters)
     sums = np.array([math.fsum(values) for values in clusters])
     seen = abs(float(sums.sum())) - ROUNDING
     if len(sums) <= EXACT:

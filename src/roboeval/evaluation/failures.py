@@ -95,8 +95,7 @@ def failure(verdicts: Sequence[Verdict]) -> Failure | None:
             if verdict.failed:
                 first = verdict.failed[0]
                 return Failure(TASK, first.category, index, first.text)
-            if error is None:
-                raise ValueError("a world without error and failed checks is satisfied")
+            assert error is not None, "a world without error and failed checks is satisfied"
             is_robots = verdict.outcome.status is Status.ROBOT_ERROR
             return Failure(ROBOT if is_robots else PYTHON, error.kind, index)
     return None

@@ -28,12 +28,9 @@ def new_task(folder: Path, name: str) -> Path:
         folder / "solutions" / path.name: ("new-solutions.yaml", ""),
         path: ("new-task.yaml", name),
     }
-    try:
-        for file, (template, put) in files.items():
-            if not file.exists():
-                write_whole(file, (_TEMPLATE / template).read_text().replace("NAME", put).encode())
-    except OSError as error:
-        raise UserError(f"cannot be written ({error.strerror})", file=error.filename) from None
+    for file, (template, put) in files.items():
+        if not file.exists():
+            write_whole(file, (_TEMPLATE / template).read_text().replace("NAME", put).encode())
     return path
 
 

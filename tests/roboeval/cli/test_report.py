@@ -81,7 +81,7 @@ def test_what_is_refused(runs: Path, tmp_path: Path) -> None:
     assert "completions.jsonl" in refusal.sentence
     (tmp_path / "file").write_text("")
     refusal = refused("report", runs / "careful", "--out", tmp_path / "file", "--no-check")
-    assert refusal.at == (str(tmp_path / "file"), None)
+    assert refusal.at == (str(tmp_path / "file" / "tables"), None)
     assert "Not a directory" in refusal.sentence
     assert refused("report", runs / "careful", "--out", "").sentence.endswith("a folder")
 

@@ -119,7 +119,7 @@ class Results:
     @property
     def tasks(self) -> frozenset[str] | None:
         """The tasks that were selected; None for all."""
-        return selected_tasks(self.head, self.run.head(self.key or ""))
+        return selected_tasks(self.head)
 
     @property
     def scope(self) -> Scope:
@@ -171,11 +171,9 @@ class Results:
         raise UserError("was replaced meanwhile; try again", file=path)
 
 
-def selected_tasks(head: Mapping[str, Any], path: Path) -> frozenset[str] | None:
-    """The tasks that a KEY.json names; None for all. Raises UserError if somebody wrote something else."""
+def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
+    """The tasks that a KEY.json names; None for all."""
     tasks = head.get("tasks")
-    if tasks is not None and not (isinstance(tasks, list) and all(isinstance(task, str) for task in tasks)):
-        raise UserError('"tasks" is not a list of names; --redo starts over', file=path)
     return None if tasks is None else frozenset(tasks)
 
 
@@ -215,7 +213,7 @@ def read_results(
     """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
     head = {} if key is None else _head(run.head(key), faults)
     about = _head(run.about, faults) if run.about.exists() else {}
-    tasks = selected_tasks(head, run.head(key or ""))
+    tasks = selected_tasks(head)
     completions = {
         (sys.intern(completion.task), completion.prompt, completion.index): completion
         for completion in read_completions(run.completions, growing=True, faults=faults)
