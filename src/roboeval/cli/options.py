@@ -169,17 +169,14 @@ def open_run(
     run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
 ) -> Opened:
     """Read a judged run; `see` is called with each line of its verdicts."""
-    from roboeval.evaluation.runs.results import open_results
+    from roboeval.evaluation.runs.folder import evaluation_of
+    from roboeval.evaluation.runs.results import read_results
 
-    results = open_results(
-        run,
-        load(suite_name),
-        ablated=ablated,
-        again=command("evaluate", run, suite=suite_name, ablated=ablated),
-        see=see,
-        watch=lambda lines, total: watched(lines, "reading", total),
+    again = command("evaluate", run, suite=suite_name, ablated=ablated)
+    folder, key, suite = evaluation_of(run, load(suite_name), ablated=ablated, again=again)
+    results = read_results(
+        folder, key, suite, see=see, watch=lambda lines, total: watched(lines, "reading", total)
     )
-    suite = results.known_suite
     if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
     again = command("evaluate", run, *_to_go_on(results, suite), suite=suite_name, ablated=ablated)

@@ -240,3 +240,24 @@ def as_judged(run: Run, suite: Suite, *, ablated: bool) -> Suite:
         case {"worlds": int(worlds), "seed": int(seed)} if worlds > 0:
             return suite.with_worlds(worlds, seed)
     return suite
+
+
+def evaluation_of(
+    path: Path, suite: Suite, *, ablated: bool, again: str = "roboeval evaluate"
+) -> tuple[Run, str, Suite]:
+    """A run, the name of its evaluation by a suite, and the suite with the worlds that it had then.
+
+    Raises UserError if the suite has not judged it; the command `again` does.
+    """
+    run = Run(path)
+    suite = as_judged(run, suite, ablated=ablated)
+    key = evaluation_key(suite, ablated=ablated)
+    if not run.completions.is_file():
+        raise UserError("is not a run: it has no completions.jsonl", file=path)
+    if not run.rows(key).is_file():
+        others = run.judged_by()
+        if not others or suite.name in others:
+            raise UserError(f"has not been judged; run `{again}`", file=path)
+        judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
+        raise UserError(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=path)
+    return run, key, suite

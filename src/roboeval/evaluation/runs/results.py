@@ -16,7 +16,7 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from roboeval.evaluation.runs.completions import KEY, Completion, Key, read_completions
-from roboeval.evaluation.runs.folder import Run, as_judged, evaluation_key, load_head
+from roboeval.evaluation.runs.folder import Run, evaluation_of, load_head
 from roboeval.evaluation.runs.rows import (
     JudgedRow,
     Line,
@@ -58,7 +58,8 @@ def load_results(
     Raises:
         UserError: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
     """
-    results = open_results(Path(run), load_suite(suite), ablated=ablation, keep_failed=False)
+    known = load_suite(suite)
+    results = read_results(*evaluation_of(Path(run), known, ablated=ablation), keep_failed=False)
     if price is None:
         return results.table
     return results.table.with_columns(
@@ -175,29 +176,6 @@ def selected_tasks(head: Mapping[str, Any]) -> frozenset[str] | None:
     """The tasks that a KEY.json names; None for all."""
     tasks = head.get("tasks")
     return None if tasks is None else frozenset(tasks)
-
-
-def open_results(
-    path: Path,
-    suite: Suite,
-    *,
-    ablated: bool,
-    again: str = "roboeval evaluate",  # the command that judges the run
-    **reading: Any,  # noqa: ANN401 - see `read_results`
-) -> Results:
-    """Read what a suite says of a run, in the worlds of then; UserError if it has not judged the run."""
-    run = Run(path)
-    suite = as_judged(run, suite, ablated=ablated)
-    key = evaluation_key(suite, ablated=ablated)
-    if not run.completions.is_file():
-        raise UserError("is not a run: it has no completions.jsonl", file=path)
-    if not run.rows(key).is_file():
-        others = run.judged_by()
-        if not others or suite.name in others:
-            raise UserError(f"has not been judged; run `{again}`", file=path)
-        judges, ours = " and ".join(f'"{name}"' for name in others), f'"{suite.name}"'
-        raise UserError(f"was judged by the suite {judges}, not by {ours}; name it with --suite", file=path)
-    return read_results(run, key, suite, **reading)
 
 
 def read_results(
