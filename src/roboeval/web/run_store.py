@@ -5,9 +5,9 @@ from __future__ import annotations
 import stat
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -36,8 +36,7 @@ class RunStore:
     def __init__(self, folder: Path, suites: Sequence[Suite] = ()) -> None:
         self.folder = folder
         self._suites: dict[str, Suite | None] = {suite.name: suite for suite in suites}
-        self._readers: OrderedDict[tuple[str, str | None], _Reader] = OrderedDict()
-        self._lock = threading.Lock()
+        self._reader_of = lru_cache(maxsize=MOST_HELD)(partial(_Reader, self))
 
     def names(self) -> list[str]:
         """The names of the runs, sorted."""
@@ -84,12 +83,7 @@ class RunStore:
         known = tuple(sorted(keys, key=lambda one: (one.endswith(ABLATED), one)))
         if key is not None and key not in known:
             raise UserError(f'"{shortened(name)}" has no evaluation "{shortened(key)}"')
-        key = key or next(iter(known), None)
-        with self._lock:
-            reader = self._readers.setdefault((name, key), _Reader(self, run, key))
-            self._readers.move_to_end((name, key))
-            while len(self._readers) > MOST_HELD:
-                self._readers.popitem(last=False)
+        reader = self._reader_of(run, key or next(iter(known), None))
         reader.evaluations = known
         return reader
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import sys
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -117,7 +115,7 @@ def read_completions(
     """
     path = Path(path)
     name = name or path
-    seen: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # lines by index: small for many rows
+    seen: dict[Key, int] = {}  # the lines
     try:
         for number, line in read_lines(path, name=name):
             try:
@@ -147,11 +145,10 @@ def _completion(line: bytes, suite: Suite | None, *, growing: bool) -> Completio
     return completion
 
 
-def _expect_new(key: Key, seen: dict[tuple[str, int], dict[int, int]], number: int) -> None:
-    task, prompt, index = key
-    first_line = seen[sys.intern(task), prompt].setdefault(index, number)
+def _expect_new(key: Key, seen: dict[Key, int], number: int) -> None:
+    first_line = seen.setdefault(key, number)
     if first_line != number:
-        raise UserError(f"{name_of(key)} is here again; it was already in line {first_line} already")
+        raise UserError(f"{name_of(key)} is here again; it was already in line {first_line}")
 
 
 def check_length(row: Mapping[str, Any], file: object, line: int | None = None) -> None:
