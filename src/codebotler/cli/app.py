@@ -98,7 +98,7 @@ def check(
 
     It reads the text and runs it in imagined worlds; the status is 1 if there are problems.
     """
-    from codebotler.checking.check import check as look_for_problems
+    from codebotler.checking import check
     from codebotler.cli.check import check_view, read_program
     from codebotler.core.terminal import busy, print_json, print_rich
     from codebotler.core.world import World
@@ -106,7 +106,7 @@ def check(
     known = None if world is None else World.read(world)
     source = read_program(program)
     with busy("checking"):
-        found = look_for_problems(
+        found = check.check(
             source,
             rooms=None if known is None else [room.name for room in known.rooms],
             start=None if known is None else known.robot,
@@ -144,8 +144,8 @@ def run(
 
     Ctrl-C stops the robot, with status 130.
     """
+    from codebotler.cli import run
     from codebotler.cli.run import Request
-    from codebotler.cli.run import run as run_mission
     from codebotler.core.files import home
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
@@ -161,7 +161,7 @@ def run(
         ros_python=ros_python,
     )
     body = open_robot(robot, settings)
-    raise typer.Exit(run_mission(body, request, home(), lambda name: open_model(name, SamplingSettings())))
+    raise typer.Exit(run.run(body, request, home(), lambda name: open_model(name, SamplingSettings())))
 
 
 @app.command()
@@ -267,10 +267,10 @@ def serve(
     body = open_robot(robot, settings) if shown is None else open_with_face(robot, settings, shown)
     console = Console(body, home(), opened, models=models, world=known, face=shown)
 
+    from codebotler.web import server
     from codebotler.web.frame import installed
-    from codebotler.web.server import serve as serve_page
 
-    serve_page(console, place, access, installed(), runs, alone_for=stop_when_alone)
+    server.serve(console, place, access, installed(), runs, alone_for=stop_when_alone)
 
 
 def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:

@@ -9,8 +9,8 @@ from nicegui import background_tasks, ui
 from codebotler.missions.view import SessionView
 from codebotler.web.console import Console
 from codebotler.web.frame import PATIENCE, Frame, PlainText
+from codebotler.web.panes import past_missions
 from codebotler.web.panes.instruction import InstructionPane
-from codebotler.web.panes.past_missions import add as add_past_missions
 from codebotler.web.panes.program import ProgramPane
 from codebotler.web.panes.robot import RobotPane
 
@@ -50,7 +50,7 @@ def add(console: Console, frame: Frame) -> None:
         client.on_delete(following.cancel)
         await instruction.load()
 
-    add_past_missions(console, frame)
+    past_missions.add(console, frame)
 
 
 def _next(view: SessionView) -> str:

@@ -131,8 +131,8 @@ def _judged(
 ) -> Iterator[JudgedRow]:
     """Judge completions, in a run if there is one to keep the rows."""
     from codebotler.core.files import to_line
+    from roboeval.evaluation import judge
     from roboeval.evaluation.evaluate import evaluate_run
-    from roboeval.evaluation.judge import evaluate as judge_all
     from roboeval.evaluation.runs.rows import judged_row
 
     if run is not None:
@@ -140,7 +140,7 @@ def _judged(
         return evaluate_run(
             run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
         )
-    rows = judge_all(source.of(tasks), suite, ablated=ablated, engine=engine)
+    rows = judge.evaluate(source.of(tasks), suite, ablated=ablated, engine=engine)
     return (judged_row(to_line(row)) for row in rows)
 
 

@@ -138,8 +138,8 @@ def serve(
     Compare runs, and look into each completion; Ctrl-C ends it. No robot is needed.
     """
     from codebotler.core.errors import UserError
+    from codebotler.web import server
     from codebotler.web.access import Access, Place
-    from codebotler.web.server import serve as serve_page
     from roboeval.web.pages import pages
     from roboeval.web.run_store import RunStore
 
@@ -150,4 +150,4 @@ def serve(
     suites = [load(each) for each in suite or ()]
     if not RunStore(runs).names():
         note(f"{runs} has no runs yet; new ones will be shown")
-    serve_page(None, place, access, (pages(suites),), runs)
+    server.serve(None, place, access, (pages(suites),), runs)
