@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import ast
 import types
-from collections.abc import Iterator
+from collections import defaultdict
 
 from codebotler.simulator.sandbox import BY_NAME, CAUGHT, ENTER, ENTRY, FUEL, PROGRAM
 from codebotler.simulator.sandbox.tame import is_tame
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
 
 TASK = "task_program"
 TOO_LARGE = "the program is too large, or nested too deeply"
 DEEPEST = 250
 MOST_BLOCKS = 20
 BLOCKS = (ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar)
+LEAVES = frozenset({"ctx", "op", "ops"})  # fields whose nodes only name something
+WITH_LEAVES = frozenset(
+    {*(ast.Name, ast.Attribute, ast.Subscript, ast.Starred, ast.List, ast.Tuple), *(ast.BinOp, ast.BoolOp)}
+    | {ast.UnaryOp, ast.Compare, ast.AugAssign}
+)
 SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 
@@ -29,79 +38,94 @@ def prepared(
         raise SyntaxError("source code cannot contain null characters", (PROGRAM, line, 1, None))
     try:
         tree = ast.parse(source, PROGRAM)
-        nodes = list(walk(tree))
-        imports = frozenset(name for node in nodes for name in imported(node))
+        nodes = nodes_of(tree)
+        imports = frozenset(
+            name
+            for kind in (ast.Import, ast.ImportFrom)
+            for node in nodes.get(kind, ())
+            for name in imported(node)
+        )
         if lowercase:
             lower_literals(nodes)
         tame = skills is not None and is_tame(tree, nodes, skills)
-        for node in nodes:
-            use_fuel(node)
-        for node in tree.body:
-            note_entries(node)
+        use_fuel(nodes)
+        for statement in tree.body:
+            note_entries(statement)
         return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), imports, tame
     except (RecursionError, MemoryError):
         raise MemoryError(TOO_LARGE) from None
 
 
-def walk(tree: ast.AST) -> Iterator[ast.AST]:
-    """All nodes of a tree, unless it is nested too deeply, which versions of Python limit differently."""
+def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
+    """The nodes of a tree by their type, without those that only name an operator or a context.
+
+    Raises MemoryError or SyntaxError if it is nested too deeply, which versions of Python limit differently.
+    """
+    nodes: defaultdict[type[ast.AST], list[Any]] = defaultdict(list)
     waiting: list[tuple[ast.AST, int, int]] = [(tree, 0, 0)]
     while waiting:
         node, depth, blocks = waiting.pop()
-        if depth > DEEPEST:
+        kind = type(node)
+        if depth > DEEPEST - (kind in WITH_LEAVES):
             raise MemoryError
-        if isinstance(node, SCOPES):
+        if kind in SCOPES:
             blocks = 0
-        elif isinstance(node, BLOCKS):
+        elif kind in BLOCKS:
             blocks += 1
             if blocks > MOST_BLOCKS:
-                raise SyntaxError("too many statically nested blocks", (PROGRAM, node.lineno, 1, None))
-        yield node
-        waiting.extend((child, depth + 1, blocks) for child in ast.iter_child_nodes(node))
+                raise SyntaxError("too many statically nested blocks", (PROGRAM, node.lineno, 1, None))  # type: ignore[attr-defined]  # by the line above
+        nodes[kind].append(node)
+        depth += 1
+        for name in kind._fields:
+            if name not in LEAVES:
+                child = getattr(node, name, None)
+                if type(child) is list:
+                    waiting += [(each, depth, blocks) for each in child if isinstance(each, ast.AST)]
+                elif isinstance(child, ast.AST):
+                    waiting.append((child, depth, blocks))
+    return nodes
 
 
-def imported(node: ast.AST) -> list[str]:
+def imported(node: ast.Import | ast.ImportFrom) -> list[str]:
     """The modules that a node imports."""
-    match node:
-        case ast.Import(names):
-            return [alias.name for alias in names]
-        case ast.ImportFrom(module=module, level=level):
-            return ["." * level + (module or "")]
-    return []
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    return ["." * node.level + (node.module or "")]
 
 
-def lower_literals(nodes: list[ast.AST]) -> None:
+def lower_literals(nodes: dict[type[ast.AST], list[Any]]) -> None:
     """Lower-case all string literals, but not the format specifications of f-strings."""
     specifications = {
         id(part)
-        for node in nodes
-        if isinstance(node, ast.FormattedValue) and isinstance(node.format_spec, ast.JoinedStr)
+        for node in nodes.get(ast.FormattedValue, ())
+        if isinstance(node.format_spec, ast.JoinedStr)
         for part in node.format_spec.values
     }
-    for node in nodes:
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in specifications:
+    for node in nodes.get(ast.Constant, ()):
+        if isinstance(node.value, str) and id(node) not in specifications:
             node.value = node.value.lower()
 
 
-def use_fuel(node: ast.AST) -> None:
-    """Use fuel at the head of whatever a node runs again."""
-    match node:
-        case ast.FunctionDef() | ast.AsyncFunctionDef():
+def use_fuel(nodes: dict[type[ast.AST], list[Any]]) -> None:
+    """Use fuel at the head of whatever is run again."""
+    for kind in (ast.FunctionDef, ast.AsyncFunctionDef):
+        for node in nodes.get(kind, ()):
             insert_head(node, ENTRY)
-        case ast.For() | ast.AsyncFor() | ast.While():
-            node.body.insert(0, call(FUEL, node.body[0]))
-        case ast.ExceptHandler():
-            node.body.insert(0, call(CAUGHT, node.body[0]))
-        case ast.Try() | ast.TryStar():
+    for kind, name in ((ast.For, FUEL), (ast.AsyncFor, FUEL), (ast.While, FUEL), (ast.ExceptHandler, CAUGHT)):
+        for node in nodes.get(kind, ()):
+            node.body.insert(0, call(name, node.body[0]))
+    for kind in (ast.Try, ast.TryStar):
+        for node in nodes.get(kind, ()):
             if node.finalbody:
                 node.finalbody.insert(0, call(CAUGHT, node.finalbody[0]))
-        case ast.Lambda():
-            spend = call(ENTRY, node.body).value
-            node.body = ast.copy_location(ast.BoolOp(ast.Or(), [spend, node.body]), node.body)
-        case ast.comprehension():
-            spend = call(FUEL, node.iter).value
-            node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), spend), node.iter))
-        case ast.Call(func=ast.Name(id=name)) if name == TASK:
+    for node in nodes.get(ast.Lambda, ()):
+        spend = call(ENTRY, node.body).value
+        node.body = ast.copy_location(ast.BoolOp(ast.Or(), [spend, node.body]), node.body)
+    for node in nodes.get(ast.comprehension, ()):
+        spend = call(FUEL, node.iter).value
+        node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), spend), node.iter))
+    for node in nodes.get(ast.Call, ()):
+        if isinstance(node.func, ast.Name) and node.func.id == TASK:
             start = call(BY_NAME, node.func).value
             node.func = ast.copy_location(ast.BoolOp(ast.Or(), [start, node.func]), node.func)
 

@@ -19,11 +19,14 @@ from __future__ import annotations
 import ast
 import builtins
 import re
+from functools import lru_cache
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-    from typing import Any, NoReturn
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import Any, NoReturn, TypeAlias
+
+    Nodes: TypeAlias = Mapping[type[ast.AST], Sequence[Any]]
 
 # Builtins that use up their first argument on the spot, and those that only take data.
 CONSUMERS = frozenset({"all", "any", "dict", "len", "list", "max", "min", "next", "sorted", "sum", "tuple"})
@@ -121,12 +124,12 @@ PLAIN_FIELDS = re.compile(r"(?:[^{}]|\{\{|\}\}|\{\w*(?:![rsa])?(?::[^{}]*)?\})*"
 CONSTANTS = (type(None), bool, int, float, str, type(...))
 
 
-def is_tame(tree: ast.Module, nodes: Iterable[ast.AST], skills: frozenset[str]) -> bool:
+def is_tame(tree: ast.Module, nodes: Nodes, skills: frozenset[str]) -> bool:
     """Whether a program is tame.
 
     Args:
         tree: its syntax tree.
-        nodes: all nodes of the tree, in any order.
+        nodes: all nodes of the tree by type.
         skills: the names of the skills that it may call.
     """
     try:
@@ -143,27 +146,21 @@ class WildError(Exception):
 class Verifier:
     """Goes through a program once, and raises WildError at the first thing that is not on the allowlist."""
 
-    def __init__(self, nodes: Iterable[ast.AST], skills: frozenset[str]) -> None:
+    def __init__(self, nodes: Nodes, skills: frozenset[str]) -> None:
         self.skills = skills
-        self.functions: set[str] = set()
-        self.bound: set[str] = set()  # names that are bound in any way but by `def`
-        for node in nodes:
-            kind = type(node)
-            if kind is ast.FunctionDef:
-                self.functions.add(node.name)  # type: ignore[attr-defined]  # by the line above
-            elif kind is ast.Name:
-                if type(node.ctx) is not ast.Load:  # type: ignore[attr-defined]  # the same
-                    self.bound.add(node.id)  # type: ignore[attr-defined]  # the same
-            elif kind is ast.arg:
-                self.bound.add(node.arg)  # type: ignore[attr-defined]  # the same
-            elif kind is ast.ExceptHandler and node.name:  # type: ignore[attr-defined]  # the same
-                self.bound.add(node.name)  # type: ignore[attr-defined]  # the same
-        self.callable = skills | GIVEN | {"time"}
+        self.functions = {node.name for node in nodes.get(ast.FunctionDef, ())}
+        self.bound = {  # names that are bound in any way but by `def`
+            *(node.id for node in nodes.get(ast.Name, ()) if type(node.ctx) is not ast.Load),
+            *(node.arg for node in nodes.get(ast.arg, ())),
+            *(node.name for node in nodes.get(ast.ExceptHandler, ()) if node.name),
+        }
+        self.special = special(skills)
+        self.hides = not self.special.isdisjoint(self.bound)
         self.hidden: list[frozenset[str]] = []  # of each function around: what is data there, and no builtin
         for name in self.functions | self.bound:
             if name.startswith("__"):
                 wild()
-        if self.functions & (self.bound | self.callable | EXISTING):
+        if not self.functions.isdisjoint(self.bound) or not self.functions.isdisjoint(self.special):
             wild()
 
     # --- names
@@ -172,7 +169,7 @@ class Verifier:
         """Whether a name stands for data here, or for nothing at all."""
         if name in self.functions:
             return False
-        if name not in self.callable and name not in EXISTING:
+        if name not in self.special:
             return not name.startswith("__") or name == "__name__"
         return any(name in names for names in self.hidden)
 
@@ -203,7 +200,7 @@ class Verifier:
         if node.returns is not None:
             self.annotation(node.returns)
         self.parameters(node.args)
-        self.hidden.append(frozenset(hidden_in(node) & (self.callable | EXISTING)))
+        self.hidden.append(self.special & hidden_in(node) if self.hides else frozenset())
         self.statements(node.body)
         self.hidden.pop()
 
@@ -238,7 +235,7 @@ class Verifier:
     def declaration(self, node: ast.Global | ast.Nonlocal) -> None:
         """Allow names of data to be those of an outer scope."""
         for name in node.names:
-            if name in self.functions or name in self.callable or name in EXISTING or name.startswith("__"):
+            if name in self.functions or name in self.special or name.startswith("__"):
                 wild()
 
     def imported(self, node: ast.Import) -> None:
@@ -334,7 +331,7 @@ class Verifier:
         """Allow what a builtin calls on the spot: a function, a skill, a builtin, a method, a lambda."""
         match node:
             case ast.Lambda(args, body):
-                if any(name in self.callable or name in EXISTING for name in parameters_of(args)):
+                if not self.special.isdisjoint(parameters_of(args)):
                     wild()
                 self.parameters(args)
                 self.value(body)
@@ -429,7 +426,7 @@ class Verifier:
         """Allow a comprehension, in which no builtin's name stands for data."""
         for each in node.generators:
             for inner in ast.walk(each.target):
-                if isinstance(inner, ast.Name) and (inner.id in self.callable or inner.id in EXISTING):
+                if isinstance(inner, ast.Name) and inner.id in self.special:
                     wild()
             self.value(each.target)
             self.consumed(each.iter)
@@ -445,7 +442,7 @@ class Verifier:
 
     def assignment(self, node: ast.NamedExpr) -> None:
         """Allow an assignment within an expression, whose scope may be another, to no builtin's name."""
-        if node.target.id in self.callable or node.target.id in EXISTING:
+        if node.target.id in self.special:
             wild()
         self.name(node.target)
         self.value(node.value)
@@ -475,6 +472,12 @@ class Verifier:
 
     def nothing(self, node: ast.AST) -> None:
         """Allow what has no parts that matter."""
+
+
+@lru_cache(maxsize=16)
+def special(skills: frozenset[str]) -> frozenset[str]:
+    """The names that some program finds without binding them: those of builtins, modules and skills."""
+    return skills | GIVEN | EXISTING
 
 
 def wild(*_: object) -> NoReturn:
