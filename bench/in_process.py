@@ -24,15 +24,13 @@ from codebotler.simulator.sandbox import REFUSED, execution
 from codebotler.simulator.sandbox.execution import RECURSION_LIMIT, LimitReachedError, ProgramRun
 from codebotler.simulator.sandbox.fuel import prepared
 from codebotler.simulator.sandbox.preparer import answer
-from codebotler.simulator.skill_protocol import described
+from codebotler.simulator.skill_protocol import described, settings_of
 
 CPU_SECONDS = 30
 MEMORY = 2 * 1024**3
 DEEPER = 500  # a robot that is called as a function takes more of the stack than one that is asked by socket
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has
-Execution: TypeAlias = tuple[
-    bytes, tuple[int, float, int, int, int, float, bool], tuple[str, ...], dict[str, Any]
-]
+Execution: TypeAlias = tuple[bytes, tuple[int, float, float, bool]]
 ORDINARY = Path(__file__).with_name("ordinary_process.py")
 
 
@@ -47,12 +45,12 @@ class Bare(ProgramRun):
         super().__init__()
         self.robot, self.limits = robot, robot.rules.limits
         self.provide(described(robot))
-        self.fuel, self.seconds, self.calls = self.limits.ticks, self.limits.seconds, self.limits.calls
+        self.fuel, self.seconds, self.left = self.limits.ticks, self.limits.seconds, self.limits.calls
 
-    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - as in ProgramRun
         """Do what the engine would."""
-        self.calls -= 1
-        if self.calls < 0:
+        self.left -= 1
+        if self.left < 0:
             self.request(name)
         return self.robot.perform(name, for_robot(arguments))
 
@@ -102,7 +100,7 @@ class Reused(Bare):
             return
         self.robot, self.now, self.spent, self.entered = SimulatedRobot(world), 0.0, False, False
         self.codes.clear()
-        self.calls = self.limits.calls
+        self.left = self.limits.calls
         self.refuel()
         namespace = self.provided.copy()
         try:
@@ -129,7 +127,7 @@ class Unwalled(Bare):
         self.limit: str | None = None
         self.errors: list[RobotError] = []
 
-    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - as in ProgramRun
         """Do what the engine would, and find the limits that it would."""
         given = for_robot(arguments)
         self.limit = self.limit or self.reached(given)
@@ -184,10 +182,7 @@ class Unwalled(Bare):
 
     def execution(self, code: bytes) -> Execution:
         """What to execute of a program that parses."""
-        limits = self.limits
-        bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
-        start = self.robot.rules.clock_starts.timestamp()
-        return code, (*bounds, start, False), (), {}
+        return code, settings_of(self.robot)
 
     def ended(self, final: dict[str, Any]) -> Outcome:
         """The outcome of a run that ended like this."""

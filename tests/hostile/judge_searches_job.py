@@ -1,7 +1,7 @@
 """Tries to find more in what the engine sent than its own source and the names of skills."""
 # ends: finished
-# does: say calls codes count entered fuel is_live known longest
-# does: say namespace now room seconds skills spent start sure
+# does: say codes count entered fuel is_live namespace now seconds
+# does: say skills spent start
 
 
 def task_program():

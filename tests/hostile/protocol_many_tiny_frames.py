@@ -11,5 +11,5 @@ def frame(text):
 
 def task_program():
     while True:
-        os.write(3, frame('["get_all_rooms", [], 0, 1]'))
+        os.write(3, frame('["get_all_rooms", [], 0]'))
         os.read(3, 1000)

@@ -11,4 +11,4 @@ def frame(text):
 
 
 def task_program():
-    os.write(3, frame('["say", ["open sesame"], 0, 1]'))
+    os.write(3, frame('["say", ["open sesame"], 0]'))

@@ -12,4 +12,4 @@ def frame(text):
 
 def task_program():
     go_to("vault")
-    os.write(3, frame('{"end": "finished"}') + frame('["say", ["open sesame"], 0, 1]'))
+    os.write(3, frame('{"end": "finished"}') + frame('["say", ["open sesame"], 0]'))

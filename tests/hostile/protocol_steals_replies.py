@@ -1,6 +1,6 @@
 """Tries to find more in the replies than was asked for."""
 # ends: finished
-# does: say ('ok', ['start', 'vault'], {}, 0.0)
+# does: say ('ok', ['start', 'vault'], 0.0)
 
 import inspect
 import os
@@ -12,6 +12,6 @@ def frame(text):
 
 
 def task_program():
-    os.write(3, frame('["get_all_rooms", [], 0, 1]'))
+    os.write(3, frame('["get_all_rooms", [], 0]'))
     marshal = inspect.importlib._bootstrap_external.marshal
     say(str(marshal.loads(os.read(3, 10_000)[4:])))

@@ -11,5 +11,5 @@ def frame(text):
 
 
 def task_program():
-    os.write(3, frame('["say", ["open \\ud800sesame"], 0, 1]'))
+    os.write(3, frame('["say", ["open \\ud800sesame"], 0]'))
     os.read(3, 100)

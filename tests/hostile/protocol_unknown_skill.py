@@ -10,4 +10,4 @@ def frame(text):
 
 
 def task_program():
-    os.write(3, frame('["record", ["say", "open sesame"], 0, 1]'))
+    os.write(3, frame('["record", ["say", "open sesame"], 0]'))

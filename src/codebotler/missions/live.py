@@ -40,9 +40,6 @@ class LiveRobot:
     """
 
     is_live = True
-    never_fails: frozenset[str] = frozenset()
-    only_looks: frozenset[str] = frozenset()
-    surely: tuple[tuple[str, str], ...] = ()
 
     def __init__(
         self, robot: base.Robot, note: Note, *, place: str = "", clock_starts: datetime | None = None

@@ -99,18 +99,16 @@ class TranscribedRun(ProgramRun):
     def provide(self, skills: Skills) -> None:
         """Give programs the skills, `time`, and the builtins of tame programs."""
         self.skills = skills
-        self.provided = {name: self.skill(name, parameters, way) for name, parameters, way in skills}
+        self.provided = {name: self.skill(name, parameters) for name, parameters in skills}
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
 
     def transcript(self, code: CodeType, kind: type[SimulatedRobot], arguments: tuple[Any, ...]) -> bytes:
         """Run a program with a robot, and return the transcript."""
         self._begin(kind(*arguments))
-        robot = self.ledger.robot
-        limits = robot.rules.limits
-        bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
-        start = robot.rules.clock_starts.timestamp()
+        rules = self.ledger.robot.rules
         sys.setrecursionlimit(RECURSION_LIMIT)
-        end = self.execute(code, (*bounds, start, False), (), {})
+        settings = (rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), False)
+        end = self.execute(code, settings)
         data = ODD if self.is_odd else self._written(end)
         return data if len(data) <= MAX_FRAME else ODD
 
@@ -131,7 +129,7 @@ class TranscribedRun(ProgramRun):
         self._order: list[int] = []
         self._moments: list[tuple[int, float]] = []
 
-    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401, ARG002 - as in ProgramRun
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the copy of the robot execute a skill."""
         given = [tuple(map(option, value)) if type(value) is list else value for value in arguments]
         try:
@@ -145,7 +143,7 @@ class TranscribedRun(ProgramRun):
         except BaseException:  # nothing that a program does, unless it has reached a limit
             self.is_odd = self.is_odd or not self.spent
             raise
-        kind, value, _ = answer
+        kind, value = answer
         if kind == "error":
             self._note(name, given, kind, value[1:])
             raise robot_error(*value)

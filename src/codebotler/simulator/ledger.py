@@ -14,9 +14,9 @@ OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty
 WAITS = "it waits for something that can never come"
 LAST_LINE = 1_000_000
 LONGEST_MESSAGE = 1_000  # characters; a robot's error may quote all that it was asked
-# What kind of answer, what it says, and whether looking may show something else now.
-SkillAnswer: TypeAlias = tuple[str, Any, bool]
-STOP: SkillAnswer = ("stop", None, False)
+SkillAnswer: TypeAlias = tuple[str, Any]
+"""`ok` and a result, `error` and its number, kind and message, or `stop`."""
+STOP: SkillAnswer = ("stop", None)
 
 
 class SkillPerformer(Protocol):
@@ -25,9 +25,6 @@ class SkillPerformer(Protocol):
     rules: Rules
     skills: SkillTable
     is_live: bool  # time passes by itself: sleeping takes it, and each skill refuels the program
-    never_fails: frozenset[str]  # skills that return nothing and cannot fail, so that nobody waits for them
-    surely: tuple[tuple[str, str], ...]  # skills and their only arguments that always succeed
-    only_looks: frozenset[str]  # skills whose result stays the same until another skill is executed
 
     @property
     def now(self) -> float:
@@ -62,8 +59,8 @@ class Ledger:
             result = self.robot.perform(skill, arguments)
         except RobotError as error:
             self.errors.append(error)
-            return ("error", (len(self.errors) - 1, error.kind, str(error)), True)
-        return ("ok", result, skill not in self.robot.only_looks)
+            return ("error", (len(self.errors) - 1, error.kind, str(error)))
+        return ("ok", result)
 
     def let_time_pass(self, now: float) -> None:
         """Let simulated time pass, until `now` seconds since the start, or until its limit."""
@@ -123,7 +120,7 @@ class RememberingLedger(Ledger):
 
     def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__(robot)
-        self._simulated, self._idle = robot, robot.only_looks | robot.never_fails
+        self._simulated, self._idle = robot, robot.idle_skills
         self._same: dict[tuple[object, ...], tuple[int, SkillAnswer, Sequence[Event]]] = {}
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:

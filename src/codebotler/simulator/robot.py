@@ -95,15 +95,10 @@ class SimulatedRobot:
         self.setup: Setup = (SimulatedRobot, (world, rules))
         if missing := [name for name in skills if name not in self.behaviours]:
             raise UserError(f'the skill "{missing[0]}" has no behaviour: say in `behaviours` what it does')
-        self.never_fails = frozenset(name for name, does in self.behaviours.items() if does is say)
-        self.only_looks = frozenset(name for name, does in self.behaviours.items() if does in LOOKING)
         self.rooms = tuple(room.name for room in world.rooms)
-        self.surely = sure_drives(self.rooms) if self.behaviours.get("go_to") is go_to else ()
         self.room = world.robot
         self.things = {room.name: [Thing(label) for label in room.objects] for room in world.rooms}
         self.people = {room.name: [Somebody(person) for person in room.people] for room in world.rooms}
-        if any(somebody.looks_before for here in self.people.values() for somebody in here):
-            self.only_looks -= {name for name, does in self.behaviours.items() if does is is_in_room}
         self.held: str | None = None
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
@@ -118,6 +113,13 @@ class SimulatedRobot:
     def own_skills(self) -> tuple[str, ...]:
         """The skills that a copy made from `setup` would not have: their behaviours were given."""
         return given_behaviours(self, BEHAVIOURS)
+
+    @property
+    def idle_skills(self) -> frozenset[str]:
+        """The skills that leave the robot and its world as they are, however often they are executed."""
+        comes = any(somebody.looks_before for here in self.people.values() for somebody in here)
+        idle = IDLE - {is_in_room} if comes else IDLE
+        return frozenset(name for name, does in self.behaviours.items() if does in idle)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill; a question is answered by the position of the chosen option."""
@@ -210,20 +212,6 @@ def go_to(robot: SimulatedRobot, location: str) -> None:
     if room is None:
         raise RobotError("GoToInvalidLocation", f'there is no room "{location}"')
     robot.room = room
-
-
-@lru_cache(maxsize=4096)
-def sure_drives(rooms: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
-    """The drives that succeed whatever happens: to each room by its name, unless it is an odd regex."""
-    return tuple(("go_to", room) for room in rooms if is_found_by_itself(room))
-
-
-def is_found_by_itself(room: str) -> bool:
-    """Whether the name of a room is found in itself."""
-    try:
-        return found_in(room, room)
-    except re.error:
-        return False
 
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
@@ -343,7 +331,7 @@ BEHAVIOURS: Mapping[str, Behaviour] = {
     "pick": pick,
     "place": place,
 }
-LOOKING = (get_current_location, get_all_rooms, is_in_room)  # their result is the same until the robot acts
+IDLE = frozenset({get_current_location, get_all_rooms, is_in_room, say})  # the robot stays as it is
 
 
 def located(trace: Trace, world: World) -> Trace:

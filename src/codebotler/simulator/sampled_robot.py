@@ -21,7 +21,6 @@ from codebotler.simulator.robot import (
     Thing,
     found_in,
     given_behaviours,
-    is_found_by_itself,
 )
 from codebotler.simulator.rules import Rules
 
@@ -62,12 +61,6 @@ class RoomMap:
         same = [room for room in self.rooms if room.strip().casefold() == wanted.casefold()]
         within = (room for room in self.rooms if room.casefold() in wanted.casefold())
         return same[0] if same else next(within, (wanted or None) if self.guessed else None)
-
-    @property
-    def sure(self) -> tuple[str, ...]:
-        """The rooms that their own names find."""
-        is_plain = self.guessed or self.plain
-        return tuple(room for room in self.rooms if is_plain or is_found_by_itself(room))
 
 
 # --- facts
@@ -168,9 +161,6 @@ class SampledRobot(SimulatedRobot):
         super().__init__(World(tuple(map(Room, room_map.rooms)), room_map.start), rules, skills, does)
         self.setup = SampledRobot, (room_map, sampler, rules)
         self.room_map, self.sampler = room_map, sampler
-        self.only_looks |= {name for name, behaviour in does.items() if behaviour is look}
-        if does.get("go_to") is drive:
-            self.surely = tuple(("go_to", room) for room in room_map.sure)
         self.things = defaultdict(list)
         self.people = defaultdict(list)  # of nobody whom a world file would name
         self.explored: defaultdict[str, ExploredRoom] = defaultdict(ExploredRoom)
@@ -184,6 +174,11 @@ class SampledRobot(SimulatedRobot):
     def own_skills(self) -> tuple[str, ...]:
         """The skills that a copy made from `setup` would not have."""
         return given_behaviours(self, SAMPLED)
+
+    @property
+    def idle_skills(self) -> frozenset[str]:
+        """The skills that leave the robot and its world as they are, once the first has drawn its facts."""
+        return frozenset(name for name, does in self.behaviours.items() if does in real.IDLE or does is look)
 
     @property
     def here(self) -> ExploredRoom:

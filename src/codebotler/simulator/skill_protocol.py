@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from json.encoder import encode_basestring_ascii as quoted
 from math import inf
 from typing import TypeAlias
 
@@ -16,10 +15,10 @@ from codebotler.simulator.isolated_process import (
     cause_of_death,
 )
 from codebotler.simulator.ledger import STOP, WAITS, Ledger, SkillAnswer, SkillPerformer
-from codebotler.simulator.robot import Argument, Result
-from codebotler.simulator.sandbox import ACTS, CPU_SECONDS, LIVE_CPU_SECONDS, LOOKS, TELLS
+from codebotler.simulator.robot import Argument
+from codebotler.simulator.sandbox import CPU_SECONDS, LIVE_CPU_SECONDS
 
-Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
+Description: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
 OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a child is ended
 
 
@@ -37,16 +36,7 @@ class SkillProtocol:
         self.ledger = Ledger(robot)
         self._heard = False
         self._skills = {skill.name: skill for skill in robot.skills.rows}
-        self._glances = [
-            (f'"{skill.name}",[]', skill.name)
-            for skill in robot.skills.rows
-            if skill.name in robot.only_looks and not skill.parameters and skill.recording is None
-        ]
-        limits = self.limits
-        bounds = (limits.ticks, limits.seconds, limits.calls, limits.text, limits.trace)
-        start = robot.rules.clock_starts.timestamp()
-        sure = tuple(f'"{name}",[{quoted(argument)}]' for name, argument in robot.surely)
-        child.send((code, described(robot), (*bounds, start, robot.is_live), sure, self._known()))
+        child.send((code, described(robot), settings_of(robot)))
 
     def outcome(self) -> Outcome:
         """Answer to the end, and say how the run ended."""
@@ -77,10 +67,8 @@ class SkillProtocol:
             if isinstance(message, dict):
                 return message
             match message:
-                case [str() as name, list() as values, int() | float() as now, int() as waits]:
-                    kind, value, changed = self._answer(name, values, now)
-                    if waits:
-                        self.child.send((kind, value, self._known() if changed else {}, self.robot.now))
+                case [str() as name, list() as values, int() | float() as now]:
+                    self.child.send((*self._answer(name, values, now), self.robot.now))
                 case _:
                     raise ProtocolError("a request is malformed")
             overrun += self.ledger.limit is not None
@@ -101,7 +89,7 @@ class SkillProtocol:
         match name, values:
             case "sleep", [float(seconds)] if self.robot.is_live and 0 <= seconds < inf:
                 self.robot.sleep_until(self.robot.now + seconds)
-                return ("ok", None, True)
+                return ("ok", None)
             case "wait", _:
                 self.ledger.limit = WAITS
             case "too-long", _:
@@ -109,10 +97,6 @@ class SkillProtocol:
             case _:
                 raise ProtocolError("there is no such skill")
         return STOP
-
-    def _known(self) -> dict[str, Result]:
-        """Results of looks without argument and trace, by request, which a child need not ask for."""
-        return {request: self.robot.perform(name, ()) for request, name in self._glances}
 
     def _ended(self, final: dict[str, object]) -> Outcome:
         if final.get("end") == "again" and self.ledger.limit is None and not self._may_import:
@@ -127,15 +111,17 @@ class SkillProtocol:
 
 
 def described(robot: SkillPerformer) -> Description:
-    """The skills of a robot for a child: name, parameters and way of calling of each."""
+    """The skills of a robot for a child: the name and the parameters of each."""
     return tuple(
-        (
-            skill.name,
-            tuple((p.name, p.type.__name__) for p in skill.parameters),
-            TELLS if skill.name in robot.never_fails else LOOKS if skill.name in robot.only_looks else ACTS,
-        )
+        (skill.name, tuple((p.name, p.type.__name__) for p in skill.parameters))
         for skill in robot.skills.rows
     )
+
+
+def settings_of(robot: SkillPerformer) -> tuple[int, float, float, bool]:
+    """What else a child is told of a run: fuel, simulated seconds, start of its clocks, whether it is live."""
+    rules = robot.rules
+    return rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), robot.is_live
 
 
 def arguments_of(skill: Skill, values: Sequence[object]) -> list[Argument]:

@@ -65,7 +65,6 @@ def test_rooms_of_a_world_keep_their_regexes_and_their_start() -> None:
     assert robot.perform("get_current_location", ()) == "hall"
     robot.perform("go_to", ["lab 2"])
     assert robot.room == "lab [12]"
-    assert robot.surely == (("go_to", "hall"),)
 
 
 def test_guessed_rooms_are_plain_texts_and_any_other_is_found_too() -> None:
@@ -130,11 +129,8 @@ def test_a_thing_is_nobody() -> None:
     assert {look(robot, "person") for robot in robots if look(robot, "body")} == {True, False}
 
 
-def test_looking_changes_nothing_so_that_a_program_need_not_wait_for_it() -> None:
-    robot = robot_in()
-    assert robot.only_looks == {"is_in_room", "get_all_rooms", "get_current_location"}
-    assert robot.never_fails == {"say"}
-    assert robot.surely == tuple(("go_to", room) for room in ROOMS.rooms)
+def test_looking_and_speaking_leave_the_robot_as_it_is() -> None:
+    assert robot_in().idle_skills == {"is_in_room", "get_all_rooms", "get_current_location", "say"}
 
 
 def test_an_object_picked_up_is_gone_and_put_down_is_there() -> None:

@@ -28,10 +28,6 @@ PROGRAM = "<program>"  # the file that a program's code says it comes from
 # Names of the functions that programs call without knowing; no source text can spell them.
 FUEL, CAUGHT, ENTRY, ENTER, BY_NAME = "<fuel>", "<caught>", "<entry>", "<enter>", "<by-name>"
 
-# How a skill is called: waiting for its result; not waiting, since there is none and it cannot fail; and
-# waiting only until the result is known, which then stays the same until the robot acts.
-ACTS, TELLS, LOOKS = 0, 1, 2
-
 ONLY_TIME = -1  # in a transcript, in the place of a call where only the clock is told
 
 # First byte of the preparer's answer: before code, before that of a tame program, before code that imports

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Functions below look here for `len` and the like, and not where a program can write.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
 
-TOO_LONG = '["too-long",[],0.0,1]'
+TOO_LONG = '["too-long",[],0.0]'
 
 
 def send(text: str) -> None:

@@ -11,7 +11,7 @@ from marshal import loads
 from sys import _getframe as getframe
 from sys import setrecursionlimit
 
-from codebotler.simulator.sandbox import ACTS, BY_NAME, CAUGHT, ENTER, ENTRY, FUEL, LOOKS, PROGRAM, TELLS
+from codebotler.simulator.sandbox import BY_NAME, CAUGHT, ENTER, ENTRY, FUEL, PROGRAM
 from codebotler.simulator.sandbox.channel import receive, send
 
 TYPE_CHECKING = False
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, TypeAlias
 
-    Skills: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...], int], ...]
-    Limits: TypeAlias = tuple[int, float, int, int, int, float, bool]
+    Skills: TypeAlias = tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
+    Settings: TypeAlias = tuple[int, float, float, bool]  # fuel, seconds, when clocks start, is live
 
 # Functions below look here for `len` and the like, and not where a program can write.
 __builtins__ = dict(vars(builtins))  # type: ignore[assignment]  # a dict will do as well as a module
@@ -39,37 +39,28 @@ class ProgramRun:
     recursion_limit = RECURSION_LIMIT
 
     def __init__(self) -> None:
-        self.skills: Skills = ()  # name, parameters (name, and type `str` or `list`) and way of calling
+        self.skills: Skills = ()  # name, and parameters: name, and type `str` or `list`
         self.now = 0.0
         self.spent = self.entered = False
         self.codes: set[types.CodeType] = set()
-        self.fuel = self.calls = self.longest = self.room = 0  # longest text, and all texts, in characters
+        self.fuel = 0
         self.start = self.seconds = 0.0
         self.is_live = False  # whether time passes by itself
-        self.sure: tuple[str, ...] = ()  # requests that succeed and return nothing, whenever they are made
-        self.known: dict[str, Any] = {}  # what looking shows now, by request
         self.namespace = types.ModuleType("__main__")
         vars(builtins).update(self.counters())
 
     def provide(self, skills: Skills) -> None:
         """Give the program what it can use without an import: the skills, and `sys` and `time`."""
         names = vars(self.namespace)
-        for name, _, _ in self.skills:
+        for name, _ in self.skills:
             del names[name]
         self.skills = skills
-        names.update((name, self.skill(name, parameters, way)) for name, parameters, way in skills)
+        names.update((name, self.skill(name, parameters)) for name, parameters in skills)
         names.update(sys=sys, time=sys.modules["time"], __builtins__=builtins)
 
-    def execute(
-        self,
-        code: bytes | types.CodeType,
-        limits: Limits,
-        sure: tuple[str, ...],
-        known: dict[str, Any],
-    ) -> str:
+    def execute(self, code: bytes | types.CodeType, settings: Settings) -> str:
         """Run the program, marshalled or not, to its end; how it ended, as JSON."""
-        self.fuel, self.seconds, self.calls, self.longest, self.room, self.start, self.is_live = limits
-        self.sure, self.known = sure, known
+        self.fuel, self.seconds, self.start, self.is_live = settings
         names = vars(self.namespace)
         sys.modules["__main__"] = self.namespace
         try:
@@ -89,7 +80,6 @@ class ProgramRun:
         self.now = 0.0
         self.spent = self.entered = False
         self.codes.clear()
-        self.known = {}
         RAISED.clear()
         self.refuel()
         provided = vars(self.namespace)
@@ -170,7 +160,7 @@ class ProgramRun:
         """Count fuel from the start."""
         self.count = itertools.count(1).__next__
 
-    def skill(self, name: str, parameters: tuple[tuple[str, str], ...], way: int) -> object:
+    def skill(self, name: str, parameters: tuple[tuple[str, str], ...]) -> object:
         """The function that a program calls for a skill."""
         names = ", ".join(parameter for parameter, _ in parameters)
         arguments = "".join(f"{parameter}, " for parameter, _ in parameters)
@@ -178,7 +168,7 @@ class ProgramRun:
             (name, list if kind == "list" else str) for name, kind in parameters
         ]
         scope = {
-            "perform": lambda *values: self.perform(name, types_, way, values),
+            "perform": lambda *values: self.perform(name, types_, values),
             "limit": setrecursionlimit,
         }
         exec(  # noqa: S102 - of trusted text
@@ -190,9 +180,7 @@ class ProgramRun:
         )
         return scope[name]
 
-    def perform(
-        self, name: str, parameters: list[tuple[str, type]], way: int, values: tuple[Any, ...]
-    ) -> Any:  # noqa: ANN401 - what a skill returns
+    def perform(self, name: str, parameters: list[tuple[str, type]], values: tuple[Any, ...]) -> Any:  # noqa: ANN401 - what a skill returns
         """Carry out a skill; texts must be `str` and options a `list`, exactly."""
         for (parameter, kind), value in zip(parameters, values, strict=True):
             given: type = type(value)
@@ -202,31 +190,16 @@ class ProgramRun:
         if self.spent:
             raise LimitReachedError
         arguments = [value.copy() if type(value) is list else value for value in values]
-        result = self.carry_out(name, arguments, way)
+        result = self.carry_out(name, arguments)
         for options in arguments:
             if type(options) is list and options and type(result) is int:
                 return options[result]  # the very object that the program gave
         return result
 
-    def carry_out(self, name: str, arguments: list[Any], way: int) -> Any:  # noqa: ANN401 - what a skill returns
-        """Ask the engine for a skill, and wait for the answer only where it is not known before."""
+    def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
+        """Ask the engine for a skill."""
         given = [options_text(value) if type(value) is list else quoted(value) for value in arguments]
-        request = f"{quoted(name)},[{','.join(given)}]"
-        self.calls -= 1
-        self.room -= len(request)
-        if way == ACTS:
-            self.known.clear()
-        if self.calls >= 0 and self.room > 0 and len(request) <= self.longest:
-            if way == TELLS or (way == ACTS and request in self.sure):
-                return self.tell(request)
-            if request in self.known:
-                self.tell(request)
-                known = self.known[request]
-                return known.copy() if type(known) is list else known
-        result = self.request(request)
-        if way == LOOKS:
-            self.known[request] = result.copy() if type(result) is list else result
-        return result
+        return self.request(f"{quoted(name)},[{','.join(given)}]")
 
     def sleep(self, seconds: object, /) -> None:
         """Let time pass; the engine learns of simulated time with the next request, or when it is up."""
@@ -245,17 +218,12 @@ class ProgramRun:
         """End the run: a program is alone, so that nothing can come that it waits for."""
         self.request('"wait",[]')
 
-    def tell(self, request: str) -> None:
-        """Send one request that needs no reply."""
-        send(f"[{request},{self.now!r},0]")
-
     def request(self, request: str) -> Any:  # noqa: ANN401 - what a skill returns
         """Send one request, and wait for its reply."""
         if self.spent:
             raise LimitReachedError
-        send(f"[{request},{self.now!r},1]")
-        kind, value, known, self.now = receive()
-        self.known.update(known)
+        send(f"[{request},{self.now!r}]")
+        kind, value, self.now = receive()
         if self.is_live:
             self.refuel()
         if kind == "ok":

@@ -154,10 +154,10 @@ def isolate(line: int, seccomp: Filter | None, seconds: int, parent: bytes) -> N
 
 def execute(run: ProgramRun) -> None:
     """Run the program that the engine sends, and report how it ended."""
-    code, skills, limits, sure, known = receive()
+    code, skills, settings = receive()
     if skills != run.skills:
         run.provide(skills)
-    send(run.execute(code, limits, sure, known))
+    send(run.execute(code, settings))
 
 
 def report(number: int) -> None:

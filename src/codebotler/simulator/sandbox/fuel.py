@@ -11,6 +11,7 @@ from codebotler.simulator.sandbox.tame import is_tame
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import Any
 
 TASK = "task_program"
@@ -108,26 +109,49 @@ def lower_literals(nodes: dict[type[ast.AST], list[Any]]) -> None:
 
 def use_fuel(nodes: dict[type[ast.AST], list[Any]]) -> None:
     """Use fuel at the head of whatever is run again."""
-    for kind in (ast.FunctionDef, ast.AsyncFunctionDef):
+    for kind, insert in INSERTS.items():
         for node in nodes.get(kind, ()):
-            insert_head(node, ENTRY)
-    for kind, name in ((ast.For, FUEL), (ast.AsyncFor, FUEL), (ast.While, FUEL), (ast.ExceptHandler, CAUGHT)):
-        for node in nodes.get(kind, ()):
-            node.body.insert(0, call(name, node.body[0]))
-    for kind in (ast.Try, ast.TryStar):
-        for node in nodes.get(kind, ()):
-            if node.finalbody:
-                node.finalbody.insert(0, call(CAUGHT, node.finalbody[0]))
-    for node in nodes.get(ast.Lambda, ()):
-        spend = call(ENTRY, node.body).value
-        node.body = ast.copy_location(ast.BoolOp(ast.Or(), [spend, node.body]), node.body)
-    for node in nodes.get(ast.comprehension, ()):
-        spend = call(FUEL, node.iter).value
-        node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), spend), node.iter))
-    for node in nodes.get(ast.Call, ()):
-        if isinstance(node.func, ast.Name) and node.func.id == TASK:
-            start = call(BY_NAME, node.func).value
-            node.func = ast.copy_location(ast.BoolOp(ast.Or(), [start, node.func]), node.func)
+            insert(node)
+
+
+def in_loop(node: ast.For | ast.AsyncFor | ast.While) -> None:
+    """Use fuel in each turn of a loop."""
+    node.body.insert(0, call(FUEL, node.body[0]))
+
+
+def in_handler(node: ast.ExceptHandler) -> None:
+    """Use fuel where something is caught."""
+    node.body.insert(0, call(CAUGHT, node.body[0]))
+
+
+def in_finally(node: ast.Try | ast.TryStar) -> None:
+    """Use fuel where something may have been raised."""
+    if node.finalbody:
+        node.finalbody.insert(0, call(CAUGHT, node.finalbody[0]))
+
+
+def in_function(node: ast.FunctionDef | ast.AsyncFunctionDef) -> None:
+    """Use fuel when a function is entered."""
+    insert_head(node, ENTRY)
+
+
+def in_lambda(node: ast.Lambda) -> None:
+    """Use fuel when a lambda is entered."""
+    spend = call(ENTRY, node.body).value
+    node.body = ast.copy_location(ast.BoolOp(ast.Or(), [spend, node.body]), node.body)
+
+
+def in_comprehension(node: ast.comprehension) -> None:
+    """Use fuel in each turn of a comprehension."""
+    spend = call(FUEL, node.iter).value
+    node.ifs.insert(0, ast.copy_location(ast.UnaryOp(ast.Not(), spend), node.iter))
+
+
+def at_start(node: ast.Call) -> None:
+    """Note that the task is called by its name."""
+    if isinstance(node.func, ast.Name) and node.func.id == TASK:
+        start = call(BY_NAME, node.func).value
+        node.func = ast.copy_location(ast.BoolOp(ast.Or(), [start, node.func]), node.func)
 
 
 def note_entries(statement: ast.stmt) -> None:
@@ -154,3 +178,14 @@ def call(name: str, where: ast.AST) -> ast.Expr:
     """The statement `name()`, with the line of another node."""
     function = ast.copy_location(ast.Name(name, ast.Load()), where)
     return ast.copy_location(ast.Expr(ast.copy_location(ast.Call(function, [], []), where)), where)
+
+
+INSERTS: dict[type[ast.AST], Callable[[Any], None]] = {
+    **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef), in_function),
+    **dict.fromkeys((ast.For, ast.AsyncFor, ast.While), in_loop),
+    ast.ExceptHandler: in_handler,
+    **dict.fromkeys((ast.Try, ast.TryStar), in_finally),
+    ast.Lambda: in_lambda,
+    ast.comprehension: in_comprehension,
+    ast.Call: at_start,
+}
