@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 
 
-@dataclass(frozen=True)
-class Option:
+class Option(NamedTuple):
     """One choice offered with a question.
 
     Args:
@@ -24,7 +23,7 @@ class Option:
     is_text: bool = True
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Event:
     """One executed skill.
 
@@ -45,6 +44,20 @@ class Event:
     found: bool | None = None
     place: str = field(default="", compare=False)
     time: float = field(default=0.0, compare=False)
+
+    def __init__(  # noqa: PLR0917 - as the generated one would have it
+        self,
+        kind: str,
+        text: str,
+        options: tuple[Option, ...] = (),
+        answer: str | None = None,
+        found: bool | None = None,  # noqa: FBT001 - the same
+        place: str = "",
+        time: float = 0.0,
+    ) -> None:
+        values = self.__dict__  # by far the quickest way to fill what is frozen, and a trace has many events
+        values["kind"], values["text"], values["options"] = kind, text, options
+        values["answer"], values["found"], values["place"], values["time"] = answer, found, place, time
 
 
 Trace: TypeAlias = tuple[Event, ...]

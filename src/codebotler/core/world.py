@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TypeAlias
 
 from codebotler.core.words import counted
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from pathlib import Path
 
 warnings.filterwarnings("ignore", "Possible (nested )?set", FutureWarning)  # odd regexes, which still work
 

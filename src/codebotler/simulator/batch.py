@@ -4,31 +4,43 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeAlias
+from functools import lru_cache
+from typing import Any, NamedTuple, TypeAlias
 
 import msgspec
 
-from codebotler.core.trace import Outcome
+from codebotler.core.skills import SkillTable
+from codebotler.core.trace import Option, Outcome
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
-from codebotler.simulator.ledger import RememberingLedger
+from codebotler.simulator.ledger import RememberingLedger, SkillAnswer
 from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
-from codebotler.simulator.sandbox import MAX_FRAME, ONLY_TIME
-from codebotler.simulator.skill_protocol import Description, arguments_of, described
+from codebotler.simulator.sandbox import MAX_FRAME
+from codebotler.simulator.skill_protocol import Description, described
 
 Programs: TypeAlias = Sequence[
     tuple[bytes, Sequence[SimulatedRobot]]
 ]  # code of each, and a robot for each run
 
 
+class Call(NamedTuple):
+    """A skill that a program called, and how it was answered."""
+
+    skill: str
+    arguments: tuple[str | tuple[Option, ...], ...]
+    kind: str  # of the answer; `ask` where only the engine can give it, `time` where only time went by
+    value: Any
+
+
 class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     """What a child says of a run: what the program asked of its robot, and how it ended."""
 
-    calls: list[tuple[str, list[Any], str, Any]]  # different ones: skill, arguments, kind of answer, answer
-    order: list[int]  # of each call that was made, its place in `calls`
+    calls: list[Call]
+    order: list[int] | None  # of each call that was made, its place in `calls`; None where each is made once
     moments: list[tuple[int, float]]  # from which call on the program's clock shows what
     end: dict[str, Any] | None  # None where the child waits for the answer to the last call
 
 
+ONLY_TIME: SkillAnswer = ("time", None)
 DECODER = msgspec.json.Decoder(Transcript | None)
 
 
@@ -80,33 +92,44 @@ class Replay:
 
     def __init__(self, robot: SimulatedRobot) -> None:
         self.robot, self.ledger = robot, RememberingLedger(robot)
+        self._signatures = signatures(robot.skills)
 
-    def follow(self, transcript: Transcript) -> tuple[str, object]:
+    def follow(self, transcript: Transcript) -> SkillAnswer:
         """Perform what was asked and return the last answer; a ProtocolError where one is not as was said."""
-        calls = [self._performed(call) for call in transcript.calls]
+        calls = [self._expected(call) for call in transcript.calls]
+        order = range(len(calls)) if transcript.order is None else transcript.order
         ledger, now = self.ledger, self.robot.now
-        moments = iter((*transcript.moments, (len(transcript.order), now)))
+        moments = iter((*transcript.moments, (len(order), now)))
         changes, later = next(moments)
-        told: tuple[str, object] = ("ok", None)
-        for number, place in enumerate(transcript.order):
+        told: SkillAnswer = ("ok", None)
+        for number, place in enumerate(order):
             if ledger.limit is not None:
                 raise ProtocolError("the program goes on beyond a limit")
             if number == changes:
                 ledger.let_time_pass(later)
                 changes, later = next(moments)
-            if place == ONLY_TIME:
+            skill, arguments, expected = calls[place]
+            if expected == ONLY_TIME:
                 continue
-            name, arguments, expected = calls[place]
-            told = kind, value = ledger.perform(name, arguments)
-            if expected is not None and expected != (kind, value[1:] if kind == "error" else value):
+            told = ledger.perform(skill, arguments)
+            if expected is not None and expected != (told if told[0] != "error" else ("error", told[1][1:])):
                 raise ProtocolError("the robot answers otherwise")
         return told
 
-    def _performed(
-        self, call: tuple[str, list[Any], str, Any]
-    ) -> tuple[str, list[Argument], tuple[str, object] | None]:
-        name, values, kind, value = call
-        if name not in self.robot.skills:
-            raise ProtocolError("there is no such skill")
-        expected = None if kind == "ask" else (kind, tuple(value) if kind == "error" else value)
-        return name, arguments_of(self.robot.skills[name], values), expected
+    def _expected(self, call: Call) -> tuple[str, Sequence[Argument], SkillAnswer | None]:
+        """A call with the answer that it should have, if that is known."""
+        if call.kind == "time":
+            return "", (), ONLY_TIME
+        signature = self._signatures.get(call.skill)
+        if signature is None or tuple(map(type, call.arguments)) != signature:
+            raise ProtocolError("there is no such skill, or it has other parameters")
+        value = tuple(call.value) if call.kind == "error" else call.value
+        return call.skill, call.arguments, None if call.kind == "ask" else (call.kind, value)
+
+
+@lru_cache(maxsize=16)
+def signatures(skills: SkillTable) -> dict[str, tuple[type, ...]]:
+    """The types of the arguments of each skill; options are a tuple here."""
+    return {
+        skill.name: tuple(str if p.type is str else tuple for p in skill.parameters) for skill in skills.rows
+    }

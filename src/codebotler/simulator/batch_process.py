@@ -8,17 +8,18 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from _socket import socket
+from collections.abc import Callable, Sequence
 from marshal import loads
 from pickle import loads as unpickled
-from socket import socket
 from types import CodeType, ModuleType
 from typing import Any, NoReturn
 
 from codebotler.core.trace import Option
-from codebotler.simulator.ledger import STOP, RememberingLedger
+from codebotler.simulator.ledger import RememberingLedger
 from codebotler.simulator.robot import Argument, SimulatedRobot
-from codebotler.simulator.sandbox import CPU_SECONDS, MAX_FRAME, ONLY_TIME
+from codebotler.simulator.sampled_robot import SampledRobot
+from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, MAX_FRAME
 from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
@@ -35,6 +36,7 @@ __all__ = ["get_ready", "serve"]
 
 # In a process of its own, a program may call itself far deeper; what is too deep here is run again there.
 RECURSION_LIMIT = 400
+FEW = 50  # calls that are written one by one, also where some are equal
 LONGEST_CALL = 50_000  # characters of what a skill is given; as one frame, more might be too long
 ODD = b"null"  # in the place of a transcript that a process of its own must decide
 
@@ -52,7 +54,7 @@ def get_ready(
     seccomp = usable_filter()
     for _ in range(lessons):
         transcripts(run, rehearsal)
-    return door, run, execute, seccomp, CPU_SECONDS
+    return door, run, execute, seccomp, BATCH_CPU_SECONDS
 
 
 def receive_setup(door: socket) -> bytes:
@@ -102,9 +104,9 @@ class TranscribedRun(ProgramRun):
         self.provided = {name: self.skill(name, parameters) for name, parameters in skills}
         self.provided.update(time=sys.modules["time"], __builtins__=self.builtins)
 
-    def transcript(self, code: CodeType, kind: type[SimulatedRobot], arguments: tuple[Any, ...]) -> bytes:
+    def transcript(self, code: CodeType, kind: str, arguments: tuple[Any, ...]) -> bytes:
         """Run a program with a robot, and return the transcript."""
-        self._begin(kind(*arguments))
+        self._begin(ROBOTS[kind](*arguments))
         rules = self.ledger.robot.rules
         sys.setrecursionlimit(RECURSION_LIMIT)
         settings = (rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), False)
@@ -124,45 +126,44 @@ class TranscribedRun(ProgramRun):
         self._forget_calls()
 
     def _forget_calls(self) -> None:
-        self._numbers: dict[tuple[object, ...], int] = {}
-        self._calls: list[tuple[object, ...]] = []
-        self._order: list[int] = []
+        self._calls: list[tuple[str, Sequence[Argument], str, Any]] = []
         self._moments: list[tuple[int, float]] = []
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the copy of the robot execute a skill."""
-        given = [tuple(map(option, value)) if type(value) is list else value for value in arguments]
         try:
-            self.ledger.let_time_pass(self.now)
-            if self.ledger.limit is not None:
-                self._stop()
-            self._expect_short(given)
+            given = [options(value) if type(value) is list else short(value) for value in arguments]
+            if self.now != self._told:
+                self._let_time_pass()
             if name in self.elsewhere:
                 return self._ask_engine(name, given)
-            answer = self.ledger.perform(name, given)
+            kind, value = self.ledger.perform(name, given)
         except BaseException:  # nothing that a program does, unless it has reached a limit
             self.is_odd = self.is_odd or not self.spent
             raise
-        kind, value = answer
         if kind == "error":
-            self._note(name, given, kind, value[1:])
+            self._calls.append((name, given, kind, value[1:]))
             raise robot_error(*value)
-        self._note(name, given, kind, value)
-        if answer is STOP:
-            self._stop(is_noted=True)
+        self._calls.append((name, given, kind, value))
+        if kind == "stop":
+            self.spent = True
+            raise LimitReachedError
         return value.copy() if type(value) is list else value
 
-    def _expect_short(self, given: list[Argument]) -> None:
-        texts = [
-            text for each in given for text in ([each] if isinstance(each, str) else (o.text for o in each))
-        ]
-        if sum(map(len, texts)) > LONGEST_CALL:
-            raise MemoryError
+    def _let_time_pass(self) -> None:
+        """Tell the ledger what the program's clock shows, and end the run when its time is up."""
+        self._told = self.now
+        self._moments.append((len(self._calls), float(self.now)))
+        self.ledger.let_time_pass(self.now)
+        if self.ledger.limit is not None:
+            self._calls.append(("", (), "time", None))
+            self.spent = True
+            raise LimitReachedError
 
     def request(self, request: str) -> NoReturn:  # noqa: ARG002 - as in ProgramRun
         """End the run, since its time is up."""
-        self.ledger.let_time_pass(self.now)
-        self._stop()
+        self._let_time_pass()
+        raise LimitReachedError
 
     def catcher(self, use_fuel: Callable[[], None]) -> Callable[[], None]:
         """Notice where a program has caught what depends on the process that it runs in."""
@@ -184,35 +185,13 @@ class TranscribedRun(ProgramRun):
         self.is_odd = self.is_odd or isinstance(error, RecursionError | MemoryError)
         return super().ended_by(error)
 
-    def _stop(self, *, is_noted: bool = False) -> NoReturn:
-        if not is_noted:
-            self._note_time()
-            self._order.append(ONLY_TIME)
-        self.spent = True
-        raise LimitReachedError
-
-    def _note(self, name: str, given: list[Argument], kind: str, value: object) -> None:
-        """Write down a call and how it was answered."""
-        self._note_time()
-        key = (name, *given, kind, tuple(value) if type(value) is list else value)
-        number = self._numbers.get(key)
-        if number is None:
-            number = self._numbers[key] = len(self._calls)
-            self._calls.append((name, [data_of(each) for each in given], kind, value))
-        self._order.append(number)
-
-    def _note_time(self) -> None:
-        if self.now != self._told:
-            self._told = self.now
-            self._moments.append((len(self._order), float(self.now)))
-
     def _written(self, end: str) -> bytes:
-        calls = encoded([self._calls, self._order, self._moments])
-        return f"[{calls[1:-1]},{end}]".encode("ascii")
+        calls, order = (self._calls, None) if len(self._calls) <= FEW else distinct(self._calls)
+        return f"[{encoded([calls, order, self._moments])[1:-1]},{end}]".encode("ascii")
 
     def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the engine's robot execute a skill, once it has done all that was asked of it before."""
-        self._note(name, given, "ask", None)
+        self._calls.append((name, given, "ask", None))
         send_frames([self._written("null")])
         self._forget_calls()
         kind, value = receive()
@@ -229,14 +208,35 @@ def the_clock(*_: object) -> ModuleType:
     return sys.modules["time"]
 
 
-def option(value: object) -> Option:
-    """An option as the robot takes it."""
-    return Option(str(value), isinstance(value, str))
+def short(text: str) -> str:
+    """A text that a skill is given, which as one frame must not be too long."""
+    if len(text) > LONGEST_CALL:
+        raise MemoryError
+    return text
 
 
-def data_of(argument: Argument) -> object:
-    """An argument as JSON has it."""
-    return argument if isinstance(argument, str) else [(each.text, each.is_text) for each in argument]
+def options(values: list[object]) -> tuple[Option, ...]:
+    """Options as the robot takes them."""
+    given = tuple([Option(str(value), isinstance(value, str)) for value in values])
+    if sum([len(text) for text, _ in given]) > LONGEST_CALL:
+        raise MemoryError
+    return given
 
 
+def distinct(calls: list[tuple[str, Sequence[Argument], str, Any]]) -> tuple[list[object], list[int]]:
+    """Different calls, and the place among these of each call."""
+    places: dict[object, int] = {}
+    different: list[object] = []
+    order = []
+    for call in calls:
+        name, given, kind, value = call
+        key = (name, *given, kind, tuple(value) if type(value) is list else value)
+        if key not in places:
+            places[key] = len(different)
+            different.append(call)
+        order.append(places[key])
+    return different, order
+
+
+ROBOTS: dict[str, type[SimulatedRobot]] = {"simulated": SimulatedRobot, "sampled": SampledRobot}
 encoded = json.JSONEncoder(separators=(",", ":")).encode

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from _blake2 import blake2b  # of `hashlib`, which would bring OpenSSL into every child
 from dataclasses import dataclass
-from hashlib import blake2b
 from typing import Any, Literal
 
 EIGHTS = 8

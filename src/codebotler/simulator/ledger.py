@@ -99,9 +99,13 @@ class Ledger:
     def _spend(self, arguments: Sequence[Argument]) -> None:
         limits, longest = self.limits, 0
         for argument in arguments:
-            texts = (argument,) if isinstance(argument, str) else [option.text for option in argument]
-            longest = max(longest, *map(len, texts), 0)
-            self.text += sum(map(len, texts)) + OPTION_OVERHEAD * (len(texts) - 1)
+            if isinstance(argument, str):
+                size = largest = len(argument)
+            else:
+                sizes = [len(text) for text, _ in argument]
+                size, largest = sum(sizes) + OPTION_OVERHEAD * (len(sizes) - 1), max(sizes, default=0)
+            self.text += size
+            longest = max(longest, largest)
         self.calls += 1
         if self.calls > limits.calls:
             self.limit = f"{limits.calls:,} skill calls"

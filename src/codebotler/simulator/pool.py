@@ -26,7 +26,7 @@ ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
 
 IN_MEMORY = 8_000_000  # bytes of results
 UNREADABLE = b""  # in the place of a key that could not be read
-LARGEST = 16  # keys of a call
+LARGEST = 32  # keys of a call
 AHEAD = 2  # calls for each thread that are under way, so that none waits
 MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 

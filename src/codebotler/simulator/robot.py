@@ -34,7 +34,7 @@ class RobotError(Exception):
 Argument: TypeAlias = str | tuple[Option, ...]
 Result: TypeAlias = str | list[str] | bool | int | None
 Behaviour: TypeAlias = Callable[..., Result]
-Setup: TypeAlias = "tuple[type[SimulatedRobot], tuple[Any, ...]]"  # of a copy: its class, and the arguments
+Setup: TypeAlias = tuple[str, tuple[Any, ...]]  # of a copy: `simulated` or `sampled`, and the arguments
 
 
 @dataclass
@@ -92,8 +92,9 @@ class SimulatedRobot:
     ) -> None:
         self.rules, self.skills = rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
-        self.setup: Setup = (SimulatedRobot, (world, rules))
-        if missing := [name for name in skills if name not in self.behaviours]:
+        self.setup: Setup = ("simulated", (world, rules))
+        missing = () if skills is SKILLS else [name for name in skills if name not in self.behaviours]
+        if missing:
             raise UserError(f'the skill "{missing[0]}" has no behaviour: say in `behaviours` what it does')
         self.rooms = tuple(room.name for room in world.rooms)
         self.room = world.robot
@@ -117,9 +118,13 @@ class SimulatedRobot:
     @property
     def idle_skills(self) -> frozenset[str]:
         """The skills that leave the robot and its world as they are, however often they are executed."""
-        comes = any(somebody.looks_before for here in self.people.values() for somebody in here)
-        idle = IDLE - {is_in_room} if comes else IDLE
-        return frozenset(name for name, does in self.behaviours.items() if does in idle)
+        if any(somebody.looks_before for here in self.people.values() for somebody in here):
+            return self.skills_that(IDLE - {is_in_room})
+        return IDLE_SKILLS if self.behaviours is BEHAVIOURS else self.skills_that(IDLE)
+
+    def skills_that(self, behave: frozenset[Behaviour]) -> frozenset[str]:
+        """The skills that behave in one of some ways."""
+        return frozenset(name for name, does in self.behaviours.items() if does in behave)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill; a question is answered by the position of the chosen option."""
@@ -137,13 +142,16 @@ class SimulatedRobot:
 
     def repeat(self, events: Sequence[Event]) -> None:
         """Add events that happened here before, and happen again now."""
-        self.events += [
-            event if event.time == self.now else replace(event, time=self.now) for event in events
-        ]
+        for event in events:
+            again = Event(
+                event.kind, event.text, event.options, event.answer, event.found, self.room, self.now
+            )
+            self.events.append(again)
 
     def amend(self, answer: str) -> None:
         """Add to the last event what was answered."""
-        self.events[-1] = replace(self.events[-1], answer=answer)
+        last = self.events[-1]
+        self.events[-1] = Event(last.kind, last.text, last.options, answer, last.found, last.place, last.time)
 
 
 def given_behaviours(robot: SimulatedRobot, usual: Mapping[str, Behaviour]) -> tuple[str, ...]:
@@ -216,6 +224,11 @@ def go_to(robot: SimulatedRobot, location: str) -> None:
 
 def resolve_room(rooms: Sequence[str], request: str, matching: Matching = "label-in-request") -> str | None:
     """The first room whose name is found in a request; by whole words, one of just that name before it."""
+    return _resolved(tuple(rooms), request, matching)
+
+
+@lru_cache(maxsize=65_536)
+def _resolved(rooms: tuple[str, ...], request: str, matching: Matching) -> str | None:
     if matching == "whole-words" and request in rooms:
         return request
     return next((room for room in rooms if finds(request, room, matching)), None)
@@ -266,29 +279,34 @@ def choose(answer: Answer, question: str, options: tuple[Option, ...], rules: Ru
     """
     if isinstance(answer, int):
         return max(0, len(options) + answer) if answer < 0 else min(answer, len(options)) - 1
-    direct = _first_saying((answer,), options, rules)
+    direct = _first_saying((answer,), options, rules.matching)
     if direct is not None:
         return direct
     if answer in {"yes", "no"} and rules.words_for_no:
         return _in_other_words(answer, options, rules)
-    return _first_saying(("yes" if finds(question, answer, rules.matching) else "no",), options, rules)
+    means = "yes" if finds(question, answer, rules.matching) else "no"
+    return _first_saying((means,), options, rules.matching)
 
 
 def _in_other_words(answer: str, options: tuple[Option, ...], rules: Rules) -> int | None:
     """Which option means yes or no; the only one that does not mean no means yes, whatever it says."""
     if answer == "no":
-        return _first_saying(rules.words_for_no, options, rules)
-    may_be = [n for n, option in enumerate(options) if not _says(option, ("no", *rules.words_for_no), rules)]
-    meant = [number for number in may_be if _says(options[number], rules.words_for_yes, rules)]
+        return _first_saying(rules.words_for_no, options, rules.matching)
+    no = ("no", *rules.words_for_no)
+    may_be = [n for n, option in enumerate(options) if not _says(option.text, no, rules.matching)]
+    meant = [n for n in may_be if _says(options[n].text, rules.words_for_yes, rules.matching)]
     return next(iter(meant), may_be[0] if len(may_be) == 1 else None)
 
 
-def _first_saying(words: tuple[str, ...], options: tuple[Option, ...], rules: Rules) -> int | None:
-    return next((number for number, option in enumerate(options) if _says(option, words, rules)), None)
+def _first_saying(words: tuple[str, ...], options: tuple[Option, ...], matching: Matching) -> int | None:
+    return next(
+        (number for number, option in enumerate(options) if _says(option.text, words, matching)), None
+    )
 
 
-def _says(option: Option, words: tuple[str, ...], rules: Rules) -> bool:
-    return any(finds(option.text, word, rules.matching) for word in words)
+@lru_cache(maxsize=65_536)
+def _says(text: str, words: tuple[str, ...], matching: Matching) -> bool:
+    return any(finds(text, word, matching) for word in words)
 
 
 def pick(robot: SimulatedRobot, obj: str) -> None:
@@ -331,7 +349,10 @@ BEHAVIOURS: Mapping[str, Behaviour] = {
     "pick": pick,
     "place": place,
 }
-IDLE = frozenset({get_current_location, get_all_rooms, is_in_room, say})  # the robot stays as it is
+IDLE: frozenset[Behaviour] = frozenset(
+    {get_current_location, get_all_rooms, is_in_room, say}
+)  # the robot stays as it is
+IDLE_SKILLS = frozenset(does.__name__ for does in IDLE)
 
 
 def located(trace: Trace, world: World) -> Trace:

@@ -159,7 +159,7 @@ class SampledRobot(SimulatedRobot):
     ) -> None:
         does = SAMPLED if behaviours is None else behaviours
         super().__init__(World(tuple(map(Room, room_map.rooms)), room_map.start), rules, skills, does)
-        self.setup = SampledRobot, (room_map, sampler, rules)
+        self.setup = "sampled", (room_map, sampler, rules)
         self.room_map, self.sampler = room_map, sampler
         self.things = defaultdict(list)
         self.people = defaultdict(list)  # of nobody whom a world file would name
@@ -178,7 +178,7 @@ class SampledRobot(SimulatedRobot):
     @property
     def idle_skills(self) -> frozenset[str]:
         """The skills that leave the robot and its world as they are, once the first has drawn its facts."""
-        return frozenset(name for name, does in self.behaviours.items() if does in real.IDLE or does is look)
+        return self.skills_that(real.IDLE | {look})
 
     @property
     def here(self) -> ExploredRoom:

@@ -119,7 +119,7 @@ def described(robot: SkillPerformer) -> Description:
 
 
 def settings_of(robot: SkillPerformer) -> tuple[int, float, float, bool]:
-    """What else a child is told of a run: fuel, simulated seconds, start of its clocks, whether it is live."""
+    """What else a child is told of a run: fuel, simulated seconds, start of its clocks, if it is live."""
     rules = robot.rules
     return rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), robot.is_live
 

@@ -20,6 +20,7 @@ WITHOUT_REFERENCES = 2  # of marshal's formats: later ones depend on what else t
 
 MEMORY = 512 * 1024 * 1024  # bytes of address space of an isolated process
 CPU_SECONDS = 5  # of processor time, against what fuel cannot see, such as one long call into C
+BATCH_CPU_SECONDS = 2  # the same of a batch; what is under way then runs again in a process of its own
 LIVE_CPU_SECONDS = 3600  # the same on a robot, where a run may take all day and somebody watches it
 MAX_CODE = 10_000_000  # bytes of a program's compiled code
 
@@ -27,8 +28,6 @@ PROGRAM = "<program>"  # the file that a program's code says it comes from
 
 # Names of the functions that programs call without knowing; no source text can spell them.
 FUEL, CAUGHT, ENTRY, ENTER, BY_NAME = "<fuel>", "<caught>", "<entry>", "<enter>", "<by-name>"
-
-ONLY_TIME = -1  # in a transcript, in the place of a call where only the clock is told
 
 # First byte of the preparer's answer: before code, before that of a tame program, before code that imports
 # more than is always there, and before the reason why there is no code.

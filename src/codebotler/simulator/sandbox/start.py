@@ -22,7 +22,7 @@ def main(module: str, role: str, descriptors: list[str]) -> None:
     """Start the interpreter again if there are descriptors, then take on a role, which a module knows."""
     if descriptors:
         start_again(list(map(int, descriptors)))
-    if role != "preparer":  # bytecode, there in one start and not in the next, would move the heap
+    if role not in ("preparer", "batch-fork-server"):  # bytecode, now there and now not, would move the heap
         sys.pycache_prefix = os.devnull
     sys.meta_path.insert(0, CompiledModules(loads(os.pread(CODES, os.fstat(CODES).st_size, 0))))  # noqa: S302 - from the engine
     os.close(CODES)
