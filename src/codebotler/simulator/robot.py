@@ -93,7 +93,8 @@ class SimulatedRobot:
         self.rules, self.skills = rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
         self.setup: Setup = ("simulated", (world, rules))
-        missing = () if skills is SKILLS else [name for name in skills if name not in self.behaviours]
+        is_usual = skills is SKILLS and behaviours is None
+        missing = () if is_usual else [name for name in skills if name not in self.behaviours]
         if missing:
             raise UserError(f'the skill "{missing[0]}" has no behaviour: say in `behaviours` what it does')
         self.rooms = tuple(room.name for room in world.rooms)
