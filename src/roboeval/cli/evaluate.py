@@ -14,6 +14,7 @@ from roboeval.cli.options import (
     EngineOption,
     IsolationOption,
     JsonOption,
+    ProcessOption,
     SuiteOption,
     TasksOption,
     WorkersOption,
@@ -53,6 +54,7 @@ def evaluate(
     ] = None,
     engine: EngineOption = "local",
     require_isolation: IsolationOption = False,
+    one_process_per_run: ProcessOption = False,
     json: JsonOption = False,
 ) -> None:
     """Judge whether each completion does what was asked."""
@@ -62,7 +64,9 @@ def evaluate(
     from roboeval.evaluation.runs.results import Scope
     from roboeval.evaluation.runs.table import TableBuilder
 
-    running = engine_named(engine, workers, require_isolation=require_isolation)
+    running = engine_named(
+        engine, workers, require_isolation=require_isolation, one_process_per_run=one_process_per_run
+    )
     judged_by = load(suite)
     if worlds is not None or seed is not None:
         judged_by = judged_by.with_worlds(worlds, seed)

@@ -93,6 +93,9 @@ WorkersOption = Annotated[
 IsolationOption = Annotated[
     bool, typer.Option("--require-isolation", help="Refuse to run programs without full isolation.")
 ]
+ProcessOption = Annotated[
+    bool, typer.Option("--one-process-per-run", help="Let no two runs share a process, which takes longer.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
     Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
@@ -239,14 +242,14 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def engine_named(name: str, workers: int | None, *, require_isolation: bool = False) -> OpenEngine:
-    """The engine with this name."""
+def engine_named(name: str, workers: int | None, **isolation: bool) -> OpenEngine:
+    """The engine with this name, which isolates programs as `WorkerPool` does."""
     from roboeval.evaluation.engines import Local
 
     if name == "local":
-        return Local(workers or cores(), require_isolation=require_isolation)
+        return Local(workers or cores(), **isolation)
     if name != "ray":
         fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
-    return RayCluster(workers, require_isolation=require_isolation)
+    return RayCluster(workers, **isolation)

@@ -38,14 +38,12 @@ OpenEngine = AbstractContextManager[Engine]
 class Local:
     """The cores of this machine: given pool, or some of its own, which end with the context."""
 
-    def __init__(self, pool: WorkerPool | int, *, require_isolation: bool = False) -> None:
-        self._given, self._required = pool, require_isolation
+    def __init__(self, pool: WorkerPool | int, **isolation: bool) -> None:  # as of `WorkerPool`
+        self._given, self._isolation = pool, isolation
 
     def __enter__(self) -> Self:
         given = self._given
-        self._pool = (
-            given if isinstance(given, WorkerPool) else WorkerPool(given, require_isolation=self._required)
-        )
+        self._pool = given if isinstance(given, WorkerPool) else WorkerPool(given, **self._isolation)
         return self
 
     def __exit__(self, *_: object) -> None:

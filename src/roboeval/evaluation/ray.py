@@ -7,7 +7,7 @@ import os
 import platform
 import socket
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import islice
 from pathlib import Path
@@ -38,8 +38,8 @@ class RayCluster:
     Raises UserError if Ray is not installed, or no cluster answers at the address.
     """
 
-    def __init__(self, workers: int | None = None, *, require_isolation: bool = False) -> None:
-        self._workers, self._required = workers, require_isolation
+    def __init__(self, workers: int | None = None, **isolation: bool) -> None:  # as of `WorkerPool`
+        self._workers, self._isolation = workers, isolation
         self._warned = False
         self._address = os.environ.get("RAY_ADDRESS") or "auto"
         current = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")  # noqa: S108 - Ray's own
@@ -86,7 +86,7 @@ class RayCluster:
                     waiting.extend(name for name, _ in read)
                     new = {name: work for name, work in read if name not in done and name not in running}
                     if new:
-                        shard = remote.remote(functions, list(new.values()), VERSIONS, self._required)
+                        shard = remote.remote(functions, list(new.values()), VERSIONS, self._isolation)
                         shards[shard] = list(new)
                         running.update(new)
                         sent += len(new)
@@ -143,7 +143,7 @@ def run_shard(
     functions: tuple[RunPrograms[Ran], Callable[[Ran], Value]],
     works: Sequence[Work],
     versions: str,  # others might judge otherwise
-    require_isolation: bool,  # noqa: FBT001 - Ray passes positions
+    isolation: Mapping[str, bool],
 ) -> tuple[list[Value], str | None]:
     """The results for programs, and a warning if they are not fully isolated; in a process of Ray's."""
     machine = platform.node()
@@ -151,7 +151,7 @@ def run_shard(
         raise EngineError(f"{machine} has {VERSIONS}, and not {versions}")
     function, then = functions
     try:
-        worker = own_worker(require_isolation=require_isolation)
+        worker = own_worker(**isolation)
         values = [then(ran) for ran in function(worker, works)]
     except EngineError as error:
         raise EngineError(f"{machine}: {error}") from None
@@ -159,9 +159,9 @@ def run_shard(
 
 
 @cache
-def own_worker(*, require_isolation: bool) -> Worker:
+def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
     """The worker of this process, kept for the next shard."""
-    worker = Worker()
+    worker = Worker(one_process_per_run=one_process_per_run)
     if require_isolation and not worker.has_seccomp:
         worker.close()
         raise EngineError(NO_SECCOMP)

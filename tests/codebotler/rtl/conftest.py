@@ -100,7 +100,7 @@ def strange_formulas() -> SearchStrategy[rtl.Formula]:
 @pytest.fixture(scope="session")
 def traces() -> SearchStrategy[Trace]:
     """Traces in which every option is text."""
-    return traces_from(st.builds(Option, NAMES, st.just(True)))
+    return traces_from(st.builds(Option, NAMES, st.just(value=True)))
 
 
 @pytest.fixture(scope="session")

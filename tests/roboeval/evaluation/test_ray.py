@@ -66,18 +66,20 @@ def numbers_of(_worker: object, works: Sequence[Work]) -> list[int]:
 def test_another_version_does_not_judge() -> None:
     functions = (lambda _, works: works, list)
     with pytest.raises(EngineError, match=r"has codebotler .*, and not codebotler 0\.0\.1"):
-        run_shard(functions, [], "codebotler 0.0.1 with Python 3.9", require_isolation=False)
+        run_shard(functions, [], "codebotler 0.0.1 with Python 3.9", {})
 
 
 def test_missing_isolation_is_warned_of_once_or_refused(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(rayengine, "Worker", lambda: SimpleNamespace(has_seccomp=False, close=lambda: None))
+    monkeypatch.setattr(
+        rayengine, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None)
+    )
     monkeypatch.setattr(rayengine, "own_worker", rayengine.own_worker.__wrapped__)
     functions, works = (numbers_of, abs), list(numbered(range(2)))
     with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
-        run_shard(functions, works, VERSIONS, require_isolation=True)
-    result = run_shard(functions, works, VERSIONS, require_isolation=False)
+        run_shard(functions, works, VERSIONS, {"require_isolation": True})
+    result = run_shard(functions, works, VERSIONS, {})
     cluster = RayCluster()
     cluster._ray = SimpleNamespace(wait=lambda shards, **_: (shards, []), get=lambda _: result)
     assert [values for _, values in cluster._ended(range(3))] == [[0, 1]] * 3
