@@ -91,6 +91,7 @@ class SkillTable(Mapping[str, Skill]):
 
     Args:
         rows: the skills; names and recorded kinds are unique.
+        recordings: the events that a trace can have, by kind; follows from the rows.
 
     Raises:
         ValueError: two rows share a name or a recorded kind.
@@ -98,6 +99,7 @@ class SkillTable(Mapping[str, Skill]):
 
     rows: tuple[Skill, ...]
     _by_name: Mapping[str, Skill] = field(init=False, repr=False, compare=False)
+    recordings: Mapping[str, Recording] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         by_name = {skill.name: skill for skill in self.rows}
@@ -105,6 +107,8 @@ class SkillTable(Mapping[str, Skill]):
         if len(by_name) != len(self.rows) or len(set(kinds)) != len(kinds):
             raise ValueError("two skills share a name or a kind of event")
         object.__setattr__(self, "_by_name", by_name)
+        recordings = {skill.recording.kind: skill.recording for skill in self.rows if skill.recording}
+        object.__setattr__(self, "recordings", recordings)
 
     def __getitem__(self, name: str) -> Skill:
         return self._by_name[name]
@@ -124,11 +128,6 @@ class SkillTable(Mapping[str, Skill]):
     def with_skill(self, skill: Skill) -> SkillTable:
         """This table and one more row."""
         return SkillTable((*self.rows, skill))
-
-    @property
-    def recordings(self) -> Mapping[str, Recording]:
-        """The events that a trace can have, by kind."""
-        return {s.recording.kind: s.recording for s in self.rows if s.recording}
 
     @property
     def verbs(self) -> Mapping[str, Verb]:

@@ -104,7 +104,8 @@ class Outcome:
 
 def trace_data(trace: Trace, skills: SkillTable = SKILLS) -> list[list[Any]]:
     """A trace as a list of `[kind, text]`, `[kind, text, found]` and `[kind, text, options, answer]`."""
-    return [_event_data(event, skills) for event in trace]
+    asking = frozenset(kind for kind, recording in skills.recordings.items() if recording.options is not None)
+    return [_event_data(event, asking) for event in trace]
 
 
 def trace_from(data: Iterable[object]) -> Trace:
@@ -123,10 +124,8 @@ def outcome_data(outcome: Outcome, skills: SkillTable = SKILLS) -> dict[str, Any
     }
 
 
-def _event_data(event: Event, skills: SkillTable) -> list[Any]:
-    recording = skills.recordings.get(event.kind)
-    asks = recording is not None and recording.options is not None
-    if asks or event.options or event.answer is not None:
+def _event_data(event: Event, asking: frozenset[str]) -> list[Any]:
+    if event.kind in asking or event.options or event.answer is not None:
         return [event.kind, event.text, [_option_data(option) for option in event.options], event.answer]
     if event.found is not None:
         return [event.kind, event.text, event.found]

@@ -11,6 +11,7 @@ from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
 
+SHORT, REMEMBERED = 200, 1_000  # characters of a text that is remembered, and how many texts
 ScopeName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
 
 
@@ -29,9 +30,21 @@ class Regex:
         """The compiled regex."""
         return compile_regex(self.pattern)
 
+    @cached_property
+    def _known(self) -> dict[str, bool]:
+        """In which short texts it is found, as far as it was asked."""
+        return {}
+
     def matches(self, text: str) -> bool:
         """Whether the regex is found in a text."""
-        return self.compiled.search(text) is not None
+        if len(text) > SHORT:
+            return self.compiled.search(text) is not None
+        known = self._known
+        if text not in known:
+            if len(known) == REMEMBERED:
+                known.clear()
+            known[text] = self.compiled.search(text) is not None
+        return known[text]
 
     def __str__(self) -> str:
         return quote(self.pattern)

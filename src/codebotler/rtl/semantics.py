@@ -77,7 +77,10 @@ def matches(element: formulas.EventPattern, trace: Trace, at: int) -> bool:
     Raises:
         Inconclusive: an option that is no text comes before the first that matches, whatever the question is.
     """
-    event = trace[at]
+    return _matches(element, trace[at], at)
+
+
+def _matches(element: formulas.EventPattern, event: Event, at: int) -> bool:
     if event.kind != element.kind:
         return False
     if element.place_regex is not None and element.place_regex.search(event.place) is None:
@@ -103,7 +106,8 @@ def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
 
 def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> Iterator[int]:
     """The positions of all events that match, each found when it is asked for."""
-    return (at for at in span if matches(element, trace, at))
+    kind = element.kind  # of most events it is another, for which no function need be called
+    return (at for at in span if (event := trace[at]).kind == kind and _matches(element, event, at))
 
 
 def first(element: formulas.EventPattern, trace: Trace, span: range) -> int | None:

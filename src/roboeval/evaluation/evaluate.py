@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from codebotler.core.errors import UserError
-from codebotler.core.files import Appender, to_line, to_text, write_whole
+from codebotler.core.files import Appender, to_text, write_whole
 from roboeval.evaluation.engines import Local, OpenEngine
-from roboeval.evaluation.judge import evaluation, head, judgements
+from roboeval.evaluation.judge import head, judgements, row_line
 from roboeval.evaluation.runs.completions import Completion, Key, name_of
 from roboeval.evaluation.runs.folder import Run, evaluation_key, load_head
 from roboeval.evaluation.runs.rows import JudgedRow, Seal, is_sealed, judged_row, read_lines_of
@@ -67,10 +67,10 @@ def _judge(
             left_out.add(completion)
             is_whole = False
             continue
-        line = to_line(evaluation(completion, judgement))
-        rows.append(line)
-        seal.add(line)
-        yield judged_row(line)
+        written = row_line(completion, judgement)
+        rows.append(written)
+        seal.add(written)
+        yield judged_row(written)
     return is_whole
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import logging
 import signal
 import threading
@@ -17,6 +18,7 @@ from msgspec import to_builtins
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
+from codebotler.core.files import to_line
 from codebotler.core.trace import Outcome, Status, Trace, outcome_data
 from codebotler.rtl import Inconclusive, holds
 from codebotler.simulator.robot import SimulatedRobot
@@ -25,7 +27,7 @@ from codebotler.simulator.worker import Worker
 from roboeval.evaluation.engines import PYTHON, Local, OpenEngine
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.runs.completions import Completion, name_of, unknown
-from roboeval.evaluation.runs.rows import Judgement, Row, bounded
+from roboeval.evaluation.runs.rows import Row, bounded
 from roboeval.suites.load import Requirement, Scenario, Suite
 
 LOG = logging.getLogger("roboeval.evaluation.judge")
@@ -92,8 +94,8 @@ def evaluate(
 
 def judgements(
     completions: Iterable[Completion], suite: Suite, *, ablated: bool, engine: OpenEngine
-) -> Iterator[tuple[Completion, Judgement | None]]:
-    """Each completion, in order, with its judgement; None, and a warning, where judging takes too long."""
+) -> Iterator[tuple[Completion, bytes | None]]:
+    """Each completion, in order, with its judgement as JSON; None, and a warning, if it takes too long."""
     waiting: deque[Completion] = deque()
 
     def works() -> Iterator[tuple[str, str]]:
@@ -140,8 +142,8 @@ def run_in_worlds(
     return [(task, outcomes) for (task, _), outcomes in zip(works, worker.run_all(jobs), strict=True)]
 
 
-def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> Judgement | None:
-    """The judgement on a program that ran in all worlds of a task; None where judging takes too long."""
+def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> bytes | None:
+    """The judgement on a program that ran in all worlds of a task, as JSON; None if it takes too long."""
     task, outcomes = ran
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
     try:
@@ -151,19 +153,25 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
         return None
 
 
-def evaluation(completion: Completion, told: Judgement) -> Row:
-    """The row of an evaluation."""
-    return {
+def evaluation(completion: Completion, told: bytes) -> Row:
+    """The row of an evaluation for a completion whose judgement is given as JSON."""
+    row: Row = json.loads(row_line(completion, told))
+    return row
+
+
+def row_line(completion: Completion, told: bytes) -> bytes:
+    """The same as a line."""
+    of_whom = {
         "task": completion.task,
         "prompt": completion.prompt,
         "index": completion.index,
         "program_sha256": completion.program_sha256,
-        **told,
     }
+    return b"%b, %b\n" % (to_line(of_whom).removesuffix(b"}\n"), told.removeprefix(b"{"))
 
 
-def judgement(verdicts: list[Verdict]) -> Judgement:
-    """The judgement on a program, as a row writes it."""
+def judgement(verdicts: list[Verdict]) -> bytes:
+    """The judgement on a program, as JSON that fits into a row."""
     why = failure(verdicts)
     return bounded(
         {

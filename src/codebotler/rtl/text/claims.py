@@ -183,7 +183,7 @@ class Claim:
         return f"{'denies' if self.denied else 'affirms'}({quote(self.pattern)})"
 
 
-@lru_cache(maxsize=64)  # several checks in a row read the same text
+@lru_cache(maxsize=1024)  # several checks read the same text, and programs say what others said
 def _polarities(text: str) -> tuple[tuple[str, Polarity], ...]:
     """The clauses of a text, each with its polarity."""
     parts = (clause for sentence in sentences(text) for clause in clauses(sentence, lists=True))

@@ -41,7 +41,7 @@ _NEAR = 30  # characters before a time, in which such a word is looked for
 _DAY = 24 * 60
 
 
-@lru_cache(maxsize=64)  # several checks in a row read the same text
+@lru_cache(maxsize=1024)  # several checks read the same text, and programs say what others said
 def times_in(text: str) -> tuple[tuple[TimeOfDay, ...], ...]:
     """The times of day in a text, each with both readings if it may be in the morning or the afternoon.
 

@@ -259,16 +259,17 @@ def is_sealed(head: Mapping[str, Any]) -> bool:
 # --- how large a row may be
 
 
-def bounded(judgement: Judgement) -> Judgement:
-    """A judgement that fits into a row: of a longer one each world has an equal share, and traces are cut."""
+def bounded(judgement: Judgement) -> bytes:
+    """A judgement as JSON that fits into a row: of a longer one each world has an equal share of it."""
+    whole = _json(judgement)
     verdicts = judgement["verdicts"]
     most = max(MOST, MOST_OF_WORLD * len(verdicts)) - NAMES
-    if not verdicts or len(to_line(judgement)) <= most:
-        return judgement
+    if not verdicts or len(whole) < most:
+        return whole
     longest_cuts = ({"events": len(verdict["trace"]), "sha256": HASH} for verdict in verdicts)
     bare = [{**verdict, "trace": [], "cut": cut} for verdict, cut in zip(verdicts, longest_cuts, strict=True)]
     share = (most - len(to_line({**judgement, "verdicts": bare}))) // len(verdicts)
-    return {**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]}
+    return _json({**judgement, "verdicts": [_within(share, verdict) for verdict in verdicts]})
 
 
 def _within(share: int, verdict: dict[str, Any]) -> dict[str, Any]:
