@@ -117,12 +117,12 @@ class ForkServer:
     def _warm_up(self) -> None:
         channel = self._ask_for_channel()
         itself = IsolatedProcess(lambda: self.pid, channel, self._process.wait, has_seccomp=False)
-        SkillProtocol(itself, WARM_UP_CODE, SimulatedRobot(WARM_UP_WORLD), may_import=True).talk()
+        SkillProtocol(itself, WARM_UP_CODE, SimulatedRobot(WARM_UP_WORLD)).talk()
         itself.hang_up()
 
     def _rehearse(self) -> None:
         """Run an empty program: by then the heap of the fork server, which programs can see, has settled."""
-        SkillProtocol(self.fork(), EMPTY, SimulatedRobot(WARM_UP_WORLD), may_import=True).outcome()
+        SkillProtocol(self.fork(), EMPTY, SimulatedRobot(WARM_UP_WORLD)).outcome()
 
     def _ask_for_channel(self) -> socket.socket:
         ours, theirs = socket.socketpair()

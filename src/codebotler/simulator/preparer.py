@@ -16,7 +16,7 @@ from codebotler.simulator.isolated_process import (
     cause_of_death,
     start,
 )
-from codebotler.simulator.sandbox import IMPORTING, MAX_CODE, PREPARER, REFUSED, TAME
+from codebotler.simulator.sandbox import MAX_CODE, PLAIN, PREPARER, REFUSED, TAME
 
 MAX_SOURCE = 5_000_000
 LONG = 100_000  # characters of a program that is prepared in a process of its own
@@ -30,7 +30,6 @@ class Prepared:
     """A program that parses."""
 
     code: bytes  # marshalled; only a child may open it
-    imports: bool  # more than is always there
     is_tame: bool  # nothing that it does can be felt by another run in the same process
 
 
@@ -96,7 +95,7 @@ class Preparer:
         process.send(asked)
         self._served += 1
         try:
-            answer = process.receive_bytes(len(IMPORTING) + MAX_CODE)
+            answer = process.receive_bytes(len(PLAIN) + MAX_CODE)
         except (TimeoutError, ProtocolError):
             answer = None
         if not answer:
@@ -109,7 +108,7 @@ class Preparer:
         process.reset_patience()
         if answer[:1] == REFUSED:
             return refused(*json.loads(answer[1:]))
-        return Prepared(answer[1:], imports=answer[:1] == IMPORTING, is_tame=answer[:1] == TAME)
+        return Prepared(answer[1:], is_tame=answer[:1] == TAME)
 
 
 def refused(kind: str, message: str, line: int | None = None) -> Outcome:

@@ -23,15 +23,9 @@ OVERRUN = 100  # requests beyond a limit, from `finally` and the like, before a 
 
 
 class SkillProtocol:
-    """One run: answers what a fresh child asks until it ends, and says how it ended.
+    """One run: answers what a fresh child asks until it ends, and says how it ended."""
 
-    Where it may import, the standard library is there, and nothing is gained by another run.
-    """
-
-    def __init__(
-        self, child: IsolatedProcess, code: bytes, robot: SkillPerformer, *, may_import: bool
-    ) -> None:
-        self._may_import = may_import
+    def __init__(self, child: IsolatedProcess, code: bytes, robot: SkillPerformer) -> None:
         self.child, self.robot, self.limits = child, robot, robot.rules.limits
         self.ledger = Ledger(robot)
         self._heard = False
@@ -57,7 +51,7 @@ class SkillProtocol:
             return self._died(self.child.ended())
         self.child.kill()
         self.child.hang_up()
-        return self._ended(final or {})
+        return self.ledger.ended(final or {})
 
     def talk(self) -> dict[str, object] | None:
         """Answer what the child asks until it says how it ended; None if it does not say so."""
@@ -97,11 +91,6 @@ class SkillProtocol:
             case _:
                 raise ProtocolError("there is no such skill")
         return STOP
-
-    def _ended(self, final: dict[str, object]) -> Outcome:
-        if final.get("end") == "again" and self.ledger.limit is None and not self._may_import:
-            raise ImportsMoreError(self.child.patience)
-        return self.ledger.ended(final)
 
     def _died(self, status: int) -> Outcome:
         if not self._heard and not self.child.was_isolated():
@@ -145,11 +134,3 @@ def _option(value: object) -> Option:
             return Option(text, is_text)
         case _:
             raise ProtocolError("an option is malformed")
-
-
-class ImportsMoreError(Exception):
-    """The program imports what is not there; it must be run again where it is."""
-
-    def __init__(self, patience: float) -> None:
-        super().__init__(patience)
-        self.patience = patience  # seconds for which it may then be waited for

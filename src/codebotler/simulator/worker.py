@@ -15,8 +15,8 @@ from codebotler.simulator.isolated_process import LostProcessError, ProtocolErro
 from codebotler.simulator.ledger import SkillPerformer
 from codebotler.simulator.preparer import Prepared, Preparer
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIBRARY_SERVER, LIVE_SERVER
-from codebotler.simulator.skill_protocol import ImportsMoreError, SkillProtocol
+from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, LIVE_SERVER
+from codebotler.simulator.skill_protocol import SkillProtocol
 
 EVENTS = logging.getLogger("codebotler.engine.events")  # each run: started, how it ended and why; at DEBUG
 NewRobot: TypeAlias = Callable[[], SimulatedRobot]
@@ -29,8 +29,7 @@ class Worker:
 
     Nearly all programs are tame: some of them share a child, which has copies of their robots. Whatever is
     not, and whatever a child could not decide, has a child of its own for each run, whose skills the engine
-    performs: from a fork server that is small and cheap to fork, or from one that has the standard library.
-    These are started when the first such program comes.
+    performs. The fork server of these has the standard library; it is started when the first of them comes.
     """
 
     def __init__(self, *, one_process_per_run: bool = False) -> None:
@@ -186,26 +185,16 @@ class Worker:
             prepared = self._prepare(source, robot)
             if isinstance(prepared, Outcome):
                 return prepared
-            if prepared.imports:
-                return self._fork(LIBRARY_SERVER, prepared, robot)
-            try:
-                return self._fork(FORK_SERVER, prepared, robot)
-            except ImportsMoreError as error:
-                return self._fork(LIBRARY_SERVER, prepared, new_robot(), patience=error.patience)
+            return self._fork(FORK_SERVER, prepared, robot)
         except (LostProcessError, OSError) as error:
             if self._stopped:
                 raise EngineError("the engine was stopped") from None
             self.close()
             raise LostProcessError(str(error)) from None
 
-    def _fork(
-        self, role: str, prepared: Prepared, robot: SkillPerformer, *, patience: float | None = None
-    ) -> Outcome:
+    def _fork(self, role: str, prepared: Prepared, robot: SkillPerformer) -> Outcome:
         """Run a prepared program in a child of one of the fork servers."""
-        child = self._fork_server(role).fork()
-        if patience is not None:
-            child.patience = patience
-        return SkillProtocol(child, prepared.code, robot, may_import=role != FORK_SERVER).outcome()
+        return SkillProtocol(self._fork_server(role).fork(), prepared.code, robot).outcome()
 
     def _fork_server(self, role: str) -> ForkServer:
         if role not in self._fork_servers:

@@ -411,33 +411,6 @@ def test_a_stop_ends_the_child_at_once_while_its_robot_is_still_busy() -> None:
     worker.close()
 
 
-COMPUTING_TWICE = """
-def now():
-    sys.modules["_ctypes"].call_function(clock, (1, moment))
-    return int.from_bytes(moment[:8], sys.byteorder) + int.from_bytes(moment[8:], sys.byteorder) / 1e9
-
-def task_program():
-    global clock, moment
-    clock, moment = sys.modules["_ctypes"].dlsym(LIBRARY, "clock_gettime"), bytes(16)
-    until = now() + 0.35
-    while now() < until:
-        sum(range(10_000))
-    if "json" not in sys.modules:
-        __import__("json")
-    say("a")
-""".replace("LIBRARY", LIBRARY)
-
-
-def test_program_that_is_run_again_is_not_waited_for_as_long_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    worker = Worker()
-    for warming in ("pass", "import json"):
-        worker.run(f"def task_program():\n    {warming}\n", lambda: SimulatedRobot(WORLD))
-    monkeypatch.setattr("codebotler.simulator.isolated_process.LONGEST", 0.6)
-    outcome = worker.run(COMPUTING_TWICE, lambda: SimulatedRobot(WORLD))
-    worker.close()
-    assert (outcome.status, outcome.trace) == (Status.TIMEOUT, ())
-
-
 WAITING_A_LITTLE = """
 def task_program():  # NUMBER
     lock = sys.modules["_thread"].allocate_lock()

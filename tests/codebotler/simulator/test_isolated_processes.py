@@ -20,8 +20,8 @@ from processes import children_of, lives
 WORLD = World((Room("start_loc"),), "start_loc")
 ROOT = os.geteuid() == 0
 USER = NOBODY if ROOT else os.geteuid()
-CLOSED = ("preparer", "child of a batch", "child", "child with the library")
-ROLES = (*CLOSED, "batch-fork-server", "fork-server", "library-fork-server")
+CLOSED = ("preparer", "child of a batch", "child")
+ROLES = (*CLOSED, "batch-fork-server", "fork-server")
 MEGABYTES = 512 * 1024**2
 NEVER = {"Max core file size": "0", "Max file size": "0", "Max locked memory": "0", "Max msgqueue size": "0"}
 LIMITS = {**NEVER, "Max address space": str(MEGABYTES)}
@@ -84,7 +84,6 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
     program = "def task_program():\n    say('child')\n"
     worker.run(program.replace("child", "child of a batch"), new_robot)
     worker.run("class A: pass\n" + program, new_robot)
-    worker.run("import json\n" + program.replace("'child'", "'child with the library'"), new_robot)
     yield found
     worker.close()
     del os.environ["A_SECRET"]

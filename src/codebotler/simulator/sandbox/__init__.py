@@ -8,10 +8,9 @@ page of memory makes each fork dearer.
 # The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings.
 FLAGS = ("-S", "-s", "-P", "-B", "-W", "ignore")
 
-# Roles: compiles programs; forks batches of tame programs; forks runs; forks runs that import something;
-# forks runs on a robot.
-PREPARER, BATCH_SERVER, FORK_SERVER = "preparer", "batch-fork-server", "fork-server"
-LIBRARY_SERVER, LIVE_SERVER = "library-fork-server", "live-fork-server"
+# Roles: compiles programs; forks batches of tame programs; forks runs; forks runs on a robot.
+PREPARER, BATCH_SERVER = "preparer", "batch-fork-server"
+FORK_SERVER, LIVE_SERVER = "fork-server", "live-fork-server"
 
 CHANNEL = 3  # the descriptor by which a closed process and the engine talk
 HEADER, MAX_FRAME = 4, 1_000_000  # bytes of length before each frame, and of a frame
@@ -29,6 +28,6 @@ PROGRAM = "<program>"  # the file that a program's code says it comes from
 # Names of the functions that programs call without knowing; no source text can spell them.
 FUEL, CAUGHT, ENTRY, ENTER, BY_NAME = "<fuel>", "<caught>", "<entry>", "<enter>", "<by-name>"
 
-# First byte of the preparer's answer: before code, before that of a tame program, before code that imports
-# more than is always there, and before the reason why there is no code.
-PLAIN, TAME, IMPORTING, REFUSED = b"p", b"t", b"i", b"-"
+# First byte of the preparer's answer: before code, before that of a tame program, and before the reason why
+# there is no code.
+PLAIN, TAME, REFUSED = b"p", b"t", b"-"

@@ -9,11 +9,12 @@ from _socket import CMSG_SPACE, socket
 from marshal import loads
 from posix import getpid, getppid
 
-from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, FORK_SERVER, LIVE_CPU_SECONDS, LIVE_SERVER
+from codebotler.simulator.sandbox import CHANNEL, CPU_SECONDS, LIVE_CPU_SECONDS, LIVE_SERVER
 from codebotler.simulator.sandbox.channel import receive, send
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import ProgramRun
 from codebotler.simulator.sandbox.isolation import die_with_parent, enclose, give_up_rights, usable_filter
+from codebotler.simulator.sandbox.stdlib import load_stdlib
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -33,20 +34,17 @@ def get_ready(
     role: str,
 ) -> tuple[socket, ProgramRun, Callable[[ProgramRun], None], Filter | None, int]:
     """Make all that runs need and share, and return what `serve` takes."""
-    library, seconds = role != FORK_SERVER, LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
+    seconds = LIVE_CPU_SECONDS if role == LIVE_SERVER else CPU_SECONDS
     door = socket(fileno=DOOR)
     run = ProgramRun()
     simulate_environment(run)
     skills, lessons = loads(door.recv(1 << 16))  # noqa: S302 - from the engine
     run.provide(skills)
-    if library:
-        from codebotler.simulator.sandbox.stdlib import load_stdlib  # noqa: PLC0415 - it is large
-
-        load_stdlib(run)
+    load_stdlib(run)
     sys.pycache_prefix = None
     for name in [name for name in sys.modules if name.partition(".")[0] == "codebotler"]:
         del sys.modules[name]
-    sys.meta_path[:] = [NothingMore() if library else MoreInTheLibrary()]
+    sys.meta_path[:] = [NothingMore()]
     give_up_rights()
     seccomp = usable_filter()
     warm_up(run, door, lessons)
@@ -84,15 +82,6 @@ class NothingMore:
     def find_spec(self, name: str, *_: object) -> NoReturn:
         """Refuse in Python's words."""
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-
-class MoreInTheLibrary:
-    """An importer that ends the run, so that it is repeated where the library is loaded."""
-
-    def find_spec(self, *_: object) -> NoReturn:
-        """Tell the engine, and end."""
-        send('{"end":"again"}')
-        os._exit(0)
 
 
 def one_run(

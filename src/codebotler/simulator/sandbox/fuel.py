@@ -29,8 +29,8 @@ SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)
 
 def prepared(
     source: str, *, lowercase: bool, skills: frozenset[str] | None = None
-) -> tuple[types.CodeType, frozenset[str], bool]:
-    """A program's code, which uses fuel, the modules that it imports, and whether it is tame.
+) -> tuple[types.CodeType, bool]:
+    """A program's code, which uses fuel, and whether it is tame.
 
     It is looked at for that only where the skills are given that it may call.
     """
@@ -40,19 +40,13 @@ def prepared(
     try:
         tree = ast.parse(source, PROGRAM)
         nodes = nodes_of(tree)
-        imports = frozenset(
-            name
-            for kind in (ast.Import, ast.ImportFrom)
-            for node in nodes.get(kind, ())
-            for name in imported(node)
-        )
         if lowercase:
             lower_literals(nodes)
         tame = skills is not None and is_tame(tree, nodes, skills)
         use_fuel(nodes)
         for statement in tree.body:
             note_entries(statement)
-        return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), imports, tame
+        return compile(tree, PROGRAM, "exec", dont_inherit=True, optimize=0), tame
     except (RecursionError, MemoryError):
         raise MemoryError(TOO_LARGE) from None
 
@@ -85,13 +79,6 @@ def nodes_of(tree: ast.AST) -> dict[type[ast.AST], list[Any]]:
                 elif isinstance(child, ast.AST):
                     waiting.append((child, depth, blocks))
     return nodes
-
-
-def imported(node: ast.Import | ast.ImportFrom) -> list[str]:
-    """The modules that a node imports."""
-    if isinstance(node, ast.Import):
-        return [alias.name for alias in node.names]
-    return ["." * node.level + (node.module or "")]
 
 
 def lower_literals(nodes: dict[type[ast.AST], list[Any]]) -> None:

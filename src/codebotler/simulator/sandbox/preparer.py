@@ -14,7 +14,6 @@ from marshal import dumps
 from codebotler.simulator.sandbox import (
     CHANNEL,
     CPU_SECONDS,
-    IMPORTING,
     MAX_CODE,
     PLAIN,
     REFUSED,
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 DOOR = 5
-ALWAYS_THERE = frozenset({"sys", "time", "__future__"})
 REHEARSAL = "def task_program():\n    for room in get_all_rooms():\n        say(f'in {room}')\n"
 
 
@@ -53,10 +51,10 @@ def serve() -> NoReturn:
 
 
 def answer(source: str, *, lowercase: bool, skills: tuple[str, ...] | None = None) -> bytes:
-    """PLAIN, TAME or IMPORTING and a program's code, or REFUSED and why there is none, as JSON."""
+    """PLAIN or TAME and a program's code, or REFUSED and why there is none, as JSON."""
     try:
         names = None if skills is None else frozenset(skills)
-        code, imports, tame = prepared(source, lowercase=lowercase, skills=names)
+        code, tame = prepared(source, lowercase=lowercase, skills=names)
         data = dumps(code, WITHOUT_REFERENCES)
         if len(data) > MAX_CODE:
             raise MemoryError(TOO_LARGE)  # noqa: TRY301 - the same as if the compiler had
@@ -65,4 +63,4 @@ def answer(source: str, *, lowercase: bool, skills: tuple[str, ...] | None = Non
         message = error.msg if isinstance(error, SyntaxError) else str(error)
         kind = quoted(type(error).__name__)
         return REFUSED + f"[{kind},{quoted(message[:1000])},{'null' if line is None else line}]".encode()
-    return (TAME if tame else PLAIN if imports <= ALWAYS_THERE else IMPORTING) + data
+    return (TAME if tame else PLAIN) + data
