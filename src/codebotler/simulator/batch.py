@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 import msgspec
 
 from codebotler.core.skills import SkillTable
-from codebotler.core.trace import Option, Outcome
+from codebotler.core.trace import Option, Outcome, Status
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import RememberingLedger, SkillAnswer
 from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
@@ -40,6 +40,7 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
     end: dict[str, Any] | None  # None where the child waits for the answer to the last call
 
 
+LAST_MOMENT = (-1, 0.0)  # after all of those in a transcript: of no call
 ONLY_TIME: SkillAnswer = ("time", None)
 DECODER = msgspec.json.Decoder(Transcript | None)
 
@@ -77,14 +78,17 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
             raise LostProcessError("a child ended in the middle of a batch")
         try:
             transcript = DECODER.decode(frame)
-        except msgspec.DecodeError:
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             raise ProtocolError("a transcript is malformed") from None
         if transcript is None:
             return None
         answer = replay.follow(transcript)
         if transcript.end is not None:
-            return replay.ledger.ended(transcript.end)
-        child.send(answer)
+            outcome = replay.ledger.ended(transcript.end)
+            if outcome.status is Status.KILLED:
+                raise ProtocolError("an end is malformed")
+            return outcome
+        child.send((*answer, robot.now))
 
 
 class Replay:
@@ -98,23 +102,33 @@ class Replay:
         """Perform what was asked and return the last answer; a ProtocolError where one is not as was said."""
         calls = [self._expected(call) for call in transcript.calls]
         order = range(len(calls)) if transcript.order is None else transcript.order
-        ledger, now = self.ledger, self.robot.now
-        moments = iter((*transcript.moments, (len(order), now)))
+        if transcript.order and not 0 <= min(order) <= max(order) < len(calls):
+            raise ProtocolError("there is no such call")
+        ledger, moments = self.ledger, iter((*transcript.moments, LAST_MOMENT))
         changes, later = next(moments)
         told: SkillAnswer = ("ok", None)
         for number, place in enumerate(order):
             if ledger.limit is not None:
                 raise ProtocolError("the program goes on beyond a limit")
-            if number == changes:
-                ledger.let_time_pass(later)
-                changes, later = next(moments)
             skill, arguments, expected = calls[place]
+            if number == changes:
+                self._let_time_pass(later, is_last=expected == ONLY_TIME)
+                changes, later = next(moments)
             if expected == ONLY_TIME:
                 continue
             told = ledger.perform(skill, arguments)
             if expected is not None and expected != (told if told[0] != "error" else ("error", told[1][1:])):
                 raise ProtocolError("the robot answers otherwise")
+        if next(moments, None) is not None:
+            raise ProtocolError("moments are out of order")
         return told
+
+    def _let_time_pass(self, now: float, *, is_last: bool) -> None:
+        if now < self.robot.now:
+            raise ProtocolError("time goes back")
+        self.ledger.let_time_pass(now)
+        if self.ledger.limit is not None and not is_last:
+            raise ProtocolError("the program goes on when its time is up")
 
     def _expected(self, call: Call) -> tuple[str, Sequence[Argument], SkillAnswer | None]:
         """A call with the answer that it should have, if that is known."""
@@ -123,7 +137,7 @@ class Replay:
         signature = self._signatures.get(call.skill)
         if signature is None or tuple(map(type, call.arguments)) != signature:
             raise ProtocolError("there is no such skill, or it has other parameters")
-        value = tuple(call.value) if call.kind == "error" else call.value
+        value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         return call.skill, call.arguments, None if call.kind == "ask" else (call.kind, value)
 
 

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 
 from codebotler.core.trace import Option
 from codebotler.simulator.ledger import RememberingLedger
-from codebotler.simulator.robot import Argument, SimulatedRobot
+from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, MAX_FRAME
 from codebotler.simulator.sandbox.channel import receive, send_frames
@@ -37,7 +37,7 @@ __all__ = ["get_ready", "serve"]
 # In a process of its own, a program may call itself far deeper; what is too deep here is run again there.
 RECURSION_LIMIT = 400
 FEW = 50  # calls that are written one by one, also where some are equal
-LONGEST_CALL = 50_000  # characters of what a skill is given; as one frame, more might be too long
+LONGEST_CALL = 50_000  # bytes of what a skill is given; as one frame, more might be too long
 ODD = b"null"  # in the place of a transcript that a process of its own must decide
 
 
@@ -83,7 +83,9 @@ def transcripts(
     robots = unpickled(pickled)  # noqa: S301 - from the engine
     for code, numbers in programs:
         compiled = loads(code)  # noqa: S302 - from the engine
-        send([run.transcript(compiled, *robots[number]) for number in numbers])
+        # Where a run may ask the engine, that must have heard of all runs before it.
+        for group in [[number] for number in numbers] if elsewhere else [numbers]:
+            send([run.transcript(compiled, *robots[number]) for number in group])
 
 
 class TranscribedRun(ProgramRun):
@@ -132,15 +134,16 @@ class TranscribedRun(ProgramRun):
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the copy of the robot execute a skill."""
         try:
-            given = [options(value) if type(value) is list else short(value) for value in arguments]
+            given = [options(value) if type(value) is list else plain(value) for value in arguments]
             if self.now != self._told:
                 self._let_time_pass()
-            if name in self.elsewhere:
-                return self._ask_engine(name, given)
-            kind, value = self.ledger.perform(name, given)
+            answer = None if name in self.elsewhere else self.ledger.perform(name, given)
         except BaseException:  # nothing that a program does, unless it has reached a limit
             self.is_odd = self.is_odd or not self.spent
             raise
+        if answer is None:
+            return self._ask_engine(name, given)
+        kind, value = answer
         if kind == "error":
             self._calls.append((name, given, kind, value[1:]))
             raise robot_error(*value)
@@ -194,8 +197,10 @@ class TranscribedRun(ProgramRun):
         self._calls.append((name, given, "ask", None))
         send_frames([self._written("null")])
         self._forget_calls()
-        kind, value = receive()
+        kind, value, self.now = receive()
+        self._told = -1.0  # so that the next call tells it again
         if kind == "error":
+            self.ledger.errors.append(RobotError(*value[1:]))  # so that later ones have the engine's numbers
             raise robot_error(*value)
         if kind == "stop":
             self.spent = True
@@ -208,9 +213,9 @@ def the_clock(*_: object) -> ModuleType:
     return sys.modules["time"]
 
 
-def short(text: str) -> str:
-    """A text that a skill is given, which as one frame must not be too long."""
-    if len(text) > LONGEST_CALL:
+def plain(text: str) -> str:
+    """A text that JSON can hold: not too long, and without halves of surrogate pairs, which it would join."""
+    if len(text.encode()) > LONGEST_CALL:
         raise MemoryError
     return text
 
@@ -218,8 +223,7 @@ def short(text: str) -> str:
 def options(values: list[object]) -> tuple[Option, ...]:
     """Options as the robot takes them."""
     given = tuple([Option(str(value), isinstance(value, str)) for value in values])
-    if sum([len(text) for text, _ in given]) > LONGEST_CALL:
-        raise MemoryError
+    plain("".join([text for text, _ in given]))
     return given
 
 

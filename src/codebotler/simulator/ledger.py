@@ -124,7 +124,7 @@ class RememberingLedger(Ledger):
 
     def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__(robot)
-        self._simulated, self._idle = robot, robot.idle_skills
+        self._simulated, self._idle = robot, robot.idle_skills.difference(robot.own_skills)
         self._same: dict[tuple[object, ...], tuple[int, SkillAnswer, Sequence[Event]]] = {}
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:

@@ -114,7 +114,7 @@ class SimulatedRobot:
     @property
     def own_skills(self) -> tuple[str, ...]:
         """The skills that a copy made from `setup` would not have: their behaviours were given."""
-        return given_behaviours(self, BEHAVIOURS)
+        return own_skills(self, SimulatedRobot, BEHAVIOURS)
 
     @property
     def idle_skills(self) -> frozenset[str]:
@@ -155,8 +155,12 @@ class SimulatedRobot:
         self.events[-1] = Event(last.kind, last.text, last.options, answer, last.found, last.place, last.time)
 
 
-def given_behaviours(robot: SimulatedRobot, usual: Mapping[str, Behaviour]) -> tuple[str, ...]:
-    """The skills of a robot that behave in another way than usual."""
+def own_skills(
+    robot: SimulatedRobot, kind: type[SimulatedRobot], usual: Mapping[str, Behaviour]
+) -> tuple[str, ...]:
+    """The skills of a robot that behave in another way than those of its kind usually do."""
+    if type(robot) is not kind:
+        return tuple(robot.skills)
     if robot.behaviours is usual:
         return ()
     return tuple(name for name in robot.skills if robot.behaviours[name] is not usual.get(name))

@@ -20,7 +20,7 @@ from codebotler.simulator.robot import (
     SimulatedRobot,
     Thing,
     found_in,
-    given_behaviours,
+    own_skills,
 )
 from codebotler.simulator.rules import Rules
 
@@ -173,7 +173,7 @@ class SampledRobot(SimulatedRobot):
     @property
     def own_skills(self) -> tuple[str, ...]:
         """The skills that a copy made from `setup` would not have."""
-        return given_behaviours(self, SAMPLED)
+        return own_skills(self, SampledRobot, SAMPLED)
 
     @property
     def idle_skills(self) -> frozenset[str]:

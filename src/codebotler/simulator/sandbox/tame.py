@@ -65,7 +65,8 @@ ERRORS = frozenset(
     }
 )
 GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program finds
-EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"})  # all that some program finds
+# All that some program finds, but for the name of its module, which all of them find.
+EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"}) - {"__name__"}
 
 TEXT_METHODS = frozenset(
     {
