@@ -1,4 +1,4 @@
-"""Runs programs in simulated worlds, each in an isolated process of its own. Start reading at `worker`."""
+"""Runs programs in simulated worlds, in isolated processes. Start reading at `worker`."""
 
 from __future__ import annotations
 

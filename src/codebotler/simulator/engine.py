@@ -1,4 +1,4 @@
-"""Runs many programs in worlds, each pair isolated, equal pairs once, with outcomes in order."""
+"""Runs many programs in worlds, in isolation, equal pairs once, with outcomes in order."""
 
 from __future__ import annotations
 

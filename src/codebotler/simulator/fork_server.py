@@ -1,4 +1,4 @@
-"""The engine's handle on a fork server: asks it for a new isolated process for each run."""
+"""The engine's handle on a fork server: asks it for a new isolated process for a run, or for a batch."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ WARM_UP_RUNS = 20  # the interpreter learns from what it has done a few times
 
 
 class ForkServer:
-    """One fork server in one of the three roles, and the children that it forks, one at a time."""
+    """One fork server in one of its roles, and the children that it forks, one at a time."""
 
     def __init__(self, role: str) -> None:
         self._report, report = os.pipe()

@@ -1,4 +1,4 @@
-"""The engine's handle on the preparer: sends it a program and gets compiled code back."""
+"""The engine's handle on the preparer: sends it a program, gets its code back, and whether it is tame."""
 
 from __future__ import annotations
 

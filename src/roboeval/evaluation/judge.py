@@ -81,7 +81,8 @@ def evaluate(
         ablated: whether to require common sense only; then all tasks have an ablation.
         workers: how many programs are run at the same time.
         require_isolation: whether to refuse where a wall around programs is missing, rather than warn.
-        engine: where programs are run; by default in so many pool of this machine, started and ended for it.
+        engine: where programs are run; by default in a pool of so many workers on this machine, started and
+            ended for it.
 
     Raises:
         UserError: there are no workers; or, when it is read, a completion is none or not of the suite.

@@ -1,8 +1,9 @@
-"""The isolated side of the engine: processes that prepare programs, and fork one closed child for each run.
+"""The isolated side of the engine: processes that prepare programs, and fork closed children that run them.
 
-A child holds nothing but the program. World, robot and trace stay with the engine, and the child asks for
-skills over a socket. All of this runs under a bare interpreter and imports as little as it can, since every
-page of memory makes each fork dearer.
+The child of one run holds nothing but the program, and asks for skills over a socket. The child of a batch
+(`batch_process`) also holds copies of worlds and robots. The robot and the trace that count stay with the
+engine. All of this runs under a bare interpreter and imports as little as it can, since every page of memory
+makes each fork dearer.
 """
 
 # The interpreter's options: no site, no user's folder, no unsafe path, no bytecode written, no warnings.

@@ -1,4 +1,4 @@
-"""Forks a process for each run, always from the same memory image, and reports how each ended."""
+"""Forks a process for each run or batch, always from the same memory image, and reports how each ended."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
-"""Parses and compiles programs in an isolated process, and never executes them.
+"""Parses and compiles programs in an isolated process, decides which are tame, and never executes them.
 
-A program runs in several worlds, each time in a fresh child. Compiled here, once and in a process that is
-warm, it costs each of them next to nothing. Code goes through the engine unopened, to the child that runs it.
+A program runs in several worlds, in one child or in a fresh one each time. Compiled here, once and in a
+process that is warm, it costs each of them next to nothing. Code goes through the engine unopened, to the
+child that runs it.
 """
 
 from __future__ import annotations
