@@ -241,9 +241,14 @@ class OrdinaryProcess:
         return outcome
 
 
+def all_of(outcome: Outcome) -> str:
+    """Everything in an outcome, with the places and times that its comparison leaves out."""
+    return f"{outcome!r} {outcome.trace!r}"
+
+
 def without_addresses(outcome: Outcome) -> str:
-    """Everything in an outcome, with the places and times that its comparison leaves out, but no address."""
-    return re.sub(r"0x[0-9a-fA-F]+", "0x", repr(outcome))
+    """Everything in an outcome but addresses."""
+    return re.sub(r"0x[0-9a-fA-F]+", "0x", all_of(outcome))
 
 
 class StandIn(Protocol):

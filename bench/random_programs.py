@@ -13,6 +13,11 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from codebotler.core.cachedproperty import cached_property
+from codebotler.core.skills import SKILLS
+from codebotler.simulator.sandbox.fuel import nodes_of
+from codebotler.simulator.sandbox.tame import is_tame
+
 DEEPEST_EXPRESSION, DEEPEST_BLOCK, DEEPEST_DEFINITION = 3, 3, 2
 
 Rules = tuple[tuple[int, str], ...]
@@ -52,14 +57,69 @@ def read_grammar(text: str) -> dict[str, list[Rule]]:
     return grammar
 
 
+@dataclass
+class Grammar:
+    """What programs are drawn from.
+
+    Args:
+        weighed: the rules for expressions, by what they are for.
+        statements: those for statements.
+        definitions: those for functions and classes, of which each is as likely.
+        strange: rules for statements of which a program may have one, if any.
+    """
+
+    weighed: dict[str, Rules]
+    statements: Rules
+    definitions: list[Rule]
+    strange: Rules = ()
+
+    @cached_property
+    def without_blocks(self) -> Rules:
+        """The statements that hold no others."""
+        return tuple(rule for rule in self.statements if "BLOCK" not in rule[1])
+
+    @classmethod
+    def of(cls, rules: dict[str, list[Rule]], definitions: list[Rule], strange: Rules = ()) -> Grammar:
+        """The grammar of some rules."""
+        weighed = {
+            kind: tuple((rule.weight, rule.text) for rule in of_kind) for kind, of_kind in rules.items()
+        }
+        return cls(weighed, weighed.pop("STATEMENT"), definitions, strange)
+
+
+def is_tame_rule(text: str) -> bool:
+    """Whether what a rule says is tame, if all that is drawn for it is; no set is."""
+    if re.search(r"\bSET\b", text):
+        return False
+    tree = ast.parse(text)
+    return is_tame(tree, nodes_of(tree), frozenset(SKILLS))
+
+
+def tame_grammar(
+    rules: dict[str, list[Rule]], definitions: list[Rule], further: dict[str, list[Rule]]
+) -> Grammar:
+    """The tame rules of a grammar, and further ones; the others are strange."""
+    tame = {
+        kind: [rule for rule in (*of_kind, *further.get(kind, ())) if is_tame_rule(rule.text)]
+        for kind, of_kind in rules.items()
+        if kind != "SET"
+    }
+    kept = []
+    for rule in (*definitions, *further["DEFINITION"]):
+        uses = [(kind, use) for kind, use in rule.uses if is_tame_rule(f"{rule.text}\n{use}")]
+        if uses and is_tame_rule(rule.text):
+            kept.append(Rule(rule.weight, rule.text, uses))
+    wild = [rule for rule in rules["STATEMENT"] if not is_tame_rule(rule.text)]
+    return Grammar.of(tame, kept, tuple((rule.weight, rule.text) for rule in wild))
+
+
 GRAMMAR = read_grammar(Path(__file__).with_name("grammar.txt").read_text(encoding="utf-8"))
+FURTHER = {kind.removeprefix("TAME "): GRAMMAR.pop(kind) for kind in [*GRAMMAR] if kind.startswith("TAME ")}
 DEFINITIONS = GRAMMAR.pop("DEFINITION")
 DEEP_DEFINITIONS = GRAMMAR.pop("DEEP DEFINITION")
-WEIGHED: dict[str, Rules] = {
-    kind: tuple((rule.weight, rule.text) for rule in rules) for kind, rules in GRAMMAR.items()
-}
-STATEMENTS = WEIGHED.pop("STATEMENT")
-STATEMENTS_WITHOUT_BLOCKS = tuple(rule for rule in STATEMENTS if "BLOCK" not in rule[1])
+USUAL = Grammar.of(GRAMMAR, DEFINITIONS)
+DEEP = Grammar.of(GRAMMAR, DEFINITIONS + DEEP_DEFINITIONS)
+TAME = tame_grammar(GRAMMAR, DEFINITIONS, FURTHER)
 
 MODULES = "collections contextlib copy dataclasses enum functools itertools json math random re"
 VARIABLES = {"T": "TEXT", "N": "NUMBER", "L": "LIST", "D": "DICT"}
@@ -100,11 +160,13 @@ class Writer(ast.NodeTransformer):
 
     Args:
         draw: draws from a strategy.
-        definitions_drawn: the rules for functions and classes.
+        grammar: the rules.
+        modules: those that programs import first.
     """
 
     draw: Any
-    definitions_drawn: Sequence[Rule]
+    grammar: Grammar = field(default_factory=lambda: DEEP)
+    modules: str = MODULES
     scopes: list[Scope] = field(default_factory=list)
     expressions: int = 0
     blocks: int = 0
@@ -113,12 +175,14 @@ class Writer(ast.NodeTransformer):
     plain: bool = False
     walrus: bool = True
     chosen: dict[str, str] = field(default_factory=dict)
+    may_be_strange: bool = False
 
     def program(self) -> str:
         """The text of a program."""
         names = {kind: [f"{name.lower()}{i}" for i in range(COUNT)] for name, kind in VARIABLES.items()}
         self.scopes = [Scope("module", names, {})]
-        tree = ast.parse(f"import {', '.join(MODULES.split())}")
+        tree = ast.parse(f"import {', '.join(self.modules.split())}")
+        self.may_be_strange = bool(self.grammar.strange) and self.number(4) == 3  # noqa: PLR2004 - one in four
         forgotten = self.number(80)
         starts = [f"{name.lower()}{i} = {START[name]}" for name in VARIABLES for i in range(COUNT)]
         tree.body += ast.parse("\n".join(s for i, s in enumerate(starts) if i != forgotten - 1)).body
@@ -157,13 +221,13 @@ class Writer(ast.NodeTransformer):
 
     def used(self, kind: str) -> list[tuple[int, str]]:
         """The rules for what was defined."""
-        weight = sum(weight for weight, _ in STATEMENTS) // 12 if kind == "STATEMENT" else 8
+        weight = sum(weight for weight, _ in self.grammar.statements) // 12 if kind == "STATEMENT" else 8
         return [(weight, use) for scope in self.scopes for use in scope.uses.get(kind, ())]
 
     def expression(self, kind: str) -> ast.expr:
         """A random expression."""
         names = [(3, name) for name in self.here.readable.get(kind, ())]
-        given = WEIGHED[kind]
+        given = self.grammar.weighed[kind]
         if self.plain and names:
             return ast.Name(self.pick(names), ast.Load())
         if self.plain or self.expressions >= DEEPEST_EXPRESSION:
@@ -183,7 +247,9 @@ class Writer(ast.NodeTransformer):
 
     def statement(self) -> list[ast.stmt]:
         """A random statement, or several that belong together."""
-        given = STATEMENTS_WITHOUT_BLOCKS if self.blocks >= DEEPEST_BLOCK else STATEMENTS
+        given = self.grammar.without_blocks if self.blocks >= DEEPEST_BLOCK else self.grammar.statements
+        if self.may_be_strange and self.number(9) == 8:  # noqa: PLR2004 - one in nine
+            self.may_be_strange, given = False, self.grammar.strange
         uses = self.used("STATEMENT")
         if self.blocks >= DEEPEST_BLOCK:
             uses = [use for use in uses if "BLOCK" not in use[1]]
@@ -210,7 +276,7 @@ class Writer(ast.NodeTransformer):
 
     def definition(self) -> list[ast.stmt]:
         """A function or class, which can be used from then on."""
-        definition = self.definitions_drawn[self.number(len(self.definitions_drawn))]
+        definition = self.grammar.definitions[self.number(len(self.grammar.definitions))]
         self.defined += 1
         name = f"f{self.defined}"
         blocks, self.blocks = self.blocks, max(self.blocks, 1)
@@ -259,7 +325,7 @@ class Writer(ast.NodeTransformer):
 
     def name(self, node: ast.Name) -> ast.expr:
         """What a name in capitals stands for."""
-        if node.id in WEIGHED:
+        if node.id in self.grammar.weighed:
             return self.expression(node.id)
         if node.id in VARIABLES or node.id == "T2":
             if node.id not in self.chosen:
@@ -376,7 +442,13 @@ def programs(draw: st.DrawFn, *, deep: bool = True) -> str:
         deep: whether to draw also such as end differently under different versions of Python, because they
             call themselves through C until the stack is full.
     """
-    return Writer(draw, DEFINITIONS + DEEP_DEFINITIONS * deep).program()
+    return Writer(draw, DEEP if deep else USUAL).program()
+
+
+@st.composite
+def tame_programs(draw: st.DrawFn) -> str:
+    """Programs that parse, of which most are tame, and the others but for one statement."""
+    return Writer(draw, TAME, "time").program()
 
 
 TOKENS = re.compile(r"\w+|\s+|[^\w\s]")

@@ -76,10 +76,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
         frame = child.receive_bytes(MAX_FRAME)
         if frame is None:
             raise LostProcessError("a child ended in the middle of a batch")
-        try:
-            transcript = DECODER.decode(frame)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-            raise ProtocolError("a transcript is malformed") from None
+        transcript = decoded(frame)
         if transcript is None:
             return None
         answer = replay.follow(transcript)
@@ -89,6 +86,15 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
                 raise ProtocolError("an end is malformed")
             return outcome
         child.send((*answer, robot.now))
+
+
+def decoded(frame: bytes) -> Transcript | None:
+    """What a child says of a run; None where another process must decide."""
+    try:
+        transcript: Transcript | None = DECODER.decode(frame)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        raise ProtocolError("a transcript is malformed") from None
+    return transcript
 
 
 class Replay:

@@ -1,14 +1,19 @@
-"""Random programs end alike in every run, with and without isolation, and nothing of ours breaks.
+"""Random programs end alike in every run, with and without isolation, alone and after others in one child.
 
-`make test` runs the same 200 each time. `make fuzz` runs thousands of others: FUZZ_EXAMPLES says how many.
+`make test` runs the same 200 each time. `make fuzz` runs thousands of others: FUZZ_EXAMPLES says how many,
+and FUZZ_SEED in which order they share children, and which programs of the corpus do.
 """
 
 import ast
+import json
 import os
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from random import Random
 
 import pytest
 from hypothesis import HealthCheck, example, given, note, settings
@@ -20,12 +25,15 @@ from codebotler.core.world import Person, Room, World
 from codebotler.simulator.engine import run
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
-from codebotler.simulator.rules import Limits, Rules
-from in_process import OrdinaryProcess, without_addresses
-from random_programs import broken_programs, programs
+from codebotler.simulator.rules import PAPER, Limits, Rules
+from codebotler.simulator.worker import Worker
+from in_process import OrdinaryProcess, all_of, without_addresses
+from random_programs import broken_programs, programs, tame_programs
+from roboeval.suites.load import Suite
 
 NIGHTLY = "FUZZ_EXAMPLES" in os.environ
 EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "200"))
+SEED = int(os.environ.get("FUZZ_SEED", "0"))
 FUZZ = settings(
     max_examples=EXAMPLES,
     derandomize=not NIGHTLY,
@@ -104,6 +112,13 @@ def other_pool() -> Iterator[WorkerPool]:
 
 
 @pytest.fixture(scope="module")
+def pool_of_processes() -> Iterator[WorkerPool]:
+    """One that gives each run a process of its own."""
+    with WorkerPool(1, one_process_per_run=True) as pool:
+        yield pool
+
+
+@pytest.fixture(scope="module")
 def ordinary() -> Iterator[OrdinaryProcess]:
     with OrdinaryProcess(RULES) as process:
         yield process
@@ -111,11 +126,6 @@ def ordinary() -> Iterator[OrdinaryProcess]:
 
 def outcome_of(pool: WorkerPool, source: str, world: World) -> Outcome:
     return pool.here().run(source, lambda: SimulatedRobot(world, RULES))
-
-
-def all_of(outcome: Outcome) -> str:
-    """Everything in an outcome, with the places and times that its comparison leaves out."""
-    return repr(outcome)
 
 
 def names_bound(source: str) -> set[str]:
@@ -204,3 +214,93 @@ def test_broken_texts_end_alike_in_every_run_and_break_nothing(
             assert (outcome.error.kind, outcome.line) == (problems[0].kind, problems[0].line)
 
     check()
+
+
+# --- programs that share a child
+
+MOST = 16  # programs of a batch
+Batch = Sequence[tuple[str, Sequence[World]]]
+Runs = dict[tuple[str, World], Outcome]
+
+
+def differences(
+    worker: Worker, batch: Batch, alone: Runs, rules: Rules
+) -> Iterator[tuple[str, World, Outcome]]:
+    """The runs of a batch that end otherwise than alone; those that nobody decided there are none."""
+    jobs = [(source, [partial(SimulatedRobot, world, rules) for world in worlds]) for source, worlds in batch]
+    for (number, run_number), outcome in worker.run_tame(jobs).items():
+        source, worlds = batch[number]
+        if all_of(outcome) != all_of(alone[source, worlds[run_number]]):
+            yield source, worlds[run_number], outcome
+
+
+def assert_alike(worker: Worker, batch: Batch, alone: Runs, rules: Rules) -> None:
+    """Fail with the fewest programs that show a difference, if there is one."""
+    if not any(differences(worker, batch, alone, rules)):
+        return
+    fewest = list(batch)
+    for program in batch:
+        fewer = [each for each in fewest if each is not program]
+        if any(differences(worker, fewer, alone, rules)):
+            fewest = fewer
+    for source, world, outcome in differences(worker, fewest, alone, rules):
+        programs = "\n# --- and then\n".join(each for each, _ in fewest)
+        pytest.fail(f"{programs}\n{world}\n{all_of(outcome)}\n{all_of(alone[source, world])}")
+    pytest.fail("a difference comes and goes:\n" + "\n# --- and then\n".join(source for source, _ in batch))
+
+
+def batches(random: Random, sources: Sequence[str], worlds: Sequence[World]) -> Iterator[Batch]:
+    """All programs in some order, in batches, each in a few worlds, perhaps in one of them twice."""
+    waiting = random.sample(sources, len(sources))
+    while waiting:
+        size = random.randint(1, MOST)
+        yield [(source, random.choices(worlds, k=random.randint(1, 4))) for source in waiting[:size]]
+        del waiting[:size]
+
+
+def test_random_programs_that_share_a_child_end_as_each_does_alone(
+    pool: WorkerPool, pool_of_processes: WorkerPool
+) -> None:
+    drawn: dict[str, None] = {}
+
+    @FUZZ
+    @given(tame_programs())
+    @example(DEEP)
+    def draw(source: str) -> None:
+        drawn[source] = None
+
+    draw()
+    sources, random = list(drawn), Random(SEED)
+    alone: Runs = {}
+    jobs = [(source, [lambda: SimulatedRobot(WORLDS[0], RULES)]) for source in sources]
+    decided = sum(len(pool.here().run_tame(jobs[at : at + MOST])) for at in range(0, len(jobs), MOST))
+    assert decided >= 0.6 * len(sources)
+    for _ in range(2):
+        for batch in batches(random, sources, WORLDS):
+            for pair in ((source, world) for source, worlds in batch for world in worlds):
+                if pair not in alone:
+                    alone[pair] = outcome_of(pool_of_processes, *pair)
+            assert_alike(pool.here(), batch, alone, RULES)
+    count = Counter(outcome.status for outcome in alone.values())
+    assert count[Status.FINISHED] >= len(alone) / 4
+    for status in (Status.PYTHON_ERROR, Status.ROBOT_ERROR, Status.TIMEOUT):
+        assert count[status] >= len(alone) / 60, count
+
+
+def test_real_programs_that_share_a_child_end_as_each_does_alone(
+    pool: WorkerPool, pool_of_processes: WorkerPool, corpus: Path, paper: Suite
+) -> None:
+    lines = (corpus / "corpus" / "programs.jsonl").read_text(encoding="utf-8").splitlines()
+    random, decided = Random(SEED), 0
+    rows = [json.loads(line) for line in random.sample(lines, -(-len(lines) // 100))]
+    whole: list[tuple[str, Sequence[World]]] = [
+        (row["program"], [scenario.world for scenario in paper.tasks[row["task"]].scenarios]) for row in rows
+    ]
+    alone: Runs = {}
+    worker = pool_of_processes.here()
+    for source, worlds in whole:
+        for world in worlds:
+            alone[source, world] = worker.run(source, partial(SimulatedRobot, world, PAPER))
+        decided += len(pool.here().run_tame([(source, [lambda: SimulatedRobot(WORLDS[0])])]))
+    assert decided >= len(whole) / 2
+    assert_alike(pool.here(), whole[:MOST], alone, PAPER)

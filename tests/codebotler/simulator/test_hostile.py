@@ -356,7 +356,7 @@ def test_hostile_program_gets_nothing(path: Path, reach: Reach, honest: Outcome)
     kind = "" if outcome.error is None else f" {outcome.error.kind}"
     assert f"{outcome.status}{kind}" in wanted.ends, outcome
     assert done(outcome) == wanted.does
-    assert SECRET not in repr(outcome)
+    assert SECRET not in f"{outcome!r} {outcome.trace!r}"
 
     verdict = judge(outcome, ASKED)
     was_there = any((e.kind, e.text, e.place) == ("say", PHRASE, "vault") for e in outcome.trace)

@@ -217,7 +217,7 @@ class Verifier:
     def annotation(self, node: ast.expr) -> None:
         """Allow an annotation, which is never looked at again."""
         match node:
-            case ast.Constant(None | str()):
+            case ast.Constant(value) if value is None or value is ... or isinstance(value, str):
                 pass
             case ast.Name(name) if name in CLASSES or self.is_data(name):
                 pass

@@ -1,0 +1,725 @@
+"""Tame programs that share a child end as each of them ends in a process of its own."""
+
+import json
+import os
+import signal
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.trace import Option, RunError, Status
+from codebotler.core.world import Person, Room, World
+from codebotler.simulator.batch import Replay, decoded
+from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
+from codebotler.simulator.ledger import Ledger, RememberingLedger
+from codebotler.simulator.pool import LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool, batch_size
+from codebotler.simulator.robot import BEHAVIOURS, Behaviour, Result, RobotError, SimulatedRobot
+from codebotler.simulator.rules import Limits, Rules
+from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
+from codebotler.simulator.worker import Job, Worker
+from in_process import all_of
+from processes import children_of
+
+WORLDS = (
+    World((Room("hall", ("mug",)), Room("lab", ("apple",), (Person("amy", ("yes", "no")),))), "hall"),
+    World((Room("lab"), Room("hall", ("apple", "mug"), (Person("bob", ("no",)),))), "hall"),
+    World((Room("hall", (), (Person("eve"),)),), "hall"),
+)
+WORLD = WORLDS[0]
+RULES = Rules(limits=Limits(seconds=600, calls=60, ticks=2_000, text=200, trace=2_000))
+TABLE = SKILLS.with_skill(
+    Skill("wave", (Parameter("person"),), "str", "Wave at a person.", Recording("wave", "person"))
+)
+
+
+@pytest.fixture(scope="module")
+def worker() -> Iterator[Worker]:
+    yield from started(Worker())
+
+
+@pytest.fixture(scope="module")
+def other_worker() -> Iterator[Worker]:
+    """One that gives each run a process of its own."""
+    yield from started(Worker(one_process_per_run=True))
+
+
+def started(worker: Worker) -> Iterator[Worker]:
+    yield worker
+    worker.close()
+
+
+def robot(world: World = WORLD, rules: Rules = RULES) -> SimulatedRobot:
+    return SimulatedRobot(world, rules)
+
+
+def job(program: str, worlds: Sequence[World] = WORLDS) -> Job:
+    return program, [partial(robot, world) for world in worlds]
+
+
+def task(*lines: str) -> str:
+    return "def task_program():\n" + "".join(f"    {line}\n" for line in lines)
+
+
+def saying(text: str) -> str:
+    return task(f"say({text!r})")
+
+
+# --- outcomes
+
+# Programs that a child can decide, and how they end in the first world.
+DECIDED: dict[str, tuple[Status, str | None]] = {
+    task("rooms = get_all_rooms()", "for room in rooms: go_to(room)", "say(', '.join(rooms))"): (
+        Status.FINISHED,
+        None,
+    ),
+    task("here = get_current_location()", "go_to('lab')", "go_to(here)", "say(str(here is None))"): (
+        Status.FINISHED,
+        None,
+    ),
+    task("if is_in_room('mug'): pick('mug')", "go_to('lab')", "place('mug')", "pick('mug')"): (
+        Status.FINISHED,
+        None,
+    ),
+    task("go_to('lab')", "say(ask('amy', 'Tea?', ['yes', 'no']) + str(ask('', 'Tea?', [1, 'no'])))"): (
+        Status.FINISHED,
+        None,
+    ),
+    task("go_to('lab')", "x = [2, 'yes', None]", "say(repr(ask('', 'Tea?', x)) + str(x))"): (
+        Status.FINISHED,
+        None,
+    ),
+    task("start = time.time()", "time.sleep(1.5)", "say(str(time.time() - start) + time.strftime('%c'))"): (
+        Status.FINISHED,
+        None,
+    ),
+    task("for n in range(9):", "    time.sleep(n)", "    say(str(time.monotonic()))"): (
+        Status.FINISHED,
+        None,
+    ),
+    task("while not is_in_room('unicorn') and time.time() % 100 < 50:", "    time.sleep(1)"): (
+        Status.FINISHED,
+        None,
+    ),
+    "import time\nx = [1]\n\ndef f(n=[]):\n    n.append(1)\n    return n\n\nfor _ in x: f()\nsay(str(f()))\n"
+    "task_program = 1": (Status.PYTHON_ERROR, "TypeError"),
+    "say(__name__)\nif __name__ == '__main__':\n    say('a')\n": (Status.PYTHON_ERROR, "NameError"),
+    "def task_program():\n    say('a')\ntask_program()\n": (Status.FINISHED, None),
+    task("say(undefined)"): (Status.PYTHON_ERROR, "NameError"),
+    task("say('a')", "say('b', 'c')"): (Status.PYTHON_ERROR, "TypeError"),
+    task("say(1)"): (Status.PYTHON_ERROR, "TypeError"),
+    task("assert is_in_room('unicorn'), 'none'"): (Status.PYTHON_ERROR, "AssertionError"),
+    task("x = {}", "say('a')", "x['key']"): (Status.PYTHON_ERROR, "KeyError"),
+    task("raise ValueError('a') from KeyError('b')"): (Status.PYTHON_ERROR, "ValueError"),
+    task("x = [1]", "x.append(x)", "say(str(x) + str({1: x}))", "x.upper()"): (
+        Status.PYTHON_ERROR,
+        "AttributeError",
+    ),
+    task("say(str(1 / 0))"): (Status.PYTHON_ERROR, "ZeroDivisionError"),
+    task("try:", "    go_to('moon')", "except Exception as error:", "    say(repr(error))", "    raise"): (
+        Status.ROBOT_ERROR,
+        "GoToInvalidLocation",
+    ),
+    task(
+        "for _ in range(3):",
+        "    try: pick('moon')",
+        "    except Exception as error: e = [error]",
+        "raise e[0]",
+    ): (
+        Status.ROBOT_ERROR,
+        "PickInvalidObject",
+    ),
+    task("ask('amy', 'Tea?', ['yes'])"): (Status.ROBOT_ERROR, "AskNoPerson"),
+    task("ask('amy', 'Tea?', [])"): (Status.ROBOT_ERROR, "AskEmptyOptions"),
+    task("go_to('lab')", "ask('amy', 'Tea?', ['tea', 'milk'])"): (Status.ROBOT_ERROR, "AskInvalidOptions"),
+    task("pick('mug')", "pick('mug')"): (Status.ROBOT_ERROR, "PickWhileHolding"),
+    task("place('mug')"): (Status.ROBOT_ERROR, "PlaceNoObject"),
+    task("while True: pass"): (Status.TIMEOUT, "TimeoutError"),
+    task("while True:", "    try: say(''.join(str(n) for n in range(99)))", "    except: continue"): (
+        Status.TIMEOUT,
+        "TimeoutError",
+    ),
+    task("for n in range(61): say(str(n))"): (Status.TIMEOUT, "TimeoutError"),
+    task("for n in range(60): say(str(n))"): (Status.FINISHED, None),
+    task("while True: is_in_room('unicorn')"): (Status.TIMEOUT, "TimeoutError"),
+    task("while True:", "    try: go_to('moon')", "    except Exception: say('a')"): (
+        Status.TIMEOUT,
+        "TimeoutError",
+    ),
+    task("say('x' * 200)", "say('y' * 201)"): (Status.TIMEOUT, "TimeoutError"),
+    task("go_to('lab')", "ask('', 'Tea?', ['yes'] * 15)", "ask('', 'Tea?', ['yes'] * 150)", "say('a')"): (
+        Status.TIMEOUT,
+        "TimeoutError",
+    ),
+    task("for n in range(11): say(str(n % 10) * 200)"): (Status.TIMEOUT, "TimeoutError"),
+    task("for n in range(11): say('x' * 200)"): (Status.TIMEOUT, "TimeoutError"),
+    task("say('a')", "time.sleep(600)", "say('b')", "time.sleep(1)"): (Status.TIMEOUT, "TimeoutError"),
+    task("while not is_in_room('unicorn'): time.sleep(30)"): (Status.TIMEOUT, "TimeoutError"),
+    task("try:", "    while True: say('a')", "finally:", "    say('b')", "    go_to('lab')"): (
+        Status.TIMEOUT,
+        "TimeoutError",
+    ),
+    task("try: time.sleep(1000)", "except BaseException: pass", "say('a')"): (Status.TIMEOUT, "TimeoutError"),
+}
+# Programs whose end depends on the process: on what its memory holds, and on how deep the stack already is.
+DEEP = "def f(n):\n    say(str(n)) if n % 100 == 0 else None\n    return f(n + 1)\n"
+UNDECIDED: dict[str, tuple[Status, str | None]] = {
+    DEEP + task("f(1)"): (Status.PYTHON_ERROR, "RecursionError"),
+    DEEP + task("try: f(1)", "except RecursionError as error: say(str(error))"): (Status.FINISHED, None),
+    DEEP + task("try: f(1)", "except Exception: say('a')"): (Status.FINISHED, None),
+    DEEP + task("for _ in '1':", "    try: f(1)", "    finally: break"): (Status.FINISHED, None),
+    "def f(n): return n and f(n - 1)\n" + task("say(str(f(600)))"): (Status.FINISHED, None),
+    task("x = 'x' * 10 ** 12"): (Status.PYTHON_ERROR, "MemoryError"),
+    task("try: x = [1] * 10 ** 12", "except MemoryError: say(str(get_all_rooms()))"): (Status.FINISHED, None),
+    task("raise MemoryError('a')"): (Status.PYTHON_ERROR, "MemoryError"),
+    task("say('half \\ud800 a character')"): (Status.FINISHED, None),
+}
+
+
+def id_of(program: str) -> str:
+    return program.removeprefix("def task_program():\n")[:60]
+
+
+@pytest.mark.parametrize(("program", "end"), DECIDED.items(), ids=map(id_of, DECIDED))
+def test_outcomes_are_those_of_processes_of_their_own(
+    worker: Worker, other_worker: Worker, program: str, end: tuple[Status, str | None]
+) -> None:
+    known = worker.run_tame([job(program)])
+    assert list(known) == [(0, number) for number in range(len(WORLDS))]
+    alone = [other_worker.run(program, new_robot) for new_robot in job(program)[1]]
+    assert list(map(all_of, known.values())) == list(map(all_of, alone))
+    assert (known[0, 0].status, known[0, 0].error and known[0, 0].error.kind) == end
+
+
+@pytest.mark.parametrize(("program", "end"), UNDECIDED.items(), ids=map(id_of, UNDECIDED))
+def test_what_depends_on_the_process_is_decided_in_one_of_its_own(
+    worker: Worker, other_worker: Worker, program: str, end: tuple[Status, str | None]
+) -> None:
+    assert worker.run_tame([job(program), job(saying("next"))]).keys() == {(1, 0), (1, 1), (1, 2)}
+    outcome = worker.run(program, robot)
+    assert all_of(outcome) == all_of(other_worker.run(program, robot))
+    assert (outcome.status, outcome.error and outcome.error.kind) == end
+
+
+@pytest.mark.parametrize(
+    "shows", ["say(str(len(str(x))))", "say(str(x == y))", "ask('', 'Tea?', [x, 'yes'])"]
+)
+def test_how_deep_data_may_be_nested_is_decided_alone(
+    worker: Worker, other_worker: Worker, shows: str
+) -> None:
+    """Python limits that by the depth of its own stack, which is not the same in both kinds of process."""
+
+    def nested(depth: int) -> str:
+        return task("go_to('lab')", "x, y = [], []", f"for _ in range({depth}): x, y = [x], [y]", shows)
+
+    def new_robot() -> SimulatedRobot:
+        return SimulatedRobot(WORLD, Rules(limits=Limits(text=1_000_000)))
+
+    fits, fails = 1, 50_000
+    while fails - fits > 1:
+        depth = (fits + fails) // 2
+        error = other_worker.run(nested(depth), new_robot).error
+        fits, fails = (fits, depth) if error and error.kind == "RecursionError" else (depth, fails)
+    assert fails < 50_000
+    for depth in range(fits - 10, fits + 10):
+        for outcome in worker.run_tame([(nested(depth), [new_robot])]).values():
+            assert (depth, all_of(outcome)) == (depth, all_of(other_worker.run(nested(depth), new_robot)))
+
+
+@pytest.mark.slow
+def test_what_computes_too_long_in_a_batch_costs_those_after_it_nothing(worker: Worker) -> None:
+    computes = task("say('a')", "pow(3, 10 ** 9)")
+    jobs = [job(saying("first"), [WORLD]), job(computes, [WORLD]), job(saying("next"), [WORLD])]
+    assert worker.run_tame(jobs).keys() == {(0, 0), (2, 0)}
+
+
+def test_programs_of_a_batch_end_as_if_each_were_alone(worker: Worker, other_worker: Worker) -> None:
+    programs = [*DECIDED, *UNDECIDED, "class A: pass\ntask_program = A", "def task_program(:"]
+    for jobs in ([job(program) for program in programs], [job(program) for program in reversed(programs)]):
+        alone = [[other_worker.run(program, new_robot) for new_robot in robots] for program, robots in jobs]
+        for (program, _), outcomes, expected in zip(jobs, worker.run_all(jobs), alone, strict=True):
+            assert [program, *map(all_of, outcomes)] == [program, *map(all_of, expected)]
+
+
+def test_nothing_is_left_of_one_program_for_the_next(worker: Worker) -> None:
+    leaves = "left = 1\ndef other(): pass\n" + task("say('a')", "time.sleep(9)", "go_to('moon')")
+    finds = task(
+        "say(str(time.monotonic()))",
+        "try: say(str(left))",
+        "except NameError as error: say(str(error))",
+        "try: other()",
+        "except NameError as error: say(str(error))",
+    )
+    known = worker.run_tame([job(leaves), job(finds)])
+    texts = [event.text for event in known[1, 0].trace]
+    assert texts == ["0.0", "name 'left' is not defined", "name 'other' is not defined"]
+
+
+# --- skills of somebody's own
+
+
+class Waves:
+    """Makes robots with one skill more, and knows who did that skill when and where."""
+
+    def __init__(self, wave: Behaviour, **others: Behaviour) -> None:
+        self.processes: list[int] = []
+        self.people: list[str] = []
+        self.wave, self.others = wave, others
+
+    def robot(self) -> SimulatedRobot:
+        return SimulatedRobot(WORLD, RULES, TABLE, {**BEHAVIOURS, "wave": self._waved, **self.others})
+
+    def _waved(self, robot: SimulatedRobot, person: str) -> Result:
+        self.processes.append(os.getpid())
+        self.people.append(person)
+        robot.record("wave", person)
+        return self.wave(robot, person)
+
+
+def answering(robot: SimulatedRobot, person: str) -> str:
+    if person == "nobody":
+        raise RobotError("WaveNoPerson", f"nobody waves back in {robot.room} after {robot.now}")
+    if person == "slow":
+        robot.now += 100
+    return f"{person} in {robot.room} at {robot.now}"
+
+
+WAVING = {
+    "once": task("say('a')", "say(wave('amy'))", "go_to('lab')"),
+    "often": task(
+        "for n in range(5):", "    say(wave('amy'))", "    time.sleep(n)", "go_to('lab')", "say(wave('amy'))"
+    ),
+    "in vain": task(
+        "try: wave('nobody')", "except Exception as error: say(repr(error))", "wave('bob')", "go_to('moon')"
+    ),
+    "in vain, and the first error again": task(
+        *("errors = []", "for name in ['nobody', 'moon', 'nobody']:"),
+        *(
+            "    try: go_to(name) if name == 'moon' else wave(name)",
+            "    except Exception as e: errors.append(e)",
+        ),
+        "raise errors[0]",
+    ),
+    "in vain, and the second error again": task(
+        *("errors = []", "for name in ['nobody', 'moon', 'nobody']:"),
+        *(
+            "    try: go_to(name) if name == 'moon' else wave(name)",
+            "    except Exception as e: errors.append(e)",
+        ),
+        "raise errors[1]",
+    ),
+    "until a limit": task("while True: wave('amy')"),
+    "until a text is too long": task("wave('x' * 200)", "wave('y' * 201)", "wave('z')"),
+    "until time is up": task("wave('a')", "time.sleep(601)", "wave('b')"),
+    "slowly": task("say(wave('slow'))", "say(str(time.monotonic()))", "time.sleep(5)", "say(wave('slow'))"),
+    "too slowly": task("while True: wave('slow')"),
+    "with nothing": task("wave(1)"),
+}
+
+
+@pytest.mark.parametrize("program", WAVING.values(), ids=WAVING)
+def test_a_skill_of_somebodys_own_is_asked_for_here_once_a_call(
+    worker: Worker, other_worker: Worker, program: str
+) -> None:
+    together, alone = Waves(answering), Waves(answering)
+    known = worker.run_tame([(program, [together.robot, together.robot])])
+    assert list(known) == [(0, 0), (0, 1)]
+    outcome = other_worker.run(program, alone.robot)
+    assert [all_of(each) for each in known.values()] == [all_of(outcome)] * 2
+    assert together.people == alone.people * 2
+    assert {*together.processes} <= {os.getpid()}
+
+
+def test_a_robot_that_moves_in_its_own_way_has_the_outcomes_of_a_process_of_its_own(
+    worker: Worker, other_worker: Worker
+) -> None:
+    def drive(robot: SimulatedRobot, location: str) -> None:
+        robot.record("goto", location)
+        robot.room = "lab"
+
+    program = task("say('a')", "go_to('moon')", "say(get_current_location() + str(is_in_room('apple')))")
+    outcomes = [each.run(program, Waves(answering, go_to=drive).robot) for each in (worker, other_worker)]
+    assert all_of(outcomes[0]) == all_of(outcomes[1])
+    assert [event.text for event in outcomes[0].trace] == ["a", "moon", "apple", "labTrue"]
+
+
+def test_what_a_behaviour_raises_is_raised_here(worker: Worker) -> None:
+    def broken(_robot: SimulatedRobot, _person: str) -> None:
+        raise LookupError("a bug")
+
+    with pytest.raises(LookupError, match="a bug"):
+        worker.run_tame([(WAVING["once"], [Waves(broken).robot])])
+    assert worker.run_tame([job(saying("next"))])
+
+
+# --- children that break off
+
+
+def test_a_child_that_is_killed_costs_only_the_program_that_it_ran(worker: Worker) -> None:
+    fork_server = worker._fork_server(BATCH_SERVER).pid
+    killed: list[int] = []
+
+    def kill_the_child(_robot: SimulatedRobot, person: str) -> str:
+        if person == "killer" and not killed:
+            killed.extend(children_of(fork_server))
+            for pid in killed:
+                os.kill(pid, signal.SIGKILL)
+        return "done"
+
+    waves = Waves(kill_the_child)
+    killer = task("say('a')", "say(wave('killer'))")
+    programs = [saying("first"), task("say(wave('amy'))"), killer, saying("next"), task("say(wave('bob'))")]
+    known = worker.run_tame([(program, [waves.robot, waves.robot]) for program in programs])
+    assert len(killed) == 1
+    assert known.keys() == {(number, run) for number in range(5) for run in range(2)} - {(2, 0), (2, 1)}
+    assert {outcome.status for outcome in known.values()} == {Status.FINISHED}
+    killed.clear()
+    outcomes = worker.run_all([(program, [waves.robot, waves.robot]) for program in programs])
+    said = [[[event.text for event in outcome.trace][-1] for outcome in each] for each in outcomes]
+    assert said == [["first"] * 2, ["done"] * 2, ["done"] * 2, ["next"] * 2, ["done"] * 2]
+
+
+def test_a_fork_server_that_is_killed_costs_all_of_them_nothing_but_time() -> None:
+    def kill_the_server(_robot: SimulatedRobot, _person: str) -> str:
+        if not killed:
+            killed.append(worker._fork_server(BATCH_SERVER).pid)
+            os.kill(killed[0], signal.SIGKILL)
+        return "done"
+
+    killed: list[int] = []
+    waves = Waves(kill_the_server)
+    worker = Worker()
+    try:
+        programs = [saying("first"), WAVING["once"], saying("next")]
+        outcomes = worker.run_all([(program, [waves.robot]) for program in programs])
+    finally:
+        worker.close()
+    assert [outcome.status for each in outcomes for outcome in each] == [Status.FINISHED] * 3
+
+
+SAYS = '[["say",["first"],"ok",null]]'
+FORGED = {
+    "no JSON": b"nonsense",
+    "nothing": b"",
+    "no transcript": b"[]",
+    "half of one": b'[[],[],[],{"end":"fin',
+    "a transcript and more": b'[[],[],[],{"end":"finished"},1]',
+    "an end of another kind": b'[[],[],[],"finished"]',
+    "an unknown end": b'[[],[],[],{"end":"again"}]',
+    "no end": b"[[],[],[],{}]",
+    "an error of the robot that there was not": b'[[],[],[],{"end":"robot-error","number":0,"line":1}]',
+    "an error without a name": b'[[],[],[],{"end":"python-error","kind":1,"message":"a"}]',
+    "a drive that cannot be": b'[[["go_to",["moon"],"ok",null]],[0],[],{"end":"finished"}]',
+    "an order of a call that there is not": f'[{SAYS},[1],[],{{"end":"finished"}}]'.encode(),
+    "too much": b" " * (MAX_FRAME + 1),
+}
+
+
+@pytest.mark.parametrize("forged", FORGED.values(), ids=FORGED)
+def test_a_child_that_speaks_nonsense_costs_only_the_program_that_it_ran(
+    worker: Worker, monkeypatch: pytest.MonkeyPatch, forged: bytes
+) -> None:
+    honest = IsolatedProcess.receive_bytes
+    heard: list[bytes | None] = []
+
+    def receive(self: IsolatedProcess, most: int) -> bytes | None:
+        frame = honest(self, most)
+        if most == MAX_FRAME and frame is not None and b"finished" in frame:
+            heard.append(frame)
+            if len(heard) == 3:
+                if len(forged) > most:
+                    raise ProtocolError("a frame is too long")
+                return forged
+        return frame
+
+    monkeypatch.setattr(IsolatedProcess, "receive_bytes", receive)
+    jobs = [job(saying(text), WORLDS[:2]) for text in ("first", "second", "third")]
+    known = worker.run_tame(jobs)
+    assert known.keys() == {(0, 0), (0, 1), (2, 0), (2, 1)}
+    outcomes = {**known, (1, 0): worker.run_alone(jobs[1][0], jobs[1][1][0])}
+    assert [outcomes[number, 0].trace[0].text for number in range(3)] == ["first", "second", "third"]
+
+
+@pytest.mark.parametrize("error", [TimeoutError, LostProcessError, None])
+def test_a_child_that_says_no_more_costs_only_the_program_that_it_ran(
+    worker: Worker, monkeypatch: pytest.MonkeyPatch, error: type[Exception] | None
+) -> None:
+    honest = IsolatedProcess.receive_bytes
+    frames = Counter[int]()
+
+    def receive(self: IsolatedProcess, most: int) -> bytes | None:
+        frames[most] += most == MAX_FRAME
+        if frames[MAX_FRAME] == 2 and most == MAX_FRAME:
+            if error is None:
+                return None
+            raise error
+        return honest(self, most)
+
+    monkeypatch.setattr(IsolatedProcess, "receive_bytes", receive)
+    assert worker.run_tame([job(saying(text), [WORLD]) for text in "abc"]).keys() == {(0, 0), (2, 0)}
+
+
+# --- replay
+
+
+def follow(calls: object, order: object, moments: object = (), rules: Rules = RULES) -> Replay:
+    transcript = decoded(json.dumps([calls, order, moments, None]).encode())
+    assert transcript is not None
+    replay = Replay(robot(rules=rules))
+    replay.follow(transcript)
+    return replay
+
+
+STOPPED: list[object] = ["", [], "time", None]  # where only time went by
+A, B = ["say", ["a"], "ok", None], ["say", ["b"], "ok", None]
+TIGHT = Rules(limits=Limits(seconds=10, calls=2, text=5, trace=20))
+LONG = ["say", ["x" * 6], "stop", None]
+REFUSED: dict[str, Callable[[], object]] = {
+    "an answer that is none": lambda: follow([["get_current_location", [], "ok", None]], [0]),
+    "another answer": lambda: follow([["get_current_location", [], "ok", "lab"]], [0]),
+    "another list": lambda: follow([["get_all_rooms", [], "ok", ["hall"]]], [0]),
+    "another sight": lambda: follow([["is_in_room", ["mug"], "ok", False]], [0]),
+    "an error where there is none": lambda: follow([["say", ["a"], "error", ["Kind", "why"]]], [0]),
+    "no error where there is one": lambda: follow([["go_to", ["moon"], "ok", None]], [0]),
+    "another kind of error": lambda: follow(
+        [["go_to", ["moon"], "error", ["PickInvalidObject", 'there is no room "moon"']]], [0]
+    ),
+    "another error": lambda: follow([["go_to", ["moon"], "error", ["GoToInvalidLocation", "why"]]], [0]),
+    "an error that is a number": lambda: follow([["go_to", ["moon"], "error", 5]], [0]),
+    "an unknown kind of answer": lambda: follow([["say", ["a"], "maybe", None]], [0]),
+    "a limit where there is none": lambda: follow([["say", ["a"], "stop", None]], [0]),
+    "an answer of later": lambda: follow(
+        [["get_current_location", [], "ok", "lab"], ["go_to", ["lab"], "ok", None]], [0, 1]
+    ),
+    "a call that is beyond a limit": lambda: follow([A], [0, 0, 0], rules=TIGHT),
+    "a call after a limit": lambda: follow([A, ["say", ["a"], "stop", None]], [0, 0, 1, 1], rules=TIGHT),
+    "a call after a text that was too long": lambda: follow([A, LONG], [1, 0], rules=TIGHT),
+    "a call after the time": lambda: follow([A], [0, 0], [[1, 11.0]], rules=TIGHT),
+    "a call after a stop for time": lambda: follow([A, STOPPED], [1, 0], [[0, 11.0]], rules=TIGHT),
+    "a call for an answer after a limit": lambda: follow(
+        [LONG, ["say", ["a"], "ask", None]], [0, 1], rules=TIGHT
+    ),
+    "an unknown skill": lambda: follow([["fly", ["a"], "ok", None]], [0]),
+    "an unknown skill that is never called": lambda: follow([A, ["fly", ["a"], "ok", None]], [0]),
+    "too few arguments": lambda: follow([["say", [], "ok", None]], [0]),
+    "too many arguments": lambda: follow([["say", ["a", "b"], "ok", None]], [0]),
+    "an argument that is no text": lambda: follow([["say", [1], "ok", None]], [0]),
+    "a list for a text": lambda: follow([["say", [[["a", True]]], "ok", None]], [0]),
+    "a text for a list": lambda: follow([["ask", ["a", "b", "c"], "ask", None]], [0]),
+    "an option that is none": lambda: follow([["ask", ["a", "b", ["c"]], "ask", None]], [0]),
+    "an option of other types": lambda: follow([["ask", ["a", "b", [["c", 1]]], "ask", None]], [0]),
+    "an order that does not exist": lambda: follow([A, B], [0, 2]),
+    "an order from the end": lambda: follow([A, B], [0, -2]),
+    "an order without calls": lambda: follow([], [0]),
+    "an order that is no number that fits": lambda: follow([A], [10**30]),
+    "moments in the wrong order": lambda: follow([A], [0, 0, 0], [[2, 1.0], [1, 2.0]]),
+    "two moments for one call": lambda: follow([A], [0, 0], [[1, 1.0], [1, 2.0]]),
+    "a moment after all calls": lambda: follow([A], [0, 0], [[2, 1.0]]),
+    "a moment before all calls": lambda: follow([A], [0, 0], [[-1, 1.0], [1, 2.0]]),
+    "time that goes back": lambda: follow([A], [0, 0, 0], [[1, 2.0], [2, 1.0]]),
+}
+
+
+@pytest.mark.parametrize("attempt", REFUSED.values(), ids=REFUSED)
+def test_replay_refuses_what_cannot_have_been(attempt: Callable[[], object]) -> None:
+    with pytest.raises(ProtocolError):
+        attempt()
+
+
+def test_replay_does_what_was_done() -> None:
+    calls = [
+        A,
+        ["go_to", ["lab"], "ok", None],
+        ["go_to", ["moon"], "error", ["GoToInvalidLocation", 'there is no room "moon"']],
+        ["get_all_rooms", [], "ok", ["hall", "lab"]],
+        ["ask", ["amy", "Tea?", [["no", True], ["yes", True]]], "ok", 1],
+        ["is_in_room", ["apple"], "ok", True],
+        STOPPED,
+    ]
+    replay = follow(calls, [0, 1, 0, 3, 2, 4, 5, 6], [[2, 1.5], [4, 3.0], [7, 9.0]])
+    told = [
+        (event.kind, event.text, event.answer, event.found, event.place, event.time)
+        for event in replay.robot.trace
+    ]
+    assert told == [
+        ("say", "a", None, None, "hall", 0.0),
+        ("goto", "lab", None, None, "hall", 0.0),
+        ("say", "a", None, None, "lab", 1.5),
+        ("goto", "moon", None, None, "lab", 3.0),
+        ("ask", "Tea?", "yes", None, "lab", 3.0),
+        ("check", "apple", None, True, "lab", 3.0),
+    ]
+    assert replay.ledger.limit is None
+    assert (replay.ledger.calls, replay.robot.now) == (7, 9.0)
+
+
+@pytest.mark.parametrize(
+    ("calls", "order", "moments"),
+    [
+        ([A, ["say", ["a"], "stop", None]], [0, 0, 1], []),
+        ([A, LONG], [0, 1], []),
+        ([A, STOPPED], [0, 1], [[1, 11.0]]),
+    ],
+)
+def test_replay_reaches_the_limits_that_were_reached(calls: object, order: object, moments: object) -> None:
+    ledger = follow(calls, order, moments, TIGHT).ledger
+    assert ledger.limit is not None
+    outcome = ledger.ended({"end": "finished"})
+    assert (outcome.status, outcome.error) == (Status.TIMEOUT, RunError("TimeoutError", ledger.limit))
+
+
+# --- looking often
+
+
+Call = tuple[float, str, tuple[Any, ...]]
+LOOKS: list[Call] = [(number // 3, "is_in_room", ("unicorn",)) for number in range(1_000)]
+HISTORIES: dict[str, list[Call]] = {
+    "looks": LOOKS,
+    "looks and says": [
+        call for look in LOOKS[:500] for call in (look, (look[0], "say", (f"not here {look[0] % 2}",)))
+    ],
+    "looks from room to room": [
+        call
+        for number, look in enumerate(LOOKS)
+        for call in (look, (look[0], "go_to", (("lab", "hall")[number // 100 % 2],)))
+        if call is look or number % 100 == 0
+    ],
+    "asks": [
+        (0, skill, arguments)
+        for _ in range(400)
+        for skill, arguments in (
+            ("go_to", ("lab",)),
+            ("is_in_room", ("person",)),
+            ("ask", ("", "Tea?", (Option("yes"), Option("no")))),
+            ("is_in_room", ("person",)),
+        )
+    ],
+    "picks": [
+        (0, skill, ("mug",)) for _ in range(400) for skill in ("is_in_room", "pick", "is_in_room", "place")
+    ],
+    "tells": [(number, "get_all_rooms", ()) for number in range(1_001)],
+    "speaks at length": [(number, "say", ("x" * (300 + number % 3),)) for number in range(1_000)],
+}
+
+
+@pytest.mark.parametrize("history", HISTORIES.values(), ids=HISTORIES)
+def test_what_was_done_before_is_done_again_in_the_same_way(history: list[Call]) -> None:
+    rules = Rules(limits=Limits(trace=250_000))
+    told = []
+    for kind in (Ledger, RememberingLedger):
+        ledger = kind(SimulatedRobot(WORLD, rules))
+        answers = []
+        for now, skill, arguments in history:
+            ledger.let_time_pass(now)
+            answers.append(ledger.perform(skill, arguments))
+        told.append((answers, repr(ledger.robot.trace), ledger.calls, ledger.text, ledger.limit))
+    assert told[0] == told[1]
+
+
+def test_a_thousand_looks_cost_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    perform = Mock(side_effect=[False])
+    monkeypatch.setattr(SimulatedRobot, "perform", perform)
+    looking = SimulatedRobot(WORLD)
+    ledger = RememberingLedger(looking)
+    for now, skill, arguments in LOOKS:
+        ledger.let_time_pass(now)
+        assert ledger.perform(skill, arguments) == ("ok", False)
+    assert perform.call_count == 1
+
+
+@pytest.mark.parametrize("seconds", [0, 1])
+def test_a_program_that_looks_a_thousand_times_ends_as_in_a_process_of_its_own(
+    worker: Worker, other_worker: Worker, seconds: int
+) -> None:
+    program = task("while not is_in_room('unicorn'):", f"    time.sleep({seconds})", "    say('not here')")
+
+    def new_robot() -> SimulatedRobot:
+        return SimulatedRobot(WORLD)
+
+    known = worker.run_tame([(program, [new_robot])])
+    assert all_of(known[0, 0]) == all_of(other_worker.run(program, new_robot))
+    assert (len(known[0, 0].trace), known[0, 0].status) == (1_000, Status.TIMEOUT)
+
+
+# --- workers and pools
+
+
+def test_events_of_batches_are_logged(worker: Worker, caplog: pytest.LogCaptureFixture) -> None:
+    programs = {
+        saying("a"): ["finished"],
+        task("go_to('moon')"): ["robot-error"],
+        task("x = 1 / 0"): ["python-error"],
+        task("while True: pass"): ["timeout"],
+    }
+    worker.run_tame([job(program) for program in programs])
+    assert not caplog.records
+    with caplog.at_level("DEBUG", logger="codebotler.engine.events"):
+        assert len(worker.run_tame([job(program) for program in programs])) == 12
+    for program, ends in programs.items():
+        number = f"program {zlib.crc32(program.encode()):08x}: "
+        own = [
+            r.getMessage().removeprefix(number) for r in caplog.records if r.getMessage().startswith(number)
+        ]
+        assert Counter(message.partition(" ")[0] for message in own) == Counter(["started", *ends] * 3)
+    assert len(caplog.records) == 24
+
+
+def test_one_process_per_run_shares_no_process(other_worker: Worker) -> None:
+    jobs = [job(saying(text)) for text in "abc"]
+    assert other_worker.run_tame(jobs) == {}
+    outcomes = other_worker.run_all(jobs)
+    assert [[each.trace[0].text for each in of_one] for of_one in outcomes] == [
+        ["a"] * 3,
+        ["b"] * 3,
+        ["c"] * 3,
+    ]
+    assert BATCH_SERVER not in other_worker._fork_servers
+    assert FORK_SERVER in other_worker._fork_servers
+
+
+def test_a_pool_hands_on_that_each_run_has_a_process() -> None:
+    for alone, role in ((False, BATCH_SERVER), (True, FORK_SERVER)):
+        with WorkerPool(1, one_process_per_run=alone) as pool:
+            assert list(pool.here()._fork_servers) == [role]
+
+
+def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
+    calls: list[list[int]] = []
+
+    def work(numbers: Sequence[int]) -> list[int]:
+        calls.append(list(numbers))
+        return [number * 2 for number in numbers]
+
+    keys = [number % 200 for number in range(500)]
+    with WorkerPool(1) as pool:
+        results = list(pool.map_distinct(work, keys, name=lambda number: number.to_bytes(2)))
+    assert results == [number * 2 for number in keys]
+    assert [number for call in calls for number in call] == list(range(200))
+    sizes = list(map(len, calls))
+    assert sizes[:-1] == sorted(sizes[:-1])
+    assert (sizes[0], max(sizes)) == (1, LARGEST)
+
+
+@pytest.mark.parametrize("width", [1, 2, 8, 64])
+def test_small_jobs_are_spread_over_all_threads(width: int) -> None:
+    assert {batch_size(sent, width) for sent in range(width)} == {1}
+    sizes = [batch_size(sent, width) for sent in range(40 * width)]
+    assert sizes == sorted(sizes)
+    assert sizes[-1] == LARGEST
+
+
+def test_keys_are_read_in_batches_and_no_further_than_somebody_takes_them() -> None:
+    keys = DistinctKeys(iter([1, 1, 2, 1, 3, 2, *range(4, 10_000)]), lambda number: number.to_bytes(2))
+    assert list(keys.read(2).values()) == [1, 2]
+    assert list(keys.read(2).values()) == [3, 4]
+    assert [int.from_bytes(name) for name in keys.waiting] == [1, 1, 2, 1, 3, 2, 4]
+    while keys.read(16):
+        pass
+    assert len(keys.waiting) == MOST_AHEAD
+    keys.waiting.clear()
+    assert len(keys.read(16)) == 16
