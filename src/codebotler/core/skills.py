@@ -100,6 +100,7 @@ class SkillTable(Mapping[str, Skill]):
     rows: tuple[Skill, ...]
     _by_name: Mapping[str, Skill] = field(init=False, repr=False, compare=False)
     recordings: Mapping[str, Recording] = field(init=False, repr=False, compare=False)
+    _hash: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         by_name = {skill.name: skill for skill in self.rows}
@@ -109,6 +110,7 @@ class SkillTable(Mapping[str, Skill]):
         object.__setattr__(self, "_by_name", by_name)
         recordings = {skill.recording.kind: skill.recording for skill in self.rows if skill.recording}
         object.__setattr__(self, "recordings", recordings)
+        object.__setattr__(self, "_hash", hash(self.rows))  # once, since tables are keys of caches
 
     def __getitem__(self, name: str) -> Skill:
         return self._by_name[name]
@@ -120,7 +122,7 @@ class SkillTable(Mapping[str, Skill]):
         return len(self.rows)
 
     def __hash__(self) -> int:
-        return hash(self.rows)
+        return self._hash
 
     def __repr__(self) -> str:
         return f"SkillTable({', '.join(self)})"

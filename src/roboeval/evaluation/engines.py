@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import platform
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -35,6 +36,9 @@ class Engine(Protocol):
 OpenEngine = AbstractContextManager[Engine]
 
 
+BRIEF = 20_000  # events and the like that are made before garbage is looked for: nearly all live briefly
+
+
 class Local:
     """The cores of this machine: given pool, or some of its own, which end with the context."""
 
@@ -42,11 +46,14 @@ class Local:
         self._given, self._isolation = pool, isolation
 
     def __enter__(self) -> Self:
+        self._threshold = gc.get_threshold()
+        gc.set_threshold(BRIEF, *self._threshold[1:])
         given = self._given
         self._pool = given if isinstance(given, WorkerPool) else WorkerPool(given, **self._isolation)
         return self
 
     def __exit__(self, *_: object) -> None:
+        gc.set_threshold(*self._threshold)
         if self._pool is not self._given:
             self._pool.__exit__()
 
