@@ -102,11 +102,13 @@ class Replay:
 
     def __init__(self, robot: SimulatedRobot) -> None:
         self.robot, self.ledger = robot, RememberingLedger(robot)
-        self._signatures = signatures(robot.skills)
+        self._signatures, self._own = signatures(robot.skills), robot.own_skills
 
     def follow(self, transcript: Transcript) -> SkillAnswer:
         """Perform what was asked and return the last answer; a ProtocolError where one is not as was said."""
         calls = [self._expected(call) for call in transcript.calls]
+        if transcript.end is None and (not calls or calls[-1][2] is not None):
+            raise ProtocolError("a child waits for nothing")
         order = range(len(calls)) if transcript.order is None else transcript.order
         if transcript.order and not 0 <= min(order) <= max(order) < len(calls):
             raise ProtocolError("there is no such call")
@@ -143,6 +145,8 @@ class Replay:
         signature = self._signatures.get(call.skill)
         if signature is None or tuple(map(type, call.arguments)) != signature:
             raise ProtocolError("there is no such skill, or it has other parameters")
+        if call.kind == "ask" and call.skill not in self._own:
+            raise ProtocolError("the child could have answered")
         value = tuple(call.value) if call.kind == "error" and isinstance(call.value, list) else call.value
         return call.skill, call.arguments, None if call.kind == "ask" else (call.kind, value)
 

@@ -19,7 +19,7 @@ from codebotler.core.trace import Option
 from codebotler.simulator.ledger import RememberingLedger
 from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
-from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, MAX_FRAME
+from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, MAX_FRAME
 from codebotler.simulator.sandbox.channel import receive, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
@@ -50,7 +50,7 @@ def get_ready(
     simulate_environment(run)
     rehearsal, lessons = loads(receive_setup(door))  # noqa: S302 - from the engine
     sys.meta_path.clear()
-    give_up_rights()
+    give_up_rights(BATCH_MEMORY)
     seccomp = usable_filter()
     for _ in range(lessons):
         transcripts(run, rehearsal)
@@ -133,8 +133,10 @@ class TranscribedRun(ProgramRun):
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the copy of the robot execute a skill."""
+        given = [options(value) if type(value) is list else value for value in arguments]
         try:
-            given = [options(value) if type(value) is list else plain(value) for value in arguments]
+            for each in given:
+                expect_plain(each)
             if self.now != self._told:
                 self._let_time_pass()
             answer = None if name in self.elsewhere else self.ledger.perform(name, given)
@@ -213,18 +215,16 @@ def the_clock(*_: object) -> ModuleType:
     return sys.modules["time"]
 
 
-def plain(text: str) -> str:
-    """A text that JSON can hold: not too long, and without halves of surrogate pairs, which it would join."""
-    if len(text.encode()) > LONGEST_CALL:
-        raise MemoryError
-    return text
-
-
 def options(values: list[object]) -> tuple[Option, ...]:
     """Options as the robot takes them."""
-    given = tuple([Option(str(value), isinstance(value, str)) for value in values])
-    plain("".join([text for text, _ in given]))
-    return given
+    return tuple([Option(str(value), isinstance(value, str)) for value in values])
+
+
+def expect_plain(given: Argument) -> None:
+    """Raise where texts are too long for JSON, or hold halves of surrogate pairs, which it would join."""
+    text = given if isinstance(given, str) else "".join([offered for offered, _ in given])
+    if len(text.encode()) > LONGEST_CALL:
+        raise MemoryError
 
 
 def distinct(calls: list[tuple[str, Sequence[Argument], str, Any]]) -> tuple[list[object], list[int]]:

@@ -468,7 +468,7 @@ def test_a_child_that_says_no_more_costs_only_the_program_that_it_ran(
 
 
 def follow(calls: object, order: object, moments: object = (), rules: Rules = RULES) -> Replay:
-    transcript = decoded(json.dumps([calls, order, moments, None]).encode())
+    transcript = decoded(json.dumps([calls, order, moments, {"end": "finished"}]).encode())
     assert transcript is not None
     replay = Replay(robot(rules=rules))
     replay.follow(transcript)

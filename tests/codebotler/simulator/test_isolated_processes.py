@@ -22,10 +22,7 @@ ROOT = os.geteuid() == 0
 USER = NOBODY if ROOT else os.geteuid()
 CLOSED = ("preparer", "child of a batch", "child")
 ROLES = (*CLOSED, "batch-fork-server", "fork-server")
-MEGABYTES = 512 * 1024**2
 NEVER = {"Max core file size": "0", "Max file size": "0", "Max locked memory": "0", "Max msgqueue size": "0"}
-LIMITS = {**NEVER, "Max address space": str(MEGABYTES)}
-CLOSED_LIMITS = {**LIMITS, "Max processes": "0", "Max open files": "4"}
 ENVIRONMENT = {"PYTHONHASHSEED", "TZ", "LC_ALL", "PYTHONUTF8", "LD_BIND_NOW"}
 
 
@@ -89,6 +86,13 @@ def enclosed() -> Iterator[dict[str, Enclosed]]:
     del os.environ["A_SECRET"]
 
 
+def limits_of(role: str) -> dict[str, tuple[str, str]]:
+    """What a process is limited to for ever, soft and hard."""
+    memory = 384 if "batch" in role else 512
+    limits = {**NEVER, "Max address space": str(memory * 1024**2)}
+    return {name: (value, value) for name, value in limits.items()}
+
+
 @pytest.mark.parametrize("role", ROLES)
 def test_rights_are_given_up(enclosed: dict[str, Enclosed], role: str) -> None:
     process = enclosed[role]
@@ -98,7 +102,8 @@ def test_rights_are_given_up(enclosed: dict[str, Enclosed], role: str) -> None:
         assert process.status["Groups"] == ""
     assert process.status["NoNewPrivs"] == "1"
     assert process.owner == 0, "its memory can be looked into"
-    assert {name: process.limits[name] for name in LIMITS} == {n: (v, v) for n, v in LIMITS.items()}
+    wanted = limits_of(role)
+    assert {name: process.limits[name] for name in wanted} == wanted
 
 
 @pytest.mark.parametrize("role", CLOSED)
@@ -106,7 +111,12 @@ def test_what_runs_or_parses_programs_is_closed(enclosed: dict[str, Enclosed], r
     process = enclosed[role]
     assert process.status["Seccomp"] == "2"
     seconds = ("2", "3") if role == "child of a batch" else ("5", "6")
-    wanted = {**{name: (value, value) for name, value in CLOSED_LIMITS.items()}, "Max cpu time": seconds}
+    wanted = {
+        **limits_of(role),
+        "Max processes": ("0", "0"),
+        "Max open files": ("4", "4"),
+        "Max cpu time": seconds,
+    }
     assert {name: process.limits[name] for name in wanted} == wanted
 
 

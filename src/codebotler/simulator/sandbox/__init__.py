@@ -19,6 +19,9 @@ PIECE, MORE = 16_384, "more"  # bytes of a message that a child gets at once, an
 WITHOUT_REFERENCES = 2  # of marshal's formats: later ones depend on what else the writing process holds
 
 MEMORY = 512 * 1024 * 1024  # bytes of address space of an isolated process
+BATCH_MEMORY = (
+    384 * 1024 * 1024
+)  # the same of a batch, so that whatever it has room for, a run by itself has too
 CPU_SECONDS = 5  # of processor time, against what fuel cannot see, such as one long call into C
 BATCH_CPU_SECONDS = 2  # the same of a batch; what is under way then runs again in a process of its own
 LIVE_CPU_SECONDS = 3600  # the same on a robot, where a run may take all day and somebody watches it

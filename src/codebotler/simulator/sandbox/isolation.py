@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     Filter: TypeAlias = tuple[bytes, bytes]  # a `struct sock_fprog`, and the code that it points to
 
 
-def give_up_rights() -> None:
+def give_up_rights(memory: int = MEMORY) -> None:
     """Give up for ever what neither this process needs nor any that it forks."""
     for name in ("CORE", "FSIZE", "MEMLOCK", "MSGQUEUE"):
         set_limit(name, 0)
-    set_limit("AS", MEMORY)
+    set_limit("AS", memory)
     become_nobody()
     die_with_parent()
     prctl(PR_SET_DUMPABLE, 0)  # others of the same user can neither trace this process nor read its memory

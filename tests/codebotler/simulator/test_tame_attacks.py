@@ -1,0 +1,535 @@
+"""Programs that aim at what tame programs rely on: the verifier, the child that they share, the replay.
+
+Each file of tests/hostile_tame is one. Its first line says what it tries, and `# tame: yes` or `# tame: no`
+what the verifier must say of it. A tame one runs in a child with honest programs before, between and after
+its runs, in three worlds each, and all outcomes are those of processes of their own. `# decided: alone` says
+that the child must leave it to these.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
+from pathlib import Path
+
+import pytest
+
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.trace import Outcome, Status
+from codebotler.core.world import Person, Room, World
+from codebotler.simulator.batch import outcomes
+from codebotler.simulator.fact_sampler import FactSampler
+from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
+from codebotler.simulator.robot import BEHAVIOURS, RobotError, SimulatedRobot
+from codebotler.simulator.rules import Rules
+from codebotler.simulator.sampled_robot import RoomMap, SampledRobot
+from codebotler.simulator.sandbox.fuel import prepared
+from codebotler.simulator.worker import NewRobot, Worker
+
+FOLDER = Path(__file__).parents[2] / "hostile_tame"
+PROGRAMS = {path.stem: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.py"))}
+TAME = [name for name, source in PROGRAMS.items() if "\n# tame: yes\n" in source]
+WILD = [name for name, source in PROGRAMS.items() if "\n# tame: no\n" in source]
+AS_WRITTEN = Rules(literals="as-written")
+AMY = Person("amy", ("yes", "no", ".*"))
+BOB = Person(".*", ("no", "yes"))
+WORLDS = (
+    World((Room("start", ("mug",), (BOB,)), Room("kitchen", ("apple", "mug"), (AMY,))), "start"),
+    World((Room("start"), Room("amy's lab", ("apple",), (AMY, BOB)), Room("kitchen")), "start"),
+    World((Room("kitchen", (), (AMY,)), Room("start")), "kitchen"),
+)
+HONEST = """
+asked = []
+
+def depth(n):
+    return 0 if n == 0 else 1 + depth(n - 1)
+
+def remember(text, kept=[]):
+    kept.append(text)
+    return kept
+
+def task_program():
+    for room in get_all_rooms():
+        go_to(room)
+        if is_in_room("mug"):
+            pick("mug")
+            asked.append(room)
+    say(str([asked, remember("a"), depth(100), time.time(), time.ctime(), time.monotonic()]))
+    say(str([sorted({"b": 1, "a": 2}.items()), [room for room in get_all_rooms()], "x".upper(), len(asked)]))
+    print("x" * 100)
+    time.sleep(1.5)
+    try:
+        asked.append(ask("", "Is it yes?", ["Yes", "No"]))
+    except Exception as error:
+        say(repr(error))
+    say(f"{asked!r} {0.1 + 0.2} {[1] == [1]} {max([3, 1, 2], key=abs)}")
+    raise
+"""
+ALSO_HONEST = """
+def task_program():
+    found = {room: is_in_room("amy") for room in get_all_rooms() if go_to(room) is None}
+    say(str(found))
+    try:
+        place("mug")
+    except Exception as error:
+        say(str(error))
+    pick("nothing")
+"""
+
+# Where `@` stands, data may stand and no function; a generator may only where a line begins with `~`.
+PLACES = r"""
+@
+x = @
+x += @
+x: int = @
+x[@] = 1
+x[@]: int = 1
+x[@:x] = 1
+x[x:@:@] = 1
+del x[@]
+for x[@] in x: pass
+~for y in @: pass
+for y in x: @
+for y in x: pass\nelse: @
+while @: pass
+while x: @
+while x: pass\nelse: @
+if @: pass
+if x: @
+if x: pass\nelse: @
+try: @\nfinally: pass
+try: pass\nexcept ValueError: @
+try: pass\nexcept ValueError: pass\nelse: @
+try: pass\nfinally: @
+raise @
+raise ValueError(@)
+raise ValueError(x=@)
+raise ValueError from @
+assert @
+assert x, @
+def f(): @
+def f(): return @
+def f(y=@): pass
+def f(*, y=@): pass
+(@ or x)
+(x or @)
+(@ + x)
+(x % @)
+-@
+not @
+(@ if x else x)
+(x if @ else x)
+(x if x else @)
+@[0]
+x[@]
+{@: 1}
+{1: @}
+{**@}
+[@]
+(@,)
+~[*@]
+[@ for y in x]
+~[1 for y in @]
+~[1 for y in x for z in @]
+[1 for y in x if @]
+[1 for x[@] in x]
+{@: 1 for y in x}
+{1: @ for y in x}
+~{1: 1 for y in @}
+list(@ for y in x)
+x < @
+@ < x
+x < @ < x
+~x in @
+~x not in @
+@ in x
+@ is None
+(y := @)
+f'{@}'
+f'{x:{@}}'
+~len(@)
+~list(@)
+~dict(@)
+~next(@)
+next(x, @)
+str(@)
+print(@)
+int(x, base=@)
+dict(a=@)
+~max(@)
+max(@, x)
+max(x, @)
+~max(@, key=str)
+max(x, default=@)
+sorted(x, reverse=@)
+sorted(x, **@)
+max(x, key=lambda y: @)
+max(x, key=lambda y=@: 1)
+max(x, key=@.get)
+~list(map(str, @))
+~list(map(str, x, @))
+~list(filter(None, @))
+~list(zip(@))
+~list(zip(*@))
+list(zip(x, strict=@))
+list(@.items())
+say(@)
+~say(*@)
+say(**@)
+say(message=@)
+own(@)
+own(key=@)
+x(@)
+x(key=@)
+x.append(@)
+x.append(key=@)
+~x.extend(@)
+~x.update(@)
+~'a'.join(@)
+x.get(1, @)
+x.sort(reverse=@)
+@.append(1)
+time.sleep(@)
+time.sleep(seconds=@)
+'{}'.format(@)
+'{a}'.format(a=@)
+isinstance(@, int)
+@.tm_year
+""".strip().splitlines()
+NAMES_IN_ANNOTATIONS = r"""
+x: @ = 1
+x: list[@] = 1
+x: @[int] = 1
+x: int | @ = 1
+x: @ | int = 1
+x: (int, @) = 1
+x: [@] = 1
+def f(y: @): pass
+def f(*y: @): pass
+def f(*, y: @): pass
+def f() -> @: pass
+""".strip().splitlines()
+NOT_ALLOWED = r"""
+def f(__builtins__): pass
+def f(own): pass
+def len(y): pass
+def open(): pass
+def say(): pass
+@x\ndef f(): pass
+global __builtins__
+def f():\n    global own
+try: pass\nexcept x: pass
+try: pass\nexcept (ValueError, x): pass
+try: pass\nexcept ConnectionError: pass
+try: pass\nexcept ValueError as len: pass
+max(x, key=lambda len: 1)
+max(x, key=lambda *len: 1)
+max(x, key=lambda **time: 1)
+max(x, key=str.encode)
+max(x, key=x.append)
+max(x, key=x.get.get)
+max(x, kez=str)
+next(map(next, x))
+list(map(*x))
+list(map(key=str))
+isinstance(x)
+isinstance(x, object)
+isinstance(x, (int, object))
+isinstance(x, int, y=1)
+isinstance(*x)
+time.tzset()
+time.time_ns()
+time.strptime(x)
+time
+time.time
+x = ValueError
+x = ValueError(1)
+[1 for len in x]
+[1 for y, (len, z) in x]
+list(1 for time in x)
+[1 for y in x if (len := y)]
+(say := 1)
+def f(len): (len := 1)
+def f(len): [1 for len in x]
+x.y: int = 1
+(own := 1)
+x is x
+x is 1
+x is None is not x is x
+x.y
+x.tm_year = 1
+x.tm_year += 1
+del x.tm_year
+time.localtime().tm_zone
+x = b'1'
+x = 1j
+x.translate(x)
+x.format(x)
+x.format_map(x)
+x.encode()
+x.__len__()
+x.items()
+{1}
+{y for y in x}
+lambda: 1
+exit()
+quit
+sys
+__file__
+__builtins__
+import os
+import time as clock
+from time import sleep
+with x: pass
+""".strip().splitlines()
+
+
+@pytest.fixture(scope="module")
+def batches() -> Iterator[Worker]:
+    """A worker that runs tame programs together."""
+    worker = Worker()
+    yield worker
+    worker.close()
+
+
+@pytest.fixture(scope="module")
+def alone() -> Iterator[Worker]:
+    """A worker with a process for each run."""
+    worker = Worker(one_process_per_run=True)
+    yield worker
+    worker.close()
+
+
+@pytest.fixture(scope="module")
+def honest(alone: Worker) -> dict[str, list[str]]:
+    """All of the outcomes of honest programs, each of which had a process of its own."""
+    return {source: run_alone(alone, source) for source in (HONEST, ALSO_HONEST)}
+
+
+@cache
+def robots() -> tuple[NewRobot, ...]:
+    return tuple(partial(SimulatedRobot, world, AS_WRITTEN) for world in WORLDS)
+
+
+def run_alone(worker: Worker, source: str) -> list[str]:
+    return [all_of(worker.run_alone(source, new_robot)) for new_robot in robots()]
+
+
+def run_together(worker: Worker, *sources: str) -> list[list[str | None]]:
+    """All of the outcomes of programs in one child, None where it left them to other processes."""
+    known = worker.run_tame([(source, robots()) for source in sources])
+    return [
+        [all_of(known[number, run]) if (number, run) in known else None for run in range(len(WORLDS))]
+        for number in range(len(sources))
+    ]
+
+
+def all_of(outcome: Outcome) -> str:
+    """Everything in an outcome, with the places and times that its comparison leaves out."""
+    return repr((outcome, outcome.trace))
+
+
+def is_tame(source: str) -> bool:
+    with warnings.catch_warnings(action="ignore"):
+        return prepared(source, lowercase=False, skills=frozenset(SKILLS))[1]
+
+
+def with_line(line: str) -> str:
+    """A program in which something stands."""
+    return f"x = []\n\ndef own(y):\n    pass\n\n{line}\n\ndef task_program():\n    pass\n".replace(
+        "\\n", "\n"
+    )
+
+
+@pytest.mark.parametrize("place", [*PLACES, *NAMES_IN_ANNOTATIONS])
+def test_functions_stand_nowhere_among_data(place: str) -> None:
+    line, takes_iterators = place.removeprefix("~"), place.startswith("~")
+    assert is_tame(with_line(line.replace("@", "x")))
+    for function in ("say", "own", "print", "time", "(lambda: 1)", "x.append", "__builtins__"):
+        assert not is_tame(with_line(line.replace("@", function))), function
+    if place in PLACES:
+        for iterator in ("(y for y in x)", "map(str, x)", "x.items()"):
+            assert is_tame(with_line(line.replace("@", iterator))) is takes_iterators, iterator
+
+
+@pytest.mark.parametrize("line", NOT_ALLOWED)
+def test_what_is_not_listed_is_not_allowed(line: str) -> None:
+    assert not is_tame(with_line(line))
+
+
+def test_all_programs_say_what_they_are() -> None:
+    assert len(TAME) + len(WILD) == len(PROGRAMS) > 100
+    for source in PROGRAMS.values():
+        assert source.startswith('"""'), source
+
+
+@pytest.mark.parametrize("name", WILD)
+def test_wild_program_is_left_alone(name: str, batches: Worker) -> None:
+    assert not is_tame(PROGRAMS[name])
+    before, wild, after = run_together(batches, HONEST, PROGRAMS[name], HONEST)
+    assert wild == [None] * len(WORLDS)
+    assert before == after
+
+
+@pytest.mark.parametrize("name", TAME)
+def test_tame_program_is_felt_by_no_other_run(
+    name: str, batches: Worker, alone: Worker, honest: Mapping[str, list[str]]
+) -> None:
+    source = PROGRAMS[name]
+    assert is_tame(source)
+    order = (HONEST, source, ALSO_HONEST, source, HONEST)
+    together = run_together(batches, *order)
+    wanted: list[str | None] = [*run_alone(alone, source)]
+    if "\n# decided: alone\n" in source:
+        wanted = [None] * len(WORLDS)
+    assert together == [honest.get(each, wanted) for each in order]
+
+
+# --- a skill of somebody's own
+
+
+def wave(robot: SimulatedRobot, person: str) -> None:
+    """Wave, which takes time, and drive somebody away."""
+    robot.sleep_until(robot.now + 30)
+    robot.record("wave", person)
+    robot.room = robot.rooms[0]
+    if person == "nobody":
+        raise RobotError("WaveNoPerson", "nobody is here")
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        ("time.sleep(10)", "wave('amy')", "time.sleep(1)", "wave('bob')", "say(str(time.time()))"),
+        ("wave('amy')", "say(get_current_location())", "go_to('kitchen')", "wave('nobody')"),
+        (
+            "try:",
+            "    wave('nobody')",
+            "except Exception as error:",
+            "    say(str(error))",
+            "go_to('nowhere')",
+        ),
+    ],
+)
+def test_a_skill_of_ones_own_is_felt_by_its_own_run_only(
+    lines: tuple[str, ...], batches: Worker, alone: Worker
+) -> None:
+    skills = SKILLS.with_skill(
+        Skill("wave", (Parameter("person"),), "None", "Wave.", Recording("wave", "person"))
+    )
+    does = {**BEHAVIOURS, "wave": wave}
+    new = [partial(SimulatedRobot, world, AS_WRITTEN, skills, does) for world in WORLDS]
+    source = "\n    ".join(("def task_program():", *lines))
+    together = batches.run_all([(source, new), (HONEST, new)])[0]
+    wanted = [alone.run_alone(source, new_robot) for new_robot in new]
+    assert [all_of(outcome) for outcome in together] == [all_of(outcome) for outcome in wanted]
+    assert all(event.time > 0 for outcome in together for event in outcome.trace)
+
+
+class Polite(SimulatedRobot):
+    """A robot that says more than it was told."""
+
+    def record(self, kind: str, text: str, *more: object, **others: object) -> None:
+        """Add a word."""
+        super().record(kind, f"{text}, please", *more, **others)  # type: ignore[arg-type]  # as theirs
+
+
+def test_a_robot_of_ones_own_class_does_what_its_class_does(batches: Worker) -> None:
+    outcome = batches.run("def task_program():\n    say('come')\n", partial(Polite, WORLDS[0], AS_WRITTEN))
+    assert [event.text for event in outcome.trace] == ["come, please"]
+
+
+def test_robots_in_sampled_worlds_are_copied_too(batches: Worker, alone: Worker) -> None:
+    room_map = RoomMap(("kitchen", "lab"), "lab")
+    new = [partial(SampledRobot, room_map, FactSampler(1, number)) for number in range(8)]
+    known = batches.run_tame([(ALSO_HONEST, new)])
+    assert [all_of(known[0, run]) for run in range(8)] == [
+        all_of(alone.run_alone(ALSO_HONEST, new_robot)) for new_robot in new
+    ]
+
+
+# --- what a child may say that a program has taken over
+
+
+class Taken(IsolatedProcess):
+    """A child that says what it likes."""
+
+    def __init__(self, *frames: bytes) -> None:
+        self.frames = list(frames)
+
+    def send(self, message: object) -> None:
+        """Listen to nobody."""
+
+    def receive_bytes(self, most: int) -> bytes | None:  # noqa: ARG002 - as theirs
+        """Say the next thing."""
+        return self.frames.pop(0) if self.frames else None
+
+
+SAY = b'["say",["x"],"ok",null]'
+FAILS = b'["pick",["x"],"error",%s]'
+END = b'{"end":"finished"}'
+DEEP = b"[" * 100_000 + b"]" * 100_000
+LONG = b"1" * 900_000
+TRANSCRIPT = b"[[%s],[%s],[%s],%s]"
+MALFORMED = {
+    "nothing": b"",
+    "two": b"null null",
+    "no end": TRANSCRIPT % (SAY, b"0", b"", b"null"),
+    "an end that is none": TRANSCRIPT % (SAY, b"0", b"", b"[]"),
+    "too few parts": b"[[],[],[]]",
+    "too many parts": b"[[],[],[],{},5]",
+    "no UTF-8": TRANSCRIPT % (b'["say",["\xff"],"ok",null]', b"0", b"", END),
+    "half a character": TRANSCRIPT % (b'["say",["\\ud800"],"ok",null]', b"0", b"", END),
+    "a deep argument": TRANSCRIPT % (b'["say",[%s],"ok",null]' % DEEP, b"0", b"", END),
+    "a deep answer": TRANSCRIPT % (b'["say",["x"],"ok",%s]' % DEEP, b"0", b"", END),
+    "a deep end": TRANSCRIPT % (SAY, b"0", b"", b'{"end":%s}' % DEEP),
+    "a call beyond the last": TRANSCRIPT % (SAY, b"0,1", b"", END),
+    "a call before the first": TRANSCRIPT % (SAY, b"0,-2", b"", END),
+    "a call of no number": TRANSCRIPT % (SAY, b"0.5", b"", END),
+    "a call of a huge number": TRANSCRIPT % (SAY, b"9" * 4_000, b"", END),
+    "a call of a number that is too long": TRANSCRIPT % (SAY, LONG, b"", END),
+    "a moment that is none": TRANSCRIPT % (SAY, b"0", b"[0,NaN]", END),
+    "a moment of no end": TRANSCRIPT % (SAY, b"0", b"[0,1e999]", END),
+    "a moment of a number that is too long": TRANSCRIPT % (SAY, b"0", b"[0,%s]" % LONG, END),
+    "no such skill": TRANSCRIPT % (b'["fly",[],"ok",null]', b"0", b"", END),
+    "too few arguments": TRANSCRIPT % (b'["say",[],"ok",null]', b"0", b"", END),
+    "an argument of another type": TRANSCRIPT % (b'["say",[["x"]],"ok",null]', b"0", b"", END),
+    "an option that is none": TRANSCRIPT % (b'["ask",["","",[["x",1]]],"ok",0]', b"0", b"", END),
+    "another answer": TRANSCRIPT % (b'["say",["x"],"ok",true]', b"0", b"", END),
+    "an answer to wait for": TRANSCRIPT % (b'["say",["x"],"ask",null]', b"0", b"", END),
+    "an error that is none": TRANSCRIPT % (FAILS % b"5", b"0", b"", END),
+    "an error that says nothing": TRANSCRIPT % (FAILS % b"null", b"0", b"", END),
+    "an error of another kind": TRANSCRIPT % (FAILS % b'["PlaceNoObject","x"]', b"0", b"", END),
+    "more than all calls": TRANSCRIPT % (SAY, b"0," * 1_005 + b"0", b"", END),
+    "more than all time": TRANSCRIPT % (SAY, b"0,0,0", b"[0,1.0],[1,9999.0]", END),
+}
+
+
+@pytest.mark.parametrize("frame", MALFORMED.values(), ids=MALFORMED)
+def test_malformed_transcript_is_no_outcome(frame: bytes) -> None:
+    robots = [SimulatedRobot(world, AS_WRITTEN) for world in WORLDS]
+    good = TRANSCRIPT % (SAY, b"0,0", b"[1,5.0]", END)
+    told = outcomes(Taken(good, frame, good), [(b"", robots)])
+    first = next(told)
+    assert first is not None
+    assert (first.status, [event.time for event in first.trace]) == (Status.FINISHED, [0.0, 5.0])
+    with pytest.raises(ProtocolError):
+        next(told)
+
+
+def test_child_that_says_no_more_is_lost() -> None:
+    told = outcomes(Taken(b"null"), [(b"", [SimulatedRobot(world, AS_WRITTEN) for world in WORLDS])])
+    assert next(told) is None
+    with pytest.raises(LostProcessError):
+        next(told)
+
+
+@pytest.mark.slow
+def test_program_that_computes_for_too_long_is_felt_by_no_other(batches: Worker) -> None:
+    source = "def task_program():\n    say('x')\n    say(str(sum(range(10**12))))\n"
+    assert is_tame(source)
+    before, endless, after = run_together(batches, HONEST, source, HONEST)
+    assert endless == [None] * len(WORLDS)
+    assert before == after
+    assert None not in before

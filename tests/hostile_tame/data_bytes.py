@@ -1,0 +1,4 @@
+"""Tries to encode, for which the interpreter keeps codecs."""
+# tame: no
+def task_program():
+    say(str("x".encode("idna")))

@@ -1,0 +1,4 @@
+"""Asks for a hash."""
+# tame: no
+def task_program():
+    say(str(hash("a")) + str(hash(None)))

@@ -1,0 +1,8 @@
+"""Says a text that is far too long, and catches what comes of it."""
+# tame: yes
+# decided: alone
+def task_program():
+    try:
+        say("x" * 60_000)
+    except BaseException as error:
+        say(repr(error))

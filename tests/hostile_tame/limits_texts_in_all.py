@@ -1,0 +1,5 @@
+"""Says texts that are too long in all."""
+# tame: yes
+def task_program():
+    for number in range(1000):
+        say(str(number % 10) * 9_999)

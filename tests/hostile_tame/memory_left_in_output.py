@@ -1,0 +1,5 @@
+"""Tries to leave a text of megabytes in the standard output."""
+# tame: yes
+def task_program():
+    print("é" * 10_000_000)
+    say("printed")
