@@ -8,7 +8,7 @@ import socket
 import sys
 
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.batch import message
+from codebotler.simulator.batches.replay import message
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, start
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.sandbox import BATCH_SERVER, HEADER, WITHOUT_REFERENCES

@@ -41,16 +41,14 @@ LONGEST = 60.0  # seconds of waiting for a process in all; nothing that computes
 SILENCE = 1  # seconds after which a silent process is looked at
 SECCOMP_MODES = "\nSeccomp:\t2\n", "\nSeccomp:\t3\n"  # filtered, and killed by the filter
 SANDBOX = Path(__file__).with_name("sandbox")
-CORE = "codebotler.core"
+CORE, BATCHES = "codebotler.core", f"{__package__}.batches"
 # What a child needs that has robots of its own, besides the sandbox.
 SIMULATION = (
+    f"{BATCHES}.process",
     *(f"{CORE}.{name}" for name in ("errors", "skills", "trace", "words", "world")),
-    *(
-        f"{__package__}.{name}"
-        for name in ("batch_process", "fact_sampler", "ledger", "robot", "rules", "sampled_robot")
-    ),
+    *(f"{__package__}.{name}" for name in ("fact_sampler", "ledger", "robot", "rules", "sampled_robot")),
 )
-MODULES = {PREPARER: f"{__package__}.sandbox.preparer", BATCH_SERVER: f"{__package__}.batch_process"}
+MODULES = {PREPARER: f"{__package__}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}
 
 
 # --- starting
@@ -120,7 +118,7 @@ def compiled_modules(compiler: Callable[[str, str], bytes], further: tuple[str, 
             SANDBOX.parents[1].joinpath(*name.split(".")[1:]).with_suffix(".py").read_text("utf-8")
         )
     if further:
-        sources[CORE] = ""
+        sources |= {CORE: "", BATCHES: ""}
     codes = {name: compiler(source, name) for name, source in sources.items()}
     return marshal.dumps(codes, WITHOUT_REFERENCES)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TypeAlias
 
 from codebotler.core.trace import Outcome
-from codebotler.simulator.batch import outcomes
+from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fork_server import BatchServer, ForkServer
 from codebotler.simulator.isolated_process import LostProcessError, ProtocolError
 from codebotler.simulator.ledger import SkillPerformer

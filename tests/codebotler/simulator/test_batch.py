@@ -15,7 +15,7 @@ import pytest
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.trace import Option, RunError, Status
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.batch import Replay, decoded
+from codebotler.simulator.batches.replay import Replay, decoded
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import Ledger, RememberingLedger
 from codebotler.simulator.pool import LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool, batch_size

@@ -18,7 +18,7 @@ import pytest
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.batch import outcomes
+from codebotler.simulator.batches.replay import outcomes
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.robot import BEHAVIOURS, RobotError, SimulatedRobot

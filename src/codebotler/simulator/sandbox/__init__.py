@@ -1,7 +1,7 @@
 """The isolated side of the engine: processes that prepare programs, and fork closed children that run them.
 
 The child of one run holds nothing but the program, and asks for skills over a socket. The child of a batch
-(`batch_process`) also holds copies of worlds and robots. The robot and the trace that count stay with the
+(`batches`) also holds copies of worlds and robots. The robot and the trace that count stay with the
 engine. All of this runs under a bare interpreter and imports as little as it can, since every page of memory
 makes each fork dearer.
 """

@@ -28,99 +28,42 @@ if TYPE_CHECKING:
 
     Nodes: TypeAlias = Mapping[type[ast.AST], Sequence[Any]]
 
+
+def words(text: str) -> frozenset[str]:
+    """The words of a text."""
+    return frozenset(text.split())
+
+
 # Builtins that use up their first argument on the spot, and those that only take data.
-CONSUMERS = frozenset({"all", "any", "dict", "len", "list", "max", "min", "next", "sorted", "sum", "tuple"})
-FUNCTIONS = CONSUMERS | {
-    "abs",
-    "bool",
-    "chr",
-    "divmod",
-    "float",
-    "int",
-    "ord",
-    "pow",
-    "print",
-    "range",
-    "repr",
-}
-FUNCTIONS |= {"round", "str"}
-ITERATORS = frozenset({"enumerate", "filter", "map", "reversed", "zip"})
-CLASSES = frozenset(
-    {"bool", "dict", "float", "int", "list", "str", "tuple"}
-)  # for `isinstance` and annotations
-ERRORS = frozenset(
-    {
-        *("ArithmeticError", "AssertionError", "AttributeError", "BaseException", "EOFError", "Exception"),
-        *(
-            "IndexError",
-            "KeyError",
-            "LookupError",
-            "MemoryError",
-            "NameError",
-            "NotImplementedError",
-            "OSError",
-        ),
-        *("OverflowError", "RecursionError", "RuntimeError", "StopIteration", "TimeoutError", "TypeError"),
-        *("UnboundLocalError", "ValueError", "ZeroDivisionError"),
-    }
+CONSUMERS = words("all any dict len list max min next sorted sum tuple")
+FUNCTIONS = CONSUMERS | words("abs bool chr divmod float int ord pow print range repr round str")
+ITERATORS = words("enumerate filter map reversed zip")
+CLASSES = words("bool dict float int list str tuple")  # for `isinstance` and annotations
+ERRORS = words(
+    """
+    ArithmeticError AssertionError AttributeError BaseException EOFError Exception IndexError KeyError
+    LookupError MemoryError NameError NotImplementedError OSError OverflowError RecursionError RuntimeError
+    StopIteration TimeoutError TypeError UnboundLocalError ValueError ZeroDivisionError
+    """
 )
 GIVEN = FUNCTIONS | ITERATORS | ERRORS | {"isinstance"}  # all builtins that a tame program finds
 # All that some program finds, but for the name of its module, which all of them find.
 EXISTING = frozenset({*dir(builtins), "exit", "quit", "sys", "time"}) - {"__name__"}
 
-TEXT_METHODS = frozenset(
-    {
-        *("capitalize", "casefold", "center", "count", "endswith", "expandtabs", "find", "index", "isalnum"),
-        *("isalpha", "isdecimal", "isdigit", "islower", "isnumeric", "isspace", "istitle", "isupper", "join"),
-        *(
-            "ljust",
-            "lower",
-            "lstrip",
-            "partition",
-            "removeprefix",
-            "removesuffix",
-            "replace",
-            "rfind",
-            "rindex",
-        ),
-        *(
-            "rjust",
-            "rpartition",
-            "rsplit",
-            "rstrip",
-            "split",
-            "splitlines",
-            "startswith",
-            "strip",
-            "swapcase",
-        ),
-        *("title", "upper", "zfill"),
-    }
+TEXT_METHODS = words(
+    """
+    capitalize casefold center count endswith expandtabs find index isalnum isalpha isdecimal isdigit islower
+    isnumeric isspace istitle isupper join ljust lower lstrip partition removeprefix removesuffix replace
+    rfind rindex rjust rpartition rsplit rstrip split splitlines startswith strip swapcase title upper zfill
+    """
 )
-METHODS = TEXT_METHODS | {
-    *(
-        "append",
-        "clear",
-        "copy",
-        "extend",
-        "get",
-        "insert",
-        "pop",
-        "popitem",
-        "remove",
-        "reverse",
-        "setdefault",
-    ),
-    *("sort", "update"),
-}
-CONSUMING_METHODS = frozenset({"extend", "join", "update"})
-VIEWS = frozenset({"items", "keys", "values"})
-CLOCK = frozenset(
-    {"asctime", "ctime", "gmtime", "localtime", "monotonic", "perf_counter", "sleep", "strftime", "time"}
+METHODS = TEXT_METHODS | words(
+    "append clear copy extend get insert pop popitem remove reverse setdefault sort update"
 )
-PARTS_OF_TIME = frozenset(
-    f"tm_{part}" for part in ("year", "mon", "mday", "hour", "min", "sec", "wday", "yday")
-)
+CONSUMING_METHODS = words("extend join update")
+VIEWS = words("items keys values")
+CLOCK = words("asctime ctime gmtime localtime monotonic perf_counter sleep strftime time")
+PARTS_OF_TIME = words("tm_year tm_mon tm_mday tm_hour tm_min tm_sec tm_wday tm_yday")
 PLAIN_FIELDS = re.compile(r"(?:[^{}]|\{\{|\}\}|\{\w*(?:![rsa])?(?::[^{}]*)?\})*")
 CONSTANTS = (type(None), bool, int, float, str, type(...))
 
