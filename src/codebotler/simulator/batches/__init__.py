@@ -1,1 +1,1 @@
-"""Batches of tame programs: `process` runs them in a closed child; `replay` repeats what they asked of robots."""
+"""Batches: `process` runs tame programs in a closed child, `replay` repeats what they asked of robots."""
