@@ -9,13 +9,14 @@ from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from os import PathLike
 from statistics import fmean
 
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import shared_pool
+from codebotler.simulator.pool import AHEAD, LARGEST, shared_pool
 from codebotler.simulator.robot import SimulatedRobot
 from roboeval.evaluation.judge import is_met, may_satisfy
 from roboeval.evaluation.runs.completions import unknown
@@ -111,11 +112,16 @@ class Rewards:
         with self._lock:
             rewards = {name: self._known[name] for name in names if name in self._known}
         new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
-        futures: list[Future[float]] = []
+        futures: list[Future[list[float]]] = []
         try:
-            judge = partial(judged, suite, task)
-            futures.extend(shared_pool().submit(judge, program) for program in new.values())
-            rewards.update(zip(new, (future.result() for future in futures), strict=True))
+            pool, left = shared_pool(), list(new.values())
+            size = max(1, min(LARGEST, -(-len(left) // (AHEAD * pool.workers))))
+            futures.extend(
+                pool.submit(judged, suite, task, left[start : start + size])
+                for start in range(0, len(left), size)
+            )
+            found = chain.from_iterable(future.result() for future in futures)
+            rewards.update(zip(new, found, strict=True))
         finally:  # after an interrupt, nobody waits for the rest
             for future in futures:
                 future.cancel()
@@ -128,12 +134,15 @@ class Rewards:
         return [rewards[name] for name in names]
 
 
-def judged(suite: Suite, task: str, program: str) -> float:
-    """The reward of a program, in a thread that has a worker."""
+def judged(suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
+    """The rewards of programs, in a thread that has a worker."""
     scenarios = suite.tasks[task].scenarios
     robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario in scenarios]
-    (outcomes,) = shared_pool().here().run_all([(program, robots)])
-    return total([Share.of(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
+    ran = shared_pool().here().run_all([(program, robots) for program in programs])
+    return [
+        total([Share.of(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
+        for outcomes in ran
+    ]
 
 
 REWARDS = Rewards()
