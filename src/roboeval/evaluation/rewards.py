@@ -114,11 +114,9 @@ class Rewards:
         new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
         futures: list[Future[list[float]]] = []
         try:
-            pool, left = shared_pool(), list(new.values())
-            size = max(1, min(LARGEST, -(-len(left) // (AHEAD * pool.workers))))
+            pool = shared_pool()
             futures.extend(
-                pool.submit(judged, suite, task, left[start : start + size])
-                for start in range(0, len(left), size)
+                pool.submit(judged, suite, task, batch) for batch in batches([*new.values()], pool.workers)
             )
             found = chain.from_iterable(future.result() for future in futures)
             rewards.update(zip(new, found, strict=True))
@@ -132,6 +130,12 @@ class Rewards:
             while len(self._known) > REMEMBERED:
                 self._known.popitem(last=False)
         return [rewards[name] for name in names]
+
+
+def batches(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
+    """Programs in batches, enough of them that all workers have some."""
+    size = max(1, min(LARGEST, -(-len(programs) // (AHEAD * workers))))
+    return [programs[start : start + size] for start in range(0, len(programs), size)]
 
 
 def judged(suite: Suite, task: str, programs: Sequence[str]) -> list[float]:

@@ -24,7 +24,7 @@ from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate
-from roboeval.evaluation.rewards import Share, reward, total
+from roboeval.evaluation.rewards import Share, batches, reward, total
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
@@ -140,21 +140,22 @@ def test_an_interrupt_gives_up_what_nobody_else_waits_for(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(pool, "submit", noted)
     waited_for, given_up = distinct(8, "interrupted"), distinct(1_000, "given up")
+    few, many = (len(batches(programs, pool.workers)) for programs in (waited_for, given_up))
 
     def interrupt() -> None:
-        while len(futures) < len(waited_for) + len(given_up):
+        while len(futures) < few + many:
             time.sleep(0.01)
         time.sleep(0.1)
         os.kill(os.getpid(), signal.SIGINT)
 
     with ThreadPoolExecutor(2) as beside:
         other = beside.submit(reward, "SayGoodDay", 0, waited_for)
-        while len(futures) < len(waited_for):
+        while len(futures) < few:
             time.sleep(0.01)
         beside.submit(interrupt)
         with pytest.raises(KeyboardInterrupt):
             reward("SayGoodDay", 0, given_up)
-        assert sum(future.cancelled() for future in futures) == len(given_up)
+        assert sum(future.cancelled() for future in futures) == many
         gate.set()
         assert other.result() == [1.0] * len(waited_for)
 
