@@ -595,7 +595,7 @@ def test_few_characters_of_much_code_are_refused() -> None:
     worker.close()
 
 
-SIZES = 15_000, 20_000, 21_400  # which fit into a fresh process only; under Python 3.11, the last at most
+SIZES = 15_000, 20_000, 20_800  # which fit into a fresh process only; under Python 3.11, the last at most
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -22,7 +22,7 @@ from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP
 from codebotler.simulator.worker import EngineError
 from command_line import ENVIRONMENT, roboeval
 from roboeval.evaluation import ray as rayengine
-from roboeval.evaluation.engines import Local, Work
+from roboeval.evaluation.engines import Local, RunPrograms, Work
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.ray import VERSIONS, RayCluster, run_shard
 from roboeval.evaluation.runs.completions import recorded_completions
@@ -56,8 +56,8 @@ def numbered(numbers: range) -> Iterator[Work]:
     return (("", str(number)) for number in numbers)
 
 
-def numbers_of(_worker: object, works: Sequence[Work]) -> list[int]:
-    return [int(number) for _, number in works]
+# Cluster processes cannot import this module: a function of it, but no lambda, would be looked for there.
+NUMBERS: RunPrograms[int] = lambda _, works: [int(number) for _, number in works]  # noqa: E731 - see above
 
 
 # --- without a cluster
@@ -76,7 +76,7 @@ def test_missing_isolation_is_warned_of_once_or_refused(
         rayengine, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None)
     )
     monkeypatch.setattr(rayengine, "own_worker", rayengine.own_worker.__wrapped__)
-    functions, works = (numbers_of, abs), list(numbered(range(2)))
+    functions, works = (NUMBERS, abs), list(numbered(range(2)))
     with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
         run_shard(functions, works, VERSIONS, {"require_isolation": True})
     result = run_shard(functions, works, VERSIONS, {})
@@ -214,7 +214,7 @@ def test_programs_are_read_as_they_are_needed_and_equal_ones_are_one_call(cluste
             yield "", str(number % 3000)
 
     results = cluster.map_distinct(
-        lambda _, some: [(n, time.time_ns()) for n in numbers_of(_, some)], works(), tuple
+        lambda _, some: [(int(n), time.time_ns()) for _, n in some], works(), tuple
     )
     first = [next(results) for _ in range(50)]
     assert [number for number, _ in first] == list(range(50))
@@ -235,7 +235,7 @@ def test_what_a_call_raises_is_raised_here(cluster: RayCluster) -> None:
 
 def test_results_that_are_not_wanted_do_no_harm(cluster: RayCluster) -> None:
     for number in range(40):  # a shard that was cancelled when just done would abort this process soon
-        results = cluster.map_distinct(numbers_of, numbered(range(500)), abs)
+        results = cluster.map_distinct(NUMBERS, numbered(range(500)), abs)
         assert [next(results) for _ in range(number + 1)] == [*range(number + 1)]
         del results
 
@@ -286,4 +286,4 @@ def test_nodes_that_are_killed_lose_nothing_until_there_is_none(
     nodes.kill()
     monkeypatch.setattr(rayengine, "PATIENCE_S", 1)
     with pytest.raises(EngineError, match="no free core"):
-        list(cluster.map_distinct(numbers_of, numbered(range(2)), int))
+        list(cluster.map_distinct(NUMBERS, numbered(range(2)), int))
