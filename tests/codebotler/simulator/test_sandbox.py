@@ -581,7 +581,7 @@ LINES: dict[str, tuple[str, object]] = {
 
 LIMITS = {
     "time": ("for i in range(3600): time.sleep(1)", "time.sleep(0.1)", "3,600 seconds of simulated time"),
-    "calls": ("for i in range(1000): say('a')", "get_all_rooms()", "1,000 skill calls"),
+    "calls": ("for i in range(1000): say(str(i))", "get_all_rooms()", "1,000 skill calls"),
     "ticks": ("for i in range(199_998): pass", "[0 for i in 'ab']", SPENT),
     "text": ("say('x' * 10_000)", "say('x' * 10_001)", "a text of more than 10,000 characters"),
     "option": ("say('x')", "ask('', '', ['x' * 10_001])", "a text of more than 10,000 characters"),
