@@ -27,6 +27,8 @@ from roboeval.cli.output import fail, note, watched
 from roboeval.cli.show import print_summary
 
 if TYPE_CHECKING:
+    from polars import DataFrame
+
     from roboeval.evaluation.engines import OpenEngine
     from roboeval.evaluation.runs.folder import Run, Source
     from roboeval.evaluation.runs.rows import JudgedRow
@@ -59,7 +61,7 @@ def evaluate(
 ) -> None:
     """Judge whether each completion does what was asked."""
     from roboeval.analysis.summary import judged_count, summary
-    from roboeval.evaluation.runs.completions import KEY, how_many, name_of
+    from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
     from roboeval.evaluation.runs.results import Scope
     from roboeval.evaluation.runs.table import TableBuilder
@@ -94,14 +96,21 @@ def evaluate(
         note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
         raise SystemExit(STOPPED) from None
     if run is not None:
-        failed = table.filter(~table["passed"]).select(KEY).head(1)
-        again = command("show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablation)
-        does = "says why that program fails" if failed.height else "prints these tables again"
-        note(f"verdicts are in {run.path}; `{again}` {does}")
+        _name_next_command(run, table, suite=suite, ablated=ablation)
     if (left_out := scope.total - judged_count(counted.prompts)) > 0:
         again = "the others are judged" if run is None else "the same command tries again"
         note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
         raise SystemExit(1)
+
+
+def _name_next_command(run: Run, table: DataFrame, *, suite: str, ablated: bool) -> None:
+    """Note where verdicts are kept, and the command that shows the first failure."""
+    from roboeval.evaluation.runs.completions import KEY, name_of
+
+    failed = table.filter(~table["passed"]).select(KEY).head(1)
+    again = command("show", run.path, *map(name_of, failed.iter_rows()), suite=suite, ablated=ablated)
+    does = "says why that program fails" if failed.height else "prints these tables again"
+    note(f"verdicts are in {run.path}; `{again}` {does}")
 
 
 def opened_source(text: str, suite: Suite) -> Source:
