@@ -10,13 +10,14 @@ import os
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from random import Random
+from typing import TypeVar
 
 import pytest
-from hypothesis import HealthCheck, example, given, note, settings
+from hypothesis import HealthCheck, example, given, note, seed, settings
 from hypothesis import strategies as st
 
 from codebotler.core.program import Flaw, Program
@@ -36,12 +37,12 @@ EXAMPLES = int(os.environ.get("FUZZ_EXAMPLES", "200"))
 SEED = int(os.environ.get("FUZZ_SEED", "0"))
 FUZZ = settings(
     max_examples=EXAMPLES,
-    derandomize=not NIGHTLY,
     database=None,
     deadline=None,
     # Programs are long, and the machine may be busy.
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example],
 )
+Check = TypeVar("Check", bound=Callable[..., None])
 RULES = Rules(limits=Limits(ticks=2_000, calls=60))
 
 CLOSED_BY_AN_ERROR = """
@@ -97,6 +98,11 @@ WORLDS = (
         "kitchen",
     ),
 )
+
+
+def seeded(check: Check) -> Check:
+    """With a seed of our own, where a nightly run gives none: Hypothesis derives one from the test's text."""
+    return check if NIGHTLY else seed(SEED)(check)
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +165,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     seen: dict[tuple[str, World], Outcome] = {}
 
     @FUZZ
+    @seeded
     @given(programs(deep=False), st.sampled_from(WORLDS))
     @example("def task_program():\n    say(undefined_name)\n", WORLDS[0])
     @example(DEEP, WORLDS[0])
@@ -174,7 +181,7 @@ def test_random_programs_end_alike_isolated_or_not_and_in_every_run(
     check()
     assert list(map(all_of, run(seen, workers=3, rules=RULES))) == list(map(all_of, seen.values()))
     count = Counter(outcome.status for outcome in seen.values())
-    assert count[Status.FINISHED] >= len(seen) / 4
+    assert count[Status.FINISHED] >= len(seen) / 3
     for status in (Status.PYTHON_ERROR, Status.ROBOT_ERROR, Status.TIMEOUT):
         assert count[status] >= len(seen) / 60, count
     assert sum(map(len, (outcome.trace for outcome in seen.values()))) >= 2 * len(seen)
@@ -184,6 +191,7 @@ def test_recursion_through_anything_ends_alike_in_every_run(pool: WorkerPool, ot
     """How deep it goes is Python's own, and differs by where the interpreter has started."""
 
     @settings(FUZZ, max_examples=EXAMPLES // 4)
+    @seeded
     @given(programs(), st.sampled_from(WORLDS))
     def check(source: str, world: World) -> None:
         note(source)
@@ -199,6 +207,7 @@ def test_broken_texts_end_alike_in_every_run_and_break_nothing(
     pool: WorkerPool, other_pool: WorkerPool
 ) -> None:
     @FUZZ
+    @seeded
     @given(broken_programs(), st.sampled_from(WORLDS))
     @example("def task_program():\n    \0\n", WORLDS[0])
     def check(source: str, world: World) -> None:
@@ -264,6 +273,7 @@ def test_random_programs_that_share_a_child_end_as_each_does_alone(
     drawn: dict[str, None] = {}
 
     @FUZZ
+    @seeded
     @given(tame_programs())
     @example(DEEP)
     def draw(source: str) -> None:
