@@ -119,7 +119,7 @@ def with_options_of(called: Callable[..., object]) -> Callable[[Command], Comman
     def extended(command: Command) -> Command:
         inherited, own = (signature(one, eval_str=True).parameters for one in (called, command))
         more = [one for name, one in own.items() if name not in inherited and one.kind is one.KEYWORD_ONLY]
-        command.__signature__ = Signature([*inherited.values(), *more])  # type: ignore[attr-defined]
+        command.__signature__ = Signature([*inherited.values(), *more])  # type: ignore[attr-defined]  # of a function
         return command
 
     return extended
