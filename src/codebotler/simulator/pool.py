@@ -160,10 +160,15 @@ class WorkerPool:
                 names = running.pop(future)
                 under_way.difference_update(names)
                 try:
-                    for named, result in zip(names, future.result(), strict=True):
-                        done[named] = then(result)
+                    results = future.result()
                 except Exception as error:  # noqa: BLE001 - raised where the result is waited for
                     failed.update(dict.fromkeys(names, error))
+                    continue
+                for named, result in zip(names, results, strict=True):
+                    try:
+                        done[named] = then(result)
+                    except Exception as error:  # noqa: BLE001 - the same, for this one alone
+                        failed[named] = error
 
 
 def batch_size(sent: int, width: int) -> int:
@@ -177,9 +182,7 @@ class DistinctKeys(Generic[Key]):
     def __init__(self, keys: Iterable[Key], name: Callable[[Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
         self._seen: set[bytes] = set()
-        self.waiting: deque[bytes] = (
-            deque()
-        )  # the names of all keys that were read, until somebody takes them
+        self.waiting: deque[bytes] = deque()  # names of keys that were read, until somebody takes them
         self.failed: dict[bytes, BaseException] = {}
 
     def read(self, most: int) -> dict[bytes, Key]:

@@ -7,6 +7,7 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import islice
 from typing import Any
 from unittest.mock import Mock
 
@@ -703,6 +704,19 @@ def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
     sizes = list(map(len, calls))
     assert sizes[:-1] == sorted(sizes[:-1])
     assert (sizes[0], max(sizes)) == (1, LARGEST)
+
+
+def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
+    def use(number: int) -> int:
+        if number == 77:
+            raise ValueError("not this one")
+        return number
+
+    with WorkerPool(1) as pool:
+        results = pool.map_distinct(list, range(200), name=lambda number: number.to_bytes(2), then=use)
+        assert list(islice(results, 77)) == list(range(77))
+        with pytest.raises(ValueError, match="not this one"):
+            next(results)
 
 
 @pytest.mark.parametrize("width", [1, 2, 8, 64])

@@ -17,9 +17,8 @@ from codebotler.simulator.robot import Argument, Setup, SimulatedRobot
 from codebotler.simulator.sandbox import MAX_FRAME
 from codebotler.simulator.skill_protocol import Description, described
 
-Programs: TypeAlias = Sequence[
-    tuple[bytes, Sequence[SimulatedRobot]]
-]  # code of each, and a robot for each run
+Programs: TypeAlias = Sequence[tuple[bytes, Sequence[SimulatedRobot]]]
+"""The code of each program, and a robot for each of its runs."""
 
 
 class Call(NamedTuple):
