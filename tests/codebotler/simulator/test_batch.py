@@ -574,6 +574,21 @@ def test_replay_reaches_the_limits_that_were_reached(calls: object, order: objec
     assert (outcome.status, outcome.error) == (Status.TIMEOUT, RunError("TimeoutError", ledger.limit))
 
 
+def test_a_robot_of_ones_own_kind_performs_every_call(worker: Worker) -> None:
+    performed: list[str] = []
+
+    class Noting(SimulatedRobot):
+        """A robot that notes what it performs."""
+
+        def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
+            performed.append(skill)
+            return super().perform(skill, arguments)
+
+    known = worker.run_tame([(task("say('a')", "say('a')", "say('a')"), [partial(Noting, WORLD)])])
+    assert known[0, 0].status is Status.FINISHED
+    assert performed == ["say"] * 3
+
+
 # --- looking often
 
 
