@@ -20,7 +20,7 @@ from codebotler.simulator.batches.replay import Replay, decoded
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import Ledger, RememberingLedger
 from codebotler.simulator.pool import LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool, batch_size
-from codebotler.simulator.robot import BEHAVIOURS, Behaviour, Result, RobotError, SimulatedRobot
+from codebotler.simulator.robot import BEHAVIOURS, Argument, Behaviour, Result, RobotError, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
 from codebotler.simulator.worker import Job, Worker
