@@ -8,11 +8,21 @@ from dataclasses import replace
 
 from codebotler.checking.problems import Check, Problem, Sample
 from codebotler.checking.room_names import MOST_ROOMS, lists_rooms, named_rooms
-from codebotler.checking.sampled import SAMPLES, CheckSettings, Run, failures, run_samples, sampled_runs
+from codebotler.checking.sampled import (
+    SAMPLES,
+    CheckSettings,
+    Run,
+    SampledRuns,
+    failures,
+    first_samplers,
+    run_samples,
+    sampled_runs,
+)
 from codebotler.checking.static import static_problems
 from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import Flaw, parsed, tree_of
 from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.trace import Outcome
 from codebotler.core.world_file import check_regex
 from codebotler.simulator.fact_sampler import FactSampler
 from codebotler.simulator.pool import WorkerPool
@@ -91,6 +101,29 @@ def check_on(
 
     rooms = room_map or _room_map(program, None, None, how.skills)
     return _checked(program, rooms, how, run)
+
+
+def checks_on(
+    worker: Worker, programs: Sequence[tuple[str, RoomMap]], settings: CheckSettings
+) -> list[Check]:
+    """The same checks of several programs of one caller, whose first runs may share a process."""
+    samplers = first_samplers(settings)[:AT_ONCE]
+    first = [SampledRuns(program, room_map, samplers, settings) for program, room_map in programs]
+    known: list[dict[int, Outcome]] = [{} for _ in programs]
+    for (number, run), outcome in worker.run_tame([runs.job for runs in first]).items():
+        known[number][run] = outcome
+
+    def checked(number: int) -> Check:
+        program, room_map = programs[number]
+
+        def run(rooms: RoomMap, wanted: Sequence[FactSampler]) -> list[Sample]:
+            if rooms == room_map and wanted == samplers:
+                return first[number].samples(worker, known[number])
+            return run_samples(worker, program, rooms, wanted, settings)
+
+        return _checked(program, room_map, settings, run)
+
+    return list(map(checked, range(len(programs))))
 
 
 def _checked(

@@ -17,7 +17,7 @@ from codebotler.simulator.isolated_process import PROCESSOR_TIME
 from codebotler.simulator.robot import Behaviour
 from codebotler.simulator.rules import Rules
 from codebotler.simulator.sampled_robot import AS_WRITTEN, RoomMap, SampledRobot
-from codebotler.simulator.worker import Worker
+from codebotler.simulator.worker import Job, Worker
 
 SAMPLES, MOST_SAMPLES = 5, 10_000
 MORE = 20  # worlds in addition, where the program waits in vain in all that were drawn before
@@ -40,6 +40,39 @@ class CheckSettings:
             raise UserError(f"the number of samples is {self.samples}; write one from 1 to {MOST_SAMPLES:,}")
 
 
+class SampledRuns:
+    """The runs of one program in some sampled worlds, first as a job for a worker."""
+
+    def __init__(
+        self, program: str, room_map: RoomMap, samplers: Sequence[FactSampler], settings: CheckSettings
+    ) -> None:
+        self._program, self._room_map = program, room_map
+        self._samplers, self._settings = samplers, settings
+        self._robots: dict[int, SampledRobot] = {}
+        self.job: Job = program, [partial(self._new_robot, number) for number in range(len(samplers))]
+
+    def samples(self, worker: Worker, known: Mapping[int, Outcome]) -> list[Sample]:
+        """What the runs show, of which some are known by number; of worlds that are alike, one may be run."""
+        ran: list[Sample] = []
+        for number, sampler in enumerate(self._samplers):
+            if number in known:
+                outcome = known[number]
+            elif any(one.is_as_in(sampler) for one in ran):
+                continue
+            else:
+                outcome = worker.run_alone(self._program, partial(self._new_robot, number))
+            robot = self._robots[number]
+            facts, draws = tuple(robot.facts), tuple(robot.draws)
+            ran.append(Sample(sampler.sample, outcome, facts, draws, _is_in_vain(outcome, robot)))
+        return ran
+
+    def _new_robot(self, number: int) -> SampledRobot:
+        how = self._settings
+        robot = SampledRobot(self._room_map, self._samplers[number], how.rules, how.skills, how.behaviours)
+        self._robots[number] = robot
+        return robot
+
+
 def run_samples(
     worker: Worker,
     program: str,
@@ -50,27 +83,9 @@ def run_samples(
     """Run a program in sampled worlds; of worlds that are alike to it, only the first may be run."""
     if not samplers:
         return []
-    robots: dict[int, SampledRobot] = {}
-
-    def new_robot(number: int) -> SampledRobot:
-        sampler = samplers[number]
-        robots[number] = SampledRobot(room_map, sampler, settings.rules, settings.skills, settings.behaviours)
-        return robots[number]
-
-    makers = [partial(new_robot, number) for number in range(len(samplers))]
-    outcomes = worker.run_tame([(program, makers)])
-    ran: list[Sample] = []
-    for number, sampler in enumerate(samplers):
-        if (0, number) in outcomes:
-            outcome = outcomes[0, number]
-        elif any(one.is_as_in(sampler) for one in ran):
-            continue
-        else:
-            outcome = worker.run_alone(program, makers[number])
-        robot = robots[number]
-        facts, draws = tuple(robot.facts), tuple(robot.draws)
-        ran.append(Sample(sampler.sample, outcome, facts, draws, _is_in_vain(outcome, robot)))
-    return ran
+    runs = SampledRuns(program, room_map, samplers, settings)
+    known = worker.run_tame([runs.job])
+    return runs.samples(worker, {number: outcome for (_, number), outcome in known.items()})
 
 
 def _is_in_vain(outcome: Outcome, robot: SampledRobot) -> bool:
@@ -100,13 +115,18 @@ def sampled_runs(run: Run, room_map: RoomMap, settings: CheckSettings, width: in
                 ran.append(replace(same, number=sampler.sample))
 
     first = FactSampler(settings.seed, 0, settings.strict)
-    add([replace(first, sample=number) for number in range(settings.samples)])
+    add(first_samplers(settings))
     for more in range(MORE):
         if not all(sample.in_vain and sample.draws for sample in ran) or all(map(_only_computed, ran)):
             break
         # A program that waits in many places needs luck to end; a search, that not all is full of things.
         add([replace(first, sample=len(ran), lucky=more % 2 == 1)])
     return ran
+
+
+def first_samplers(settings: CheckSettings) -> list[FactSampler]:
+    """What draws the facts of the worlds in which a program runs at first."""
+    return [FactSampler(settings.seed, number, settings.strict) for number in range(settings.samples)]
 
 
 def _only_computed(sample: Sample) -> bool:

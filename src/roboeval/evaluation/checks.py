@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, TypeAlias
 
 from codebotler import __version__
-from codebotler.checking.check import check_on
+from codebotler.checking.check import checks_on
 from codebotler.checking.problems import Check
 from codebotler.checking.sampled import CheckSettings
 from codebotler.core.files import Appender, to_line, to_text, write_whole
@@ -66,7 +66,7 @@ def _open(run: Run, metadata: dict[str, Any]) -> Appender:
 def _check(
     plans: Mapping[str, RoomMap], settings: CheckSettings, worker: Worker, works: Sequence[Work]
 ) -> list[Check]:
-    return [check_on(worker, program, plans[task], settings) for task, program in works]
+    return checks_on(worker, [(program, plans[task]) for task, program in works], settings)
 
 
 def _sentences(check: Check) -> list[str]:

@@ -7,7 +7,7 @@ from unittest.mock import Mock
 
 import pytest
 
-from codebotler.checking.check import check, check_on
+from codebotler.checking.check import check, check_on, checks_on
 from codebotler.checking.problems import Check
 from codebotler.checking.sampled import MORE, CheckSettings
 from codebotler.core.errors import UserError
@@ -355,6 +355,30 @@ def test_the_number_of_workers_changes_nothing() -> None:
         assert json.dumps(check_on(worker, source, RoomMap(ROOMS, ROOMS[0]), settings).data()) == written[0]
     finally:
         worker.close()
+
+
+@pytest.mark.parametrize("samples", [3, 20])
+def test_programs_that_are_checked_together_are_checked_as_each_alone(samples: int) -> None:
+    looks, rooms = START + "\n    ".join(LOOKS) + "\n", RoomMap(ROOMS, ROOMS[0])
+    waits = START + "while not is_in_room('mug'):\n        time.sleep(1)\n"
+    programs = [
+        looks,
+        f"class A: pass\n{looks}",
+        "def task_program(:",
+        waits,
+        START + "go_to('moon')\n",
+        looks,
+    ]
+    settings = CheckSettings(samples=samples, seed=4)
+    worker = Worker()
+    try:
+        together = checks_on(worker, [(program, rooms) for program in programs], settings)
+        alone = [check_on(worker, program, rooms, settings) for program in programs]
+    finally:
+        worker.close()
+    assert [check.data() for check in together] == [check.data() for check in alone]
+    assert [together[number].problems[0].kind for number in (2, 4)] == ["SyntaxError", "GoToInvalidLocation"]
+    assert together[0].samples == together[5].samples
 
 
 def test_other_seeds_draw_other_worlds_and_the_same_seed_the_same(checks: Checks) -> None:
