@@ -4,6 +4,7 @@ Inspect is an extra; `make test-inspect` runs this file.
 """
 
 import asyncio
+import gc
 import socket
 import subprocess
 import sys
@@ -40,6 +41,13 @@ from viewing import chromium
 pytestmark = pytest.mark.filterwarnings("ignore:Unclosed <MemoryObjectReceiveStream:ResourceWarning")
 
 TASK = "codebotler/roboeval"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def streams_left_open() -> Iterator[None]:
+    """Collected while the mark above holds: at the end of a session it no longer does."""
+    yield
+    gc.collect()
 
 
 def answering(completions: list[Completion]) -> Any:  # noqa: ANN401 - Inspect has no types here
