@@ -17,15 +17,17 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import cache, partial
-from itertools import count, groupby, repeat
+from itertools import chain, count, groupby, repeat
 from pathlib import Path
 
 from codebotler.core.trace import Status
 from codebotler.core.world import Room, World
+from codebotler.simulator.batches.replay import REPLAYED
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled
+from roboeval.evaluation.engines import Local, Work
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import load_suite
 
@@ -59,18 +61,19 @@ def pairs() -> list[Pair]:
 
 def isolated(pool: WorkerPool, part: Sequence[Pair]) -> list[Status]:
     """Ours: isolated, a few programs in a child, each in all of its worlds."""
+    REPLAYED.clear()  # what other times have left
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
-    def run_all(numbers: Sequence[int]) -> list[list[Status]]:
+    def run_all(worker: Worker, works: Sequence[Work]) -> list[list[Status]]:
         jobs = [
-            (programs[number][0][0], [partial(SimulatedRobot, world) for _, world in programs[number]])
-            for number in numbers
+            (source, [partial(SimulatedRobot, world) for _, world in programs[int(number)]])
+            for number, source in works
         ]
-        return [[outcome.status for outcome in outcomes] for outcomes in pool.here().run_all(jobs)]
+        return [[outcome.status for outcome in outcomes] for outcomes in worker.run_all(jobs)]
 
-    name = partial(int.to_bytes, length=8, byteorder="big")
-    statuses = pool.map_distinct(run_all, range(len(programs)), name=name)
-    return [status for of_program in statuses for status in of_program]
+    works = ((str(number), of_program[0][0]) for number, of_program in enumerate(programs))
+    with Local(pool) as engine:
+        return list(chain.from_iterable(engine.map_distinct(run_all, works, lambda statuses: statuses)))
 
 
 @cache

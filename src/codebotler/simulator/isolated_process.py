@@ -160,20 +160,22 @@ class IsolatedProcess:
             self.hang_up()
             raise
 
-    def send(self, message: object) -> None:
-        """Send a message in one or more pieces; that the process is gone is noticed when it is listened to.
+    def send(self, message: object, *, at_once: bool = False) -> None:
+        """Send a message; that the process is gone is noticed when it is listened to.
 
-        Each piece but the last is asked for more. So a process reads pieces of sizes that depend on the
-        message only, and not on how quick it was: what it reads leaves its mark on the heap.
+        Where a program could see the heap, which what it reads leaves its mark on, a message goes in pieces:
+        each but the last is asked for more. So their sizes depend on the message only, and not on how quick
+        the process was.
         """
         data = marshal.dumps(message, WITHOUT_REFERENCES)  # type: ignore[arg-type]  # made of texts, numbers and the like
         whole = len(data).to_bytes(HEADER, "big") + data
-        for start in range(0, len(whole), PIECE):
+        size = len(whole) if at_once else PIECE
+        for start in range(0, len(whole), size):
             if start and (reply := self.receive()) != MORE:
                 if reply is None:
                     return
                 raise ProtocolError("it speaks in the middle of a message")
-            self._send_piece(memoryview(whole)[start : start + PIECE])
+            self._send_piece(memoryview(whole)[start : start + size])
 
     def _send_piece(self, rest: memoryview) -> None:
         watch = StuckDetector(self)

@@ -10,6 +10,7 @@ from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.simulator.robot import Argument, Result, RobotError, SimulatedRobot
 from codebotler.simulator.rules import Rules
 
+FEW = 50  # calls of which nothing is remembered
 OPTION_OVERHEAD = 10  # characters that an option counts more than it has: empty ones take memory, too
 WAITS = "it waits for something that can never come"
 LAST_LINE = 1_000_000
@@ -97,29 +98,35 @@ class Ledger:
         return Outcome(status, self.robot.trace, RunError(kind, message[:LONGEST_MESSAGE]), where)
 
     def _spend(self, arguments: Sequence[Argument]) -> None:
-        limits, longest = self.limits, 0
+        limits, size = self.limits, 0
         for argument in arguments:
             if isinstance(argument, str):
-                size = largest = len(argument)
+                size += len(argument)
             else:
-                sizes = [len(text) for text, _ in argument]
-                size, largest = sum(sizes) + OPTION_OVERHEAD * (len(sizes) - 1), max(sizes, default=0)
-            self.text += size
-            longest = max(longest, largest)
+                size -= OPTION_OVERHEAD
+                for text, _ in argument:
+                    size += len(text) + OPTION_OVERHEAD
+        self.text += size
         self.calls += 1
         if self.calls > limits.calls:
             self.limit = f"{limits.calls:,} skill calls"
-        elif longest > limits.text:
+        elif size + OPTION_OVERHEAD * len(arguments) > limits.text and longest(arguments) > limits.text:
             self.limit = f"a text of more than {limits.text:,} characters"
         elif self.text > limits.trace:
             self.limit = f"texts of more than {limits.trace:,} characters in all"
+
+
+def longest(arguments: Sequence[Argument]) -> int:
+    """How many characters the longest text has that a skill is given."""
+    texts = [[given] if isinstance(given, str) else [text for text, _ in given] for given in arguments]
+    return max((len(text) for each in texts for text in each), default=0)
 
 
 class RememberingLedger(Ledger):
     """The ledger of a run in simulation, which does at once what the robot has just done before.
 
     Looking and speaking leave the robot as it is. So a program that waits for something costs little, though
-    it looks a thousand times.
+    it looks a thousand times. Most programs call few skills, and nothing of these is remembered.
     """
 
     def __init__(self, robot: SimulatedRobot) -> None:
@@ -130,7 +137,7 @@ class RememberingLedger(Ledger):
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
         """Let the robot execute one skill, unless that goes beyond a limit."""
         robot = self._simulated
-        if skill not in self._idle:
+        if self.calls < FEW or skill not in self._idle:
             self._same.clear()
             return super().perform(skill, arguments)
         call = (skill, *arguments)

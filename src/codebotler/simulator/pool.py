@@ -14,6 +14,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
+from itertools import islice
 from queue import SimpleQueue
 from typing import Any, Generic, ParamSpec, Self, TypeVar
 
@@ -26,7 +27,7 @@ ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
 
 IN_MEMORY = 8_000_000  # bytes of results
 UNREADABLE = b""  # in the place of a key that could not be read
-LARGEST = 32  # keys of a call
+FIRST, SMALLEST, LARGEST = 8, 16, 64  # keys of the first calls, of later ones at the end, and of all between
 AHEAD = 2  # calls for each thread that are under way, so that none waits
 MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
@@ -137,20 +138,17 @@ class WorkerPool:
         distinct = DistinctKeys(keys, name)
         waiting, failed = distinct.waiting, distinct.failed
         running: dict[Future[Sequence[Called]], list[bytes]] = {}
-        under_way: set[bytes] = set()
         ended: SimpleQueue[Future[Sequence[Called]]] = SimpleQueue()
-        calls, sent = AHEAD * self.workers, 0
+        calls = AHEAD * self.workers
         with ResultFile() as done:
             while True:
-                while len(running) < calls and (batch := distinct.read(batch_size(sent, calls))):
+                while len(running) < calls and (batch := distinct.batch(self.workers)):
                     future = self._threads.submit(function, list(batch.values()))
                     running[future] = list(batch)
-                    under_way.update(batch)
-                    sent += len(batch)
                     future.add_done_callback(ended.put)
                 if not waiting:
                     return
-                if waiting[0] not in under_way and ended.empty():
+                if ended.empty() and (waiting[0] in done or waiting[0] in failed):
                     named = waiting.popleft()
                     if named in failed:
                         raise failed[named]
@@ -158,7 +156,6 @@ class WorkerPool:
                     continue
                 future = ended.get()
                 names = running.pop(future)
-                under_way.difference_update(names)
                 try:
                     results = future.result()
                 except Exception as error:  # noqa: BLE001 - raised where the result is waited for
@@ -171,41 +168,49 @@ class WorkerPool:
                         failed[named] = error
 
 
-def batch_size(sent: int, width: int) -> int:
-    """How many keys a call is given: few at first, so that small jobs are spread over all threads."""
-    return min(LARGEST, 1 + sent // width)
-
-
 class DistinctKeys(Generic[Key]):
-    """Keys with a name each, which are read in batches, equal ones once."""
+    """Keys with a name each, which are read a little ahead and handed out in batches, equal ones once."""
 
     def __init__(self, keys: Iterable[Key], name: Callable[[Key], bytes]) -> None:
         self._keys, self._name = iter(keys), name
         self._seen: set[bytes] = set()
+        self._new: dict[bytes, Key] = {}  # read, and not yet handed out
+        self._sent = 0
         self.waiting: deque[bytes] = deque()  # names of keys that were read, until somebody takes them
         self.failed: dict[bytes, BaseException] = {}
 
-    def read(self, most: int) -> dict[bytes, Key]:
-        """The next new keys by name; none once there are no more, or too many wait to be taken.
+    def batch(self, width: int) -> dict[bytes, Key]:
+        """New keys by name, for one call of so many that work at the same time.
 
-        What is raised when they are read comes in the place of the next one, as that of a name that fails.
+        Batches grow, so that the first results come soon; the last ones shrink, so that all calls end at the
+        same time. None is left once there are no more keys, or too many wait to be taken. What is raised when
+        they are read comes in the place of the next one, as that of a name that fails.
         """
-        batch: dict[bytes, Key] = {}
+        size = min(LARGEST, max(FIRST, self._sent))
+        self._read(size * width)
+        share = -(-len(self._new) // width)
+        size = min(size, max(share, SMALLEST if self._sent >= LARGEST else 1))
+        batch = dict(islice(self._new.items(), size))
+        for named in batch:
+            del self._new[named]
+        self._sent += len(batch)
+        return batch
+
+    def _read(self, most: int) -> None:
         try:
-            while len(batch) < most and len(self.waiting) < MOST_AHEAD:
+            while len(self._new) < most and len(self.waiting) < MOST_AHEAD:
                 key = next(self._keys)
                 name = self._name(key)
                 self.waiting.append(name)
                 if name not in self._seen:
                     self._seen.add(name)
-                    batch[name] = key
+                    self._new[name] = key
         except StopIteration:
             pass
         except Exception as error:  # noqa: BLE001 - raised after the results of what was read before
             self._keys = iter(())
             self.waiting.append(UNREADABLE)
             self.failed[UNREADABLE] = error
-        return batch
 
 
 class ResultFile:

@@ -1,10 +1,11 @@
-"""The engine's handle on the preparer: sends it a program, gets its code back, and whether it is tame."""
+"""The engine's handle on the preparer: sends it programs, gets their code back, and which are tame."""
 
 from __future__ import annotations
 
 import json
 import signal
 import socket
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -19,8 +20,8 @@ from codebotler.simulator.isolated_process import (
 from codebotler.simulator.sandbox import MAX_CODE, PLAIN, PREPARER, REFUSED, TAME
 
 MAX_SOURCE = 5_000_000
-LONG = 100_000  # characters of a program that is prepared in a process of its own
-SERVES = 500  # programs that one process prepares
+LONG = 100_000  # characters: a longer program is prepared in a process of its own, more of them one by one
+SERVES = 2_000  # programs that one process prepares
 Skills: TypeAlias = tuple[str, ...]  # the names of those that a program may call
 EXHAUSTED = ("MemoryError", "TimeoutError", "Crash")
 
@@ -49,6 +50,18 @@ class Preparer:
         if self._last is None or self._last[0] != asked:
             self._last = asked, self._prepare(*asked)
         return self._last[1]
+
+    def prepare_all(
+        self, sources: Sequence[str], *, lowercase: bool, skills: Skills
+    ) -> list[Prepared | Outcome]:
+        """The same of several programs, which travel together where they are short."""
+        if sum(map(len, sources)) <= LONG:
+            if self._served + len(sources) > SERVES:
+                self.close()
+            results = self._ask(sources, lowercase, skills)
+            if len(results) == len(sources) and not any(map(is_exhausted, results)):
+                return results
+        return [self.prepare(source, lowercase=lowercase, skills=skills) for source in sources]
 
     def start(self) -> IsolatedProcess:
         """The process, started now if there is none; what is sent to it waits until it is ready."""
@@ -81,34 +94,48 @@ class Preparer:
             self.close()
         served = self._served
         try:
-            result = self._ask((source, lowercase, skills))
-            if served and isinstance(result, Outcome) and result.error and result.error.kind in EXHAUSTED:
+            (result,) = self._ask((source,), lowercase, skills)
+            if served and is_exhausted(result):
                 self.close()  # perhaps earlier programs had exhausted it: a verdict needs a fresh one
-                result = self._ask((source, lowercase, skills))
+                (result,) = self._ask((source,), lowercase, skills)
             return result
         finally:
             if len(source) > LONG:
                 self.close()
 
-    def _ask(self, asked: tuple[str, bool, Skills]) -> Prepared | Outcome:
+    def _ask(self, sources: Sequence[str], lowercase: bool, skills: Skills) -> list[Prepared | Outcome]:  # noqa: FBT001 - private
+        """The results for programs, up to the first at which the process has ended."""
         process = self.start()
-        process.send(asked)
-        self._served += 1
-        try:
-            answer = process.receive_bytes(len(PLAIN) + MAX_CODE)
-        except (TimeoutError, ProtocolError):
-            answer = None
-        if not answer:
-            self._process, self._served = None, 0
-            status = process.ended()
-            if status == -signal.SIGKILL:
-                raise LostProcessError("the preparer was killed from outside")
-            cause, error = cause_of_death(status)
-            return Outcome(cause, (), error)
+        process.send((tuple(sources), lowercase, skills), at_once=True)
+        self._served += len(sources)
+        results: list[Prepared | Outcome] = []
+        for _ in sources:
+            try:
+                answer = process.receive_bytes(len(PLAIN) + MAX_CODE)
+            except (TimeoutError, ProtocolError):
+                answer = None
+            if not answer:
+                self._process, self._served = None, 0
+                status = process.ended()
+                if status == -signal.SIGKILL:
+                    raise LostProcessError("the preparer was killed from outside")
+                cause, error = cause_of_death(status)
+                return [*results, Outcome(cause, (), error)]
+            results.append(result_of(answer))
         process.reset_patience()
-        if answer[:1] == REFUSED:
-            return refused(*json.loads(answer[1:]))
-        return Prepared(answer[1:], is_tame=answer[:1] == TAME)
+        return results
+
+
+def result_of(answer: bytes) -> Prepared | Outcome:
+    """What the process says of a program."""
+    if answer[:1] == REFUSED:
+        return refused(*json.loads(answer[1:]))
+    return Prepared(answer[1:], is_tame=answer[:1] == TAME)
+
+
+def is_exhausted(result: Prepared | Outcome) -> bool:
+    """Whether a program, or those before it, took more than a process has."""
+    return isinstance(result, Outcome) and result.error is not None and result.error.kind in EXHAUSTED
 
 
 def refused(kind: str, message: str, line: int | None = None) -> Outcome:

@@ -116,7 +116,7 @@ class Worker:
     def run_tame(self, jobs: Sequence[Job]) -> dict[tuple[int, int], Outcome]:
         """The outcomes of tame programs, as far as they are certain, by the numbers of job and robot."""
         known: dict[tuple[int, int], Outcome] = {}
-        if self._one_process_per_run:
+        if self._one_process_per_run or not jobs:
             return known
         try:
             waiting = list(self._tame(jobs))
@@ -129,11 +129,13 @@ class Worker:
         return known
 
     def _tame(self, jobs: Sequence[Job]) -> Iterator[tuple[int, bytes, list[SimulatedRobot]]]:
-        for number, (source, robots) in enumerate(jobs):
-            first = robots[0]()
-            prepared = self._prepare(source, first)
+        robot = jobs[0][1][0]()
+        lowercase = robot.rules.literals == "lowercase"
+        sources = [source for source, _ in jobs]
+        told = self._preparer.prepare_all(sources, lowercase=lowercase, skills=tuple(robot.skills))
+        for number, prepared in enumerate(told):
             if isinstance(prepared, Prepared) and prepared.is_tame:
-                yield number, prepared.code, [first, *(new() for new in robots[1:])]
+                yield number, prepared.code, [new_robot() for new_robot in jobs[number][1]]
 
     def _run_batch(
         self,

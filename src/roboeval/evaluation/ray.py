@@ -6,17 +6,15 @@ import logging
 import os
 import platform
 import socket
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from itertools import islice
 from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP, ResultFile, batch_size
+from codebotler.simulator.pool import NO_SECCOMP, DistinctKeys, ResultFile
 from codebotler.simulator.worker import EngineError, Worker
 from roboeval.evaluation.engines import PYTHON, Ran, RunPrograms, Value, Work
 
@@ -72,32 +70,24 @@ class RayCluster:
         """
         remote = self._ray.remote(num_cpus=1, max_retries=RETRIES, retry_exceptions=False)(run_shard)
         functions = self._ray.put((function, then))
-        works, waiting = iter(works), deque[bytes]()
+        distinct = DistinctKeys(works, lambda work: digest(*work))
+        waiting = distinct.waiting
         shards: dict[Any, list[bytes]] = {}
-        running: set[bytes] = set()
-        sent, most = 0, self._most()
+        most = self._most()
         with ResultFile() as done:
             while True:
-                while len(shards) < most:
-                    size = min(batch_size(sent, 2 * most), MOST_AHEAD - len(waiting))
-                    read = [(digest(*work), work) for work in islice(works, size)]
-                    if not read:
-                        break
-                    waiting.extend(name for name, _ in read)
-                    new = {name: work for name, work in read if name not in done and name not in running}
-                    if new:
-                        shard = remote.remote(functions, list(new.values()), VERSIONS, self._isolation)
-                        shards[shard] = list(new)
-                        running.update(new)
-                        sent += len(new)
+                while len(shards) < most and (batch := distinct.batch(most)):
+                    shard = remote.remote(functions, list(batch.values()), VERSIONS, self._isolation)
+                    shards[shard] = list(batch)
                 if not waiting:
                     return
+                if waiting[0] in distinct.failed:
+                    raise distinct.failed[waiting[0]]
                 if waiting[0] in done:
                     yield done[waiting.popleft()]
                     continue
                 for shard, values in self._ended(shards):
                     for name, value in zip(shards.pop(shard), values, strict=True):
-                        running.remove(name)
                         done[name] = value
                 most = self._most()
 

@@ -16,10 +16,10 @@ import pytest
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.trace import Option, RunError, Status
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.batches.replay import Replay, decoded
+from codebotler.simulator.batches.replay import Replay, Transcript, decoded
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
-from codebotler.simulator.ledger import Ledger, RememberingLedger
-from codebotler.simulator.pool import LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool, batch_size
+from codebotler.simulator.ledger import FEW, Ledger, RememberingLedger, SkillAnswer
+from codebotler.simulator.pool import FIRST, LARGEST, MOST_AHEAD, SMALLEST, DistinctKeys, WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Argument, Behaviour, Result, RobotError, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
@@ -245,6 +245,56 @@ def test_programs_of_a_batch_end_as_if_each_were_alone(worker: Worker, other_wor
         alone = [[other_worker.run(program, new_robot) for new_robot in robots] for program, robots in jobs]
         for (program, _), outcomes, expected in zip(jobs, worker.run_all(jobs), alone, strict=True):
             assert [program, *map(all_of, outcomes)] == [program, *map(all_of, expected)]
+
+
+@pytest.fixture
+def replays(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The rooms in which robots stood at first whose runs were replayed, and nothing remembered."""
+    rooms: list[str] = []
+    follow = Replay.follow
+
+    def noted(replay: Replay, transcript: Transcript) -> SkillAnswer:
+        rooms.append(replay.robot.room)
+        return follow(replay, transcript)
+
+    monkeypatch.setattr(Replay, "follow", noted)
+    monkeypatch.setattr("codebotler.simulator.batches.replay.REPLAYED", {})
+    return rooms
+
+
+def test_programs_that_do_the_same_in_a_world_are_replayed_once(
+    worker: Worker, other_worker: Worker, replays: list[str]
+) -> None:
+    looks = task("for room in get_all_rooms():", "    go_to(room)", "    say(str(is_in_room('mug')))")
+    jobs = [job(f"# {number}\n{looks}") for number in range(3)]
+    told = worker.run_all(jobs)
+    assert len(replays) == len(WORLDS)
+    expected = [other_worker.run(looks, new_robot) for new_robot in jobs[0][1]]
+    assert [list(map(all_of, outcomes)) for outcomes in told] == [list(map(all_of, expected))] * 3
+
+
+def test_runs_that_say_the_same_elsewhere_or_by_other_rules_are_replayed(
+    worker: Worker, other_worker: Worker, replays: list[str]
+) -> None:
+    says = saying("hello, everybody")
+    short = Rules(limits=Limits(calls=1))
+    new_robots = [partial(robot, WORLDS[0]), partial(robot, WORLDS[1]), partial(robot, WORLDS[0], short)]
+    (told,) = worker.run_all([(says, new_robots)])
+    assert len(replays) == len(new_robots)
+    assert list(map(all_of, told)) == [all_of(other_worker.run(says, new)) for new in new_robots]
+
+
+def test_few_outcomes_are_remembered_and_no_long_ones(
+    worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known: dict[object, object] = {}
+    monkeypatch.setattr("codebotler.simulator.batches.replay.REPLAYED", known)
+    monkeypatch.setattr("codebotler.simulator.batches.replay.MOST_REMEMBERED", 5)
+    monkeypatch.setattr("codebotler.simulator.batches.replay.LONGEST_REMEMBERED", 100)
+    worker.run_all([job(saying(str(number)), [WORLD]) for number in range(23)])
+    assert len(known) == 23 % 5
+    worker.run_all([job(saying("x" * 100), [WORLD])])
+    assert len(known) == 23 % 5
 
 
 def test_nothing_is_left_of_one_program_for_the_next(worker: Worker) -> None:
@@ -624,7 +674,10 @@ HISTORIES: dict[str, list[Call]] = {
 
 
 @pytest.mark.parametrize("history", HISTORIES.values(), ids=HISTORIES)
-def test_what_was_done_before_is_done_again_in_the_same_way(history: list[Call]) -> None:
+def test_what_was_done_before_is_done_again_in_the_same_way(
+    history: list[Call], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.simulator.ledger.FEW", 0)
     rules = Rules(limits=Limits(trace=250_000))
     told = []
     for kind in (Ledger, RememberingLedger):
@@ -637,15 +690,15 @@ def test_what_was_done_before_is_done_again_in_the_same_way(history: list[Call])
     assert told[0] == told[1]
 
 
-def test_a_thousand_looks_cost_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    perform = Mock(side_effect=[False])
+def test_hundreds_of_looks_cost_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    perform = Mock(return_value=False)
     monkeypatch.setattr(SimulatedRobot, "perform", perform)
     looking = SimulatedRobot(WORLD)
     ledger = RememberingLedger(looking)
     for now, skill, arguments in LOOKS:
         ledger.let_time_pass(now)
         assert ledger.perform(skill, arguments) == ("ok", False)
-    assert perform.call_count == 1
+    assert perform.call_count == FEW + 1
 
 
 @pytest.mark.parametrize("seconds", [0, 1])
@@ -711,14 +764,14 @@ def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
         calls.append(list(numbers))
         return [number * 2 for number in numbers]
 
-    keys = [number % 200 for number in range(500)]
+    keys = [number % 300 for number in range(700)]
     with WorkerPool(1) as pool:
         results = list(pool.map_distinct(work, keys, name=lambda number: number.to_bytes(2)))
     assert results == [number * 2 for number in keys]
-    assert [number for call in calls for number in call] == list(range(200))
+    assert [number for call in calls for number in call] == list(range(300))
     sizes = list(map(len, calls))
     assert sizes[:-1] == sorted(sizes[:-1])
-    assert (sizes[0], max(sizes)) == (1, LARGEST)
+    assert (sizes[0], max(sizes)) == (FIRST, LARGEST)
 
 
 def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
@@ -734,21 +787,36 @@ def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
             next(results)
 
 
-@pytest.mark.parametrize("width", [1, 2, 8, 64])
-def test_small_jobs_are_spread_over_all_threads(width: int) -> None:
-    assert {batch_size(sent, width) for sent in range(width)} == {1}
-    sizes = [batch_size(sent, width) for sent in range(40 * width)]
-    assert sizes == sorted(sizes)
-    assert sizes[-1] == LARGEST
+def in_two_bytes(number: int) -> bytes:
+    return number.to_bytes(2)
 
 
-def test_keys_are_read_in_batches_and_no_further_than_somebody_takes_them() -> None:
-    keys = DistinctKeys(iter([1, 1, 2, 1, 3, 2, *range(4, 10_000)]), lambda number: number.to_bytes(2))
-    assert list(keys.read(2).values()) == [1, 2]
-    assert list(keys.read(2).values()) == [3, 4]
-    assert [int.from_bytes(name) for name in keys.waiting] == [1, 1, 2, 1, 3, 2, 4]
-    while keys.read(16):
+@pytest.mark.parametrize("width", [2, 8, 32])
+def test_batches_grow_at_first_and_shrink_at_the_end(width: int) -> None:
+    keys = DistinctKeys(iter(range(3_000)), in_two_bytes)
+    sizes = []
+    while batch := keys.batch(width):
+        sizes.append(len(batch))
+    assert sum(sizes) == 3_000
+    top = sizes.index(max(sizes))
+    assert sizes[: top + 1] == sorted(sizes[: top + 1])
+    assert sizes[top:-1] == sorted(sizes[top:-1], reverse=True)
+    assert (sizes[0], max(sizes)) == (FIRST, LARGEST)
+    assert sizes[-1] <= SMALLEST
+
+
+def test_few_keys_are_spread_over_all_calls() -> None:
+    keys = DistinctKeys(iter(range(12)), in_two_bytes)
+    sizes = [len(keys.batch(8)) for _ in range(8)]
+    assert (sum(sizes), max(sizes)) == (12, 2)
+
+
+def test_keys_are_read_a_little_ahead_and_no_further_than_somebody_takes_them() -> None:
+    keys = DistinctKeys(iter([1, 1, 2, 1, 3, 2, *range(4, 10_000)]), in_two_bytes)
+    assert list(keys.batch(1).values()) == list(range(1, 1 + FIRST))
+    assert [int.from_bytes(name) for name in keys.waiting] == [1, 1, 2, 1, 3, 2, *range(4, 1 + FIRST)]
+    while keys.batch(1):
         pass
     assert len(keys.waiting) == MOST_AHEAD
     keys.waiting.clear()
-    assert len(keys.read(16)) == 16
+    assert len(keys.batch(1)) == LARGEST

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from codebotler.core.skills import SKILLS
-from codebotler.core.trace import Status
+from codebotler.core.trace import Outcome, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator.preparer import Prepared, Preparer
+from codebotler.simulator.preparer import LONG, Prepared, Preparer, is_exhausted
 from codebotler.simulator.robot import SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import tame
@@ -526,6 +526,36 @@ def test_the_preparer_knows_names_that_its_own_interpreter_lacks() -> None:
             prepared = preparer.prepare(program, lowercase=True, skills=tuple(NAMES))
             assert isinstance(prepared, Prepared)
             assert prepared.is_tame is not is_wild
+    finally:
+        preparer.close()
+
+
+def test_programs_that_are_prepared_together_are_as_if_each_were_alone() -> None:
+    deep = "x = " + "[" * 3_000 + "]" * 3_000
+    programs = ["say('Hi')", "import os", "x = (", deep, "\ud800", "go_to('lab')\n" * 3_000, "say('Ho')"]
+    skills = tuple(NAMES)
+    preparer = Preparer()
+    try:
+        alone = [preparer.prepare(program, lowercase=True, skills=skills) for program in programs]
+        assert preparer.prepare_all(programs, lowercase=True, skills=skills) == alone
+        with_long = [*programs, f"'{'x' * LONG}'"]
+        together = preparer.prepare_all(with_long, lowercase=True, skills=skills)
+        assert together[:-1] == alone
+        assert isinstance(together[-1], Prepared)
+    finally:
+        preparer.close()
+
+
+def test_a_program_that_exhausts_the_preparer_costs_those_beside_it_nothing() -> None:
+    greedy = f"import {'.'.join(['a'] * 40_000)}\n"
+    preparer = Preparer()
+    try:
+        programs = ["say(1)", greedy, "say(2)"]
+        first, refused, last = preparer.prepare_all(programs, lowercase=True, skills=("say",))
+        assert isinstance(first, Prepared)
+        assert isinstance(last, Prepared)
+        assert isinstance(refused, Outcome)
+        assert is_exhausted(refused)
     finally:
         preparer.close()
 

@@ -458,7 +458,7 @@ class Taken(IsolatedProcess):
     def __init__(self, *frames: bytes) -> None:
         self.frames = list(frames)
 
-    def send(self, message: object) -> None:
+    def send(self, message: object, *, at_once: bool = False) -> None:
         """Listen to nobody."""
 
     def receive_bytes(self, most: int) -> bytes | None:  # noqa: ARG002 - as theirs

@@ -20,7 +20,7 @@ from codebotler.simulator.ledger import RememberingLedger
 from codebotler.simulator.robot import Argument, RobotError, SimulatedRobot
 from codebotler.simulator.sampled_robot import SampledRobot
 from codebotler.simulator.sandbox import BATCH_CPU_SECONDS, BATCH_MEMORY, MAX_FRAME
-from codebotler.simulator.sandbox.channel import receive, send_frames
+from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.environment import simulate_environment
 from codebotler.simulator.sandbox.execution import LimitReachedError, ProgramRun, robot_error
 from codebotler.simulator.sandbox.fork_server import DOOR, serve
@@ -29,8 +29,12 @@ from codebotler.simulator.sandbox.tame import GIVEN
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     from codebotler.simulator.sandbox.execution import Skills
     from codebotler.simulator.sandbox.isolation import Filter
+
+    Called: TypeAlias = tuple[str, Sequence[Argument], str, Any]  # a skill, what it was given, the answer
 
 __all__ = ["get_ready", "serve"]
 
@@ -38,6 +42,7 @@ __all__ = ["get_ready", "serve"]
 RECURSION_LIMIT = 400
 FEW = 50  # calls that are written one by one, also where some are equal
 LONGEST_CALL = 50_000  # bytes of what a skill is given; as one frame, more might be too long
+SURROGATE = b"\\ud"  # in JSON, half of a pair
 ODD = b"null"  # in the place of a transcript that a process of its own must decide
 
 
@@ -68,7 +73,7 @@ def receive_setup(door: socket) -> bytes:
 
 def execute(run: TranscribedRun) -> None:
     """Run a batch of programs that the engine sends, and send their transcripts."""
-    transcripts(run, receive(), send_frames)
+    transcripts(run, receive_at_once(), send_frames)
 
 
 def transcripts(
@@ -114,7 +119,7 @@ class TranscribedRun(ProgramRun):
         settings = (rules.limits.ticks, rules.limits.seconds, rules.clock_starts.timestamp(), False)
         end = self.execute(code, settings)
         data = ODD if self.is_odd else self._written(end)
-        return data if len(data) <= MAX_FRAME else ODD
+        return ODD if self.is_odd or len(data) > MAX_FRAME else data
 
     def _begin(self, robot: SimulatedRobot) -> None:
         """Be as before any run."""
@@ -128,15 +133,13 @@ class TranscribedRun(ProgramRun):
         self._forget_calls()
 
     def _forget_calls(self) -> None:
-        self._calls: list[tuple[str, Sequence[Argument], str, Any]] = []
+        self._calls: list[Called] = []
         self._moments: list[tuple[int, float]] = []
 
     def carry_out(self, name: str, arguments: list[Any]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the copy of the robot execute a skill."""
         given = [options(value) if type(value) is list else value for value in arguments]
         try:
-            for each in given:
-                expect_plain(each)
             if self.now != self._told:
                 self._let_time_pass()
             answer = None if name in self.elsewhere else self.ledger.perform(name, given)
@@ -192,14 +195,20 @@ class TranscribedRun(ProgramRun):
 
     def _written(self, end: str) -> bytes:
         calls, order = (self._calls, None) if len(self._calls) <= FEW else distinct(self._calls)
-        return f"[{encoded([calls, order, self._moments])[1:-1]},{end}]".encode("ascii")
+        data = f"[{encoded([calls, order, self._moments])[1:-1]},{end}]".encode("ascii")
+        if len(data) > LONGEST_CALL or SURROGATE in data:
+            self.is_odd = self.is_odd or not all(is_plain(each) for _, given, _, _ in calls for each in given)
+        return data
 
     def _ask_engine(self, name: str, given: list[Argument]) -> Any:  # noqa: ANN401 - what a skill returns
         """Let the engine's robot execute a skill, once it has done all that was asked of it before."""
         self._calls.append((name, given, "ask", None))
-        send_frames([self._written("null")])
+        data = self._written("null")
+        if self.is_odd:
+            raise MemoryError
+        send_frames([data])
         self._forget_calls()
-        kind, value, self.now = receive()
+        kind, value, self.now = receive_at_once()
         self._told = -1.0  # so that the next call tells it again
         if kind == "error":
             self.ledger.errors.append(RobotError(*value[1:]))  # so that later ones have the engine's numbers
@@ -220,17 +229,19 @@ def options(values: list[object]) -> tuple[Option, ...]:
     return tuple([Option(str(value), isinstance(value, str)) for value in values])
 
 
-def expect_plain(given: Argument) -> None:
-    """Raise where texts are too long for JSON, or hold halves of surrogate pairs, which it would join."""
+def is_plain(given: Argument) -> bool:
+    """Whether texts are short enough for JSON, and hold no halves of surrogate pairs, which it would join."""
     text = given if isinstance(given, str) else "".join([offered for offered, _ in given])
-    if len(text.encode()) > LONGEST_CALL:
-        raise MemoryError
+    try:
+        return len(text.encode()) <= LONGEST_CALL
+    except UnicodeEncodeError:
+        return False
 
 
-def distinct(calls: list[tuple[str, Sequence[Argument], str, Any]]) -> tuple[list[object], list[int]]:
+def distinct(calls: list[Called]) -> tuple[list[Called], list[int]]:
     """Different calls, and the place among these of each call."""
     places: dict[object, int] = {}
-    different: list[object] = []
+    different: list[Called] = []
     order = []
     for call in calls:
         name, given, kind, value = call

@@ -54,9 +54,19 @@ def receive() -> Any:  # noqa: ANN401 - whatever the engine sends
     return loads(b"".join(pieces)[HEADER:])  # noqa: S302 - written by the engine
 
 
-def read_piece() -> bytes:
-    """Read what the engine has sent at once; without an engine, end."""
-    piece = read(CHANNEL, PIECE)
+def receive_at_once() -> Any:  # noqa: ANN401 - the same
+    """Read one message that does not come in pieces."""
+    missing = int.from_bytes(read_piece(HEADER), "big")
+    pieces = []
+    while missing > 0:
+        pieces.append(read_piece(missing))
+        missing -= len(pieces[-1])
+    return loads(b"".join(pieces))  # noqa: S302 - the same
+
+
+def read_piece(most: int = PIECE) -> bytes:
+    """Read what the engine has sent; without an engine, end."""
+    piece = read(CHANNEL, most)
     if not piece:
         _exit(1)
     return piece

@@ -21,7 +21,7 @@ from codebotler.simulator.sandbox import (
     TAME,
     WITHOUT_REFERENCES,
 )
-from codebotler.simulator.sandbox.channel import receive, send_bytes
+from codebotler.simulator.sandbox.channel import receive_at_once, send_frames
 from codebotler.simulator.sandbox.fuel import TOO_LARGE, prepared
 from codebotler.simulator.sandbox.isolation import enclose, give_up_rights, usable_filter
 
@@ -45,10 +45,10 @@ def get_ready(_role: str) -> tuple[()]:
 
 
 def serve() -> NoReturn:
-    """Prepare one program after the other until the engine closes its end."""
+    """Prepare the programs that the engine sends until it closes its end."""
     while True:
-        source, lowercase, skills = receive()
-        send_bytes(answer(source, lowercase=lowercase, skills=skills))
+        sources, lowercase, skills = receive_at_once()
+        send_frames([answer(source, lowercase=lowercase, skills=skills) for source in sources])
 
 
 def answer(source: str, *, lowercase: bool, skills: tuple[str, ...] | None = None) -> bytes:
