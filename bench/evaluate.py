@@ -1,10 +1,10 @@
 """How fast is the engine, compared with no isolation at all and with one fresh interpreter a run?
 
 The list is fixed: every distinct (program, world) pair of the corpus, where CODEBOTLER_CORPUS names it, or
-else of the recorded models. Nothing is deduplicated; ours and the in-process way both compile each program
-once, while the clock runs. The three ways take turns over parts of the list, several times, so that the
-ratios hold on a machine whose speed drifts. Pairs that reach a limit, loops and programs that hang are
-printed apart.
+else of the recorded models; then those of every fourth program under the suite `plus`. Nothing is
+deduplicated; ours and the in-process way both compile each program once, while the clock runs. The three ways
+take turns over parts of the list, several times, so that the ratios hold on a machine whose speed drifts.
+Pairs that reach a limit, loops and programs that hang are printed apart.
 """
 
 import json
@@ -25,11 +25,12 @@ from codebotler.core.world import Room, World
 from codebotler.simulator.batches.replay import REPLAYED
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import SimulatedRobot
+from codebotler.simulator.rules import PAPER, Rules
 from codebotler.simulator.worker import Worker
 from in_process import Reused, compiled
 from roboeval.evaluation.engines import Local, Work
 from roboeval.evaluation.runs.completions import recorded_completions
-from roboeval.suites.load import load_suite
+from roboeval.suites.load import Suite, load_suite
 
 WORKERS = int(os.environ.get("WORKERS", "2"))
 PARTS, TIMES = 3, 3
@@ -37,9 +38,8 @@ PARTS, TIMES = 3, 3
 Pair = tuple[str, World]
 
 
-def pairs() -> list[Pair]:
+def pairs(suite: Suite) -> list[Pair]:
     """The fixed list; the worlds of a program follow one another."""
-    suite = load_suite()
     corpus = os.environ.get("CODEBOTLER_CORPUS")
     if corpus:
         lines = (Path(corpus) / "corpus" / "programs.jsonl").read_text().splitlines()
@@ -59,14 +59,14 @@ def pairs() -> list[Pair]:
 # --- the three ways
 
 
-def isolated(pool: WorkerPool, part: Sequence[Pair]) -> list[Status]:
+def isolated(pool: WorkerPool, rules: Rules, part: Sequence[Pair]) -> list[Status]:
     """Ours: isolated, a few programs in a child, each in all of its worlds."""
     REPLAYED.clear()  # what other times have left
     programs = [list(same) for _, same in groupby(part, key=lambda pair: pair[0])]
 
     def run_all(worker: Worker, works: Sequence[Work]) -> list[list[Status]]:
         jobs = [
-            (source, [partial(SimulatedRobot, world) for _, world in programs[int(number)]])
+            (source, [partial(SimulatedRobot, world, rules) for _, world in programs[int(number)]])
             for number, source in works
         ]
         return [[outcome.status for outcome in outcomes] for outcomes in worker.run_all(jobs)]
@@ -88,21 +88,23 @@ def forget(time: int) -> None:  # noqa: ARG001 - once for each time
     compiled.cache_clear()
 
 
-def run_bare(part: Sequence[Pair], time: int = 0) -> None:
+def run_bare(part: Sequence[Pair], time: int = 0, rules: Rules = PAPER) -> None:
     """Run pairs in this process."""
     forget(time)
     for pair in part:
-        reused(NOWHERE).run(pair)
+        reused(NOWHERE).run(pair, rules)
 
 
 NOWHERE = World((Room("nowhere"),), "nowhere")
 
 
-def in_process(processes: ProcessPoolExecutor, times: Iterator[int], part: Sequence[Pair]) -> None:
+def in_process(
+    processes: ProcessPoolExecutor, times: Iterator[int], rules: Rules, part: Sequence[Pair]
+) -> None:
     """No isolation: the same programs in as many processes."""
     share = -(-len(part) // (8 * WORKERS))
     shares = [part[at : at + share] for at in range(0, len(part), share)]
-    list(processes.map(run_bare, shares, repeat(next(times))))
+    list(processes.map(run_bare, shares, repeat(next(times)), repeat(rules)))
 
 
 def fresh_interpreters(threads: ThreadPoolExecutor, part: Sequence[Pair]) -> None:
@@ -130,29 +132,60 @@ def parts(whole: Sequence[Pair]) -> Iterator[list[Pair]]:
 
 def main() -> None:
     """Print runs per second of the three ways, the two ratios, and what is apart."""
-    whole = pairs()
+    paper, plus = load_suite(), load_suite("plus")
+    whole = pairs(paper)
     processes = ProcessPoolExecutor(WORKERS, multiprocessing.get_context("fork"))
     list(processes.map(run_bare, [whole[:1]] * 4 * WORKERS))
     with processes, WorkerPool(WORKERS) as pool, ThreadPoolExecutor(WORKERS) as threads:
-        ours = partial(isolated, pool)
-        statuses = ours(whole)
-        honest = [pair for pair, status in zip(whole, statuses, strict=True) if status is not Status.TIMEOUT]
-        limited = [pair for pair, status in zip(whole, statuses, strict=True) if status is Status.TIMEOUT]
-        ways: dict[str, Callable[[Sequence[Pair]], object]] = {
-            "isolated (ours)": ours,
-            "in-process, no isolation": partial(in_process, processes, count(1)),
-            "one `python -c pass` a run": partial(fresh_interpreters, threads),
-        }
-        times: dict[str, list[float]] = {}
-        for part in list(parts(honest)) * TIMES:
-            for name, way in ways.items():
-                times.setdefault(name, []).append(seconds(way, part))
-        report(len(honest), times)
+        ours = partial(isolated, pool, paper.rules)
+        honest, limited = by_limit(ours, whole)
+        numbers = count(1)
+        compare(
+            honest,
+            {
+                "isolated (ours)": ours,
+                "in-process, no isolation": partial(in_process, processes, numbers, paper.rules),
+                "one `python -c pass` a run": partial(fresh_interpreters, threads),
+            },
+        )
+        ours_plus = partial(isolated, pool, plus.rules)
+        compare(
+            by_limit(ours_plus, every_fourth(pairs(plus)))[0],
+            {
+                "under plus, isolated (ours)": ours_plus,
+                "under plus, in-process": partial(in_process, processes, numbers, plus.rules),
+            },
+        )
         if limited:
             at_limit = seconds(ours, limited) / len(limited)
             print(f"{len(limited)} pairs that reach a limit, ours: {1000 * at_limit:.1f} ms a run")
         report_hanging(ours, honest[: len(honest) // PARTS])
     report_loops(honest)
+
+
+def by_limit(
+    ours: Callable[[Sequence[Pair]], list[Status]], whole: Sequence[Pair]
+) -> tuple[list[Pair], list[Pair]]:
+    """The pairs that end by themselves, and those that reach a limit."""
+    statuses = list(zip(whole, ours(whole), strict=True))
+    honest = [pair for pair, status in statuses if status is not Status.TIMEOUT]
+    return honest, [pair for pair, status in statuses if status is Status.TIMEOUT]
+
+
+def every_fourth(whole: Sequence[Pair]) -> list[Pair]:
+    """The pairs of every fourth program."""
+    programs = list(dict.fromkeys(program for program, _ in whole))
+    some = set(programs[::4])
+    return [pair for pair in whole if pair[0] in some]
+
+
+def compare(honest: Sequence[Pair], ways: dict[str, Callable[[Sequence[Pair]], object]]) -> None:
+    """Time ways in turns, and print what they reach."""
+    times: dict[str, list[float]] = {}
+    for part in list(parts(honest)) * TIMES:
+        for name, way in ways.items():
+            times.setdefault(name, []).append(seconds(way, part))
+    report(len(honest), times)
 
 
 def report(pairs: int, times: dict[str, list[float]]) -> None:
@@ -161,9 +194,10 @@ def report(pairs: int, times: dict[str, list[float]]) -> None:
     total = {name: sum(each) for name, each in times.items()}
     for name, spent in total.items():
         print(f"{name:36}{pairs * TIMES / spent:10.0f} runs/s")
-    ours, bare, fresh = total.values()
+    ours, bare, *fresh = total.values()
     print(f"ours / in-process:         {bare / ours:.3f}   (by round, sorted: {ratios(times, 1)})")
-    print(f"ours / fresh interpreters: {fresh / ours:.2f}    (by round, sorted: {ratios(times, 2)})")
+    if fresh:
+        print(f"ours / fresh interpreters: {fresh[0] / ours:.2f}    (by round, sorted: {ratios(times, 2)})")
 
 
 def ratios(times: dict[str, list[float]], other: int) -> str:

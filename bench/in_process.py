@@ -92,13 +92,13 @@ class Reused(Bare):
         time.sleep = self.sleep
         self.provided = dict(vars(self.namespace))
 
-    def run(self, pair: tuple[str, World]) -> None:
+    def run(self, pair: tuple[str, World], rules: Rules = PAPER) -> None:
         """Run a program in a world."""
         source, world = pair
         code = compiled(source)
         if isinstance(code, BaseException):
             return
-        self.robot, self.now, self.spent, self.entered = SimulatedRobot(world), 0.0, False, False
+        self.robot, self.now, self.spent, self.entered = SimulatedRobot(world, rules), 0.0, False, False
         self.codes.clear()
         self.left = self.limits.calls
         self.refuel()

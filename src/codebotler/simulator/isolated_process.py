@@ -45,7 +45,7 @@ CORE, BATCHES = "codebotler.core", f"{__package__}.batches"
 # What a child needs that has robots of its own, besides the sandbox.
 SIMULATION = (
     f"{BATCHES}.process",
-    *(f"{CORE}.{name}" for name in ("errors", "skills", "trace", "words", "world")),
+    *(f"{CORE}.{name}" for name in ("cachedproperty", "errors", "skills", "trace", "words", "world")),
     *(f"{__package__}.{name}" for name in ("fact_sampler", "ledger", "robot", "rules", "sampled_robot")),
 )
 MODULES = {PREPARER: f"{__package__}.sandbox.preparer", BATCH_SERVER: f"{BATCHES}.process"}

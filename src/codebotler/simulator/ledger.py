@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypeAlias
 
+from codebotler.core.cachedproperty import cached_property
 from codebotler.core.skills import SkillTable
 from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.simulator.robot import Argument, Result, RobotError, SimulatedRobot
@@ -131,8 +132,12 @@ class RememberingLedger(Ledger):
 
     def __init__(self, robot: SimulatedRobot) -> None:
         super().__init__(robot)
-        self._simulated, self._idle = robot, robot.idle_skills.difference(robot.own_skills)
+        self._simulated = robot
         self._same: dict[tuple[object, ...], tuple[int, SkillAnswer, Sequence[Event]]] = {}
+
+    @cached_property
+    def _idle(self) -> frozenset[str]:
+        return self._simulated.idle_skills.difference(self._simulated.own_skills)
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> SkillAnswer:
         """Let the robot execute one skill, unless that goes beyond a limit."""

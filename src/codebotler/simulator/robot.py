@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from typing import Any, TypeAlias
 
+from codebotler.core.cachedproperty import cached_property
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Event, Option, Trace
@@ -90,7 +91,7 @@ class SimulatedRobot:
         skills: SkillTable = SKILLS,
         behaviours: Mapping[str, Behaviour] | None = None,
     ) -> None:
-        self.rules, self.skills = rules, skills
+        self.world, self.rules, self.skills = world, rules, skills
         self.behaviours = BEHAVIOURS if behaviours is None else behaviours
         self.setup: Setup = ("simulated", (world, rules))
         is_usual = skills is SKILLS and behaviours is None
@@ -99,12 +100,22 @@ class SimulatedRobot:
             raise UserError(f'the skill "{missing[0]}" has no behaviour: say in `behaviours` what it does')
         self.rooms = tuple(room.name for room in world.rooms)
         self.room = world.robot
-        self.things = {room.name: [Thing(label) for label in room.objects] for room in world.rooms}
-        self.people = {room.name: [Somebody(person) for person in room.people] for room in world.rooms}
         self.held: str | None = None
         self.taken: Thing | None = None
         self.now, self.is_live = 0.0, False
         self.events: list[Event] = []
+
+    # Made when they are first needed: whose run is remembered needs neither.
+
+    @cached_property
+    def things(self) -> dict[str, list[Thing]]:
+        """The objects in each room."""
+        return {room.name: [Thing(label) for label in room.objects] for room in self.world.rooms}
+
+    @cached_property
+    def people(self) -> dict[str, list[Somebody]]:
+        """The people in each room, also those who have yet to come."""
+        return {room.name: [Somebody(person) for person in room.people] for room in self.world.rooms}
 
     @property
     def trace(self) -> Trace:

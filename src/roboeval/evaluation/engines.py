@@ -36,7 +36,7 @@ class Engine(Protocol):
 OpenEngine = AbstractContextManager[Engine]
 
 
-BRIEF = 20_000  # events and the like that are made before garbage is looked for: nearly all live briefly
+BRIEF = 100_000  # events and the like that are made before garbage is looked for: nearly all live briefly
 
 
 class Local:

@@ -40,7 +40,7 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 
 
 Key: TypeAlias = tuple[Any, ...]  # a transcript as it is sent, and the ids of what its robot is made from
-MOST_REMEMBERED, LONGEST_REMEMBERED = 4_096, 4_096  # transcripts, and bytes of one
+MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 4_096  # transcripts, and bytes of one
 # Outcomes of transcripts, and what the ids of their keys belong to, so that nothing else gets these ids.
 REPLAYED: dict[Key, tuple[Outcome, SkillTable, Setup]] = {}
 LAST_MOMENT = (-1, 0.0)  # after all of those in a transcript: of no call
