@@ -75,8 +75,8 @@ def outcomes(child: IsolatedProcess, programs: Programs) -> Iterator[Outcome | N
 
 def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
     key: Key = (frame := _frame(child), id(robot.skills), *map(id, robot.setup[1]))
-    if key in REPLAYED:
-        return REPLAYED[key][0]
+    if (known := REPLAYED.get(key)) is not None:  # another thread may clear it at any moment
+        return known[0]
     replay = Replay(robot)
     while (transcript := decoded(frame)) is not None:
         answer = replay.follow(transcript)
