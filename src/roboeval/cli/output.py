@@ -19,8 +19,8 @@ def watched(items: Iterable[Item], doing: str, total: int) -> Iterator[Item]:
     """Pass things on, with a progress bar on a terminal and a line now and then elsewhere."""
     with metered(doing, total) as tell:
         for done, item in enumerate(items, 1):
-            tell(done, "")
             yield item
+            tell(done, "")  # only now it is done: who is interrupted by what this says has the item
 
 
 @contextmanager
