@@ -27,7 +27,7 @@ ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
 
 IN_MEMORY = 8_000_000  # bytes of results
 UNREADABLE = b""  # in the place of a key that could not be read
-FIRST, SMALLEST, LARGEST = 8, 16, 64  # keys of the first calls, of later ones at the end, and of all between
+FEW, LARGEST = 16, 64  # keys of the first calls and of the last, and of those between
 AHEAD = 2  # calls for each thread that are under way, so that none waits
 MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
@@ -186,10 +186,10 @@ class DistinctKeys(Generic[Key]):
         same time. None is left once there are no more keys, or too many wait to be taken. What is raised when
         they are read comes in the place of the next one, as that of a name that fails.
         """
-        size = min(LARGEST, max(FIRST, self._sent))
+        size = min(LARGEST, max(FEW, self._sent // 2))
         self._read(size * width)
         share = -(-len(self._new) // width)
-        size = min(size, max(share, SMALLEST if self._sent >= LARGEST else 1))
+        size = min(size, max(share, FEW if self._sent >= LARGEST else 1))
         batch = dict(islice(self._new.items(), size))
         for named in batch:
             del self._new[named]

@@ -18,8 +18,8 @@ from codebotler.core.trace import Option, RunError, Status
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import Replay, Transcript, decoded
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
-from codebotler.simulator.ledger import FEW, Ledger, RememberingLedger, SkillAnswer
-from codebotler.simulator.pool import FIRST, LARGEST, MOST_AHEAD, SMALLEST, DistinctKeys, WorkerPool
+from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
+from codebotler.simulator.pool import FEW, LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Argument, Behaviour, Result, RobotError, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
@@ -690,7 +690,9 @@ def test_what_was_done_before_is_done_again_in_the_same_way(
     assert told[0] == told[1]
 
 
-def test_hundreds_of_looks_cost_one(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("few", "performed"), [(0, 1), (50, 51)])
+def test_a_thousand_looks_cost_one(monkeypatch: pytest.MonkeyPatch, few: int, performed: int) -> None:
+    monkeypatch.setattr("codebotler.simulator.ledger.FEW", few)
     perform = Mock(return_value=False)
     monkeypatch.setattr(SimulatedRobot, "perform", perform)
     looking = SimulatedRobot(WORLD)
@@ -698,7 +700,7 @@ def test_hundreds_of_looks_cost_one(monkeypatch: pytest.MonkeyPatch) -> None:
     for now, skill, arguments in LOOKS:
         ledger.let_time_pass(now)
         assert ledger.perform(skill, arguments) == ("ok", False)
-    assert perform.call_count == FEW + 1
+    assert perform.call_count == performed
 
 
 @pytest.mark.parametrize("seconds", [0, 1])
@@ -771,7 +773,7 @@ def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:
     assert [number for call in calls for number in call] == list(range(300))
     sizes = list(map(len, calls))
     assert sizes[:-1] == sorted(sizes[:-1])
-    assert (sizes[0], max(sizes)) == (FIRST, LARGEST)
+    assert (sizes[0], max(sizes)) == (FEW, LARGEST)
 
 
 def test_a_result_that_cannot_be_used_takes_the_place_of_no_other() -> None:
@@ -801,8 +803,8 @@ def test_batches_grow_at_first_and_shrink_at_the_end(width: int) -> None:
     top = sizes.index(max(sizes))
     assert sizes[: top + 1] == sorted(sizes[: top + 1])
     assert sizes[top:-1] == sorted(sizes[top:-1], reverse=True)
-    assert (sizes[0], max(sizes)) == (FIRST, LARGEST)
-    assert sizes[-1] <= SMALLEST
+    assert (sizes[0], max(sizes)) == (FEW, LARGEST)
+    assert sizes[-1] <= FEW
 
 
 def test_few_keys_are_spread_over_all_calls() -> None:
@@ -813,8 +815,8 @@ def test_few_keys_are_spread_over_all_calls() -> None:
 
 def test_keys_are_read_a_little_ahead_and_no_further_than_somebody_takes_them() -> None:
     keys = DistinctKeys(iter([1, 1, 2, 1, 3, 2, *range(4, 10_000)]), in_two_bytes)
-    assert list(keys.batch(1).values()) == list(range(1, 1 + FIRST))
-    assert [int.from_bytes(name) for name in keys.waiting] == [1, 1, 2, 1, 3, 2, *range(4, 1 + FIRST)]
+    assert list(keys.batch(1).values()) == list(range(1, 1 + FEW))
+    assert [int.from_bytes(name) for name in keys.waiting] == [1, 1, 2, 1, 3, 2, *range(4, 1 + FEW)]
     while keys.batch(1):
         pass
     assert len(keys.waiting) == MOST_AHEAD
