@@ -14,7 +14,7 @@ from unittest.mock import Mock
 import pytest
 
 from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
-from codebotler.core.trace import Option, RunError, Status
+from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
 from codebotler.simulator.batches.replay import Replay, Transcript, decoded
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
@@ -624,7 +624,10 @@ def test_replay_reaches_the_limits_that_were_reached(calls: object, order: objec
     assert (outcome.status, outcome.error) == (Status.TIMEOUT, RunError("TimeoutError", ledger.limit))
 
 
-def test_a_robot_of_ones_own_kind_performs_every_call(worker: Worker) -> None:
+def test_a_robot_of_ones_own_kind_performs_every_call(
+    worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("codebotler.simulator.ledger.FEW", 0)
     performed: list[str] = []
 
     class Noting(SimulatedRobot):
@@ -637,6 +640,30 @@ def test_a_robot_of_ones_own_kind_performs_every_call(worker: Worker) -> None:
     known = worker.run_tame([(task("say('a')", "say('a')", "say('a')"), [partial(Noting, WORLD)])])
     assert known[0, 0].status is Status.FINISHED
     assert performed == ["say"] * 3
+
+
+class Greeting(SimulatedRobot):
+    """A robot that has greeted before any program runs."""
+
+    @property
+    def trace(self) -> Trace:
+        """What it has done, the greeting included."""
+        return (Event("say", "hello"), *super().trace)
+
+
+def test_a_robot_of_ones_own_kind_shares_no_outcome(worker: Worker) -> None:
+    idle = task("pass")
+    for kind in (SimulatedRobot, Greeting, SimulatedRobot, Greeting):
+        (outcome,) = worker.run_tame([(idle, [partial(kind, WORLD)])]).values()
+        assert len(outcome.trace) == (kind is Greeting)
+
+
+@pytest.mark.parametrize(("question", "options"), [(200, []), (201, []), (190, [11]), (5, [200]), (5, [201])])
+def test_a_text_may_be_so_long_whatever_else_is_given(question: int, options: list[int]) -> None:
+    ledger = Ledger(SimulatedRobot(WORLD, Rules(limits=Limits(text=200))))
+    ledger.perform("ask", ("", "q" * question, tuple(Option("o" * size) for size in options)))
+    is_too_long = max(question, *options, 0) > 200
+    assert (ledger.limit == "a text of more than 200 characters") == is_too_long
 
 
 # --- looking often

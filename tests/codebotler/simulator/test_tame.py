@@ -2,6 +2,8 @@
 
 import ast
 import json
+import os
+import signal
 import sys
 import warnings
 from pathlib import Path
@@ -556,6 +558,18 @@ def test_a_program_that_exhausts_the_preparer_costs_those_beside_it_nothing() ->
         assert isinstance(last, Prepared)
         assert isinstance(refused, Outcome)
         assert is_exhausted(refused)
+    finally:
+        preparer.close()
+
+
+@pytest.mark.parametrize("number", [signal.SIGXCPU, signal.SIGSYS, signal.SIGSEGV])
+def test_a_preparer_that_dies_at_several_programs_is_replaced(number: int) -> None:
+    preparer = Preparer()
+    try:
+        preparer.prepare("say(0)", lowercase=True, skills=("say",))
+        os.kill(preparer.start().pid, number)
+        together = preparer.prepare_all(["say(1)", "say(2)"], lowercase=True, skills=("say",))
+        assert [type(one) for one in together] == [Prepared, Prepared]
     finally:
         preparer.close()
 

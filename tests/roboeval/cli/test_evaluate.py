@@ -16,6 +16,7 @@ import pytest
 from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
 from roboeval import load_results
+from roboeval.cli.output import watched
 from seals import unseal
 
 GREETS = 'def task_program():\n    say("good day")\n'
@@ -402,6 +403,15 @@ def test_an_output_that_is_full_or_closed() -> None:
     assert ended.status == 1
     assert re.fullmatch(r"roboeval: [^\n]*: No space left on device; [^\n]*\n", ended.err)
     assert roboeval("tasks", "--json", after="| head -c 1").err == ""
+
+
+def test_progress_counts_what_has_been_passed_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("roboeval.cli.output.QUIET_S", 0.0)
+    items = watched("ab", "judging", 2)
+    assert (next(items), capsys.readouterr().err) == ("a", "")
+    assert (next(items), capsys.readouterr().err[:15]) == ("b", "judging: 1 of 2")
 
 
 # --- Ctrl-C

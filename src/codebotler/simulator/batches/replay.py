@@ -42,7 +42,7 @@ class Transcript(msgspec.Struct, array_like=True, forbid_unknown_fields=True):
 Key: TypeAlias = tuple[Any, ...]  # a transcript as it is sent, and the ids of what its robot is made from
 MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 4_096  # transcripts, and bytes of one
 # Outcomes of transcripts, and what the ids of their keys belong to, so that nothing else gets these ids.
-REPLAYED: dict[Key, tuple[Outcome, SkillTable, Setup]] = {}
+REPLAYED: dict[Key | None, tuple[Outcome, SkillTable, Setup]] = {}
 LAST_MOMENT = (-1, 0.0)  # after all of those in a transcript: of no call
 ONLY_TIME: SkillAnswer = ("time", None)
 DECODER = msgspec.json.Decoder(Transcript | None)
@@ -74,7 +74,8 @@ def outcomes(child: IsolatedProcess, programs: Programs) -> Iterator[Outcome | N
 
 
 def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
-    key: Key = (frame := _frame(child), id(robot.skills), *map(id, robot.setup[1]))
+    frame = _frame(child)
+    key = key_of(frame, robot)
     if (known := REPLAYED.get(key)) is not None:  # another thread may clear it at any moment
         return known[0]
     replay = Replay(robot)
@@ -84,7 +85,7 @@ def _outcome(child: IsolatedProcess, robot: SimulatedRobot) -> Outcome | None:
             outcome = replay.ledger.ended(transcript.end)
             if outcome.status is Status.KILLED:
                 raise ProtocolError("an end is malformed")
-            if frame is key[0] and robot.setup[0] == "simulated" and not robot.own_skills:
+            if key is not None:
                 remember(key, outcome, robot)
             return outcome
         child.send((*answer, robot.now), at_once=True)
@@ -99,12 +100,18 @@ def _frame(child: IsolatedProcess) -> bytes:
     return frame
 
 
+def key_of(frame: bytes, robot: SimulatedRobot) -> Key | None:
+    """What a transcript is remembered by; None where it is long, or its robot of a kind of its own."""
+    if len(frame) > LONGEST_REMEMBERED or robot.setup[0] != "simulated" or robot.own_skills:
+        return None
+    return frame, id(robot.skills), *map(id, robot.setup[1])
+
+
 def remember(key: Key, outcome: Outcome, robot: SimulatedRobot) -> None:
     """Keep what a transcript amounts to: many programs do the same in the same world."""
-    if len(key[0]) <= LONGEST_REMEMBERED:
-        if len(REPLAYED) >= MOST_REMEMBERED:
-            REPLAYED.clear()
-        REPLAYED[key] = outcome, robot.skills, robot.setup
+    if len(REPLAYED) >= MOST_REMEMBERED:
+        REPLAYED.clear()
+    REPLAYED[key] = outcome, robot.skills, robot.setup
 
 
 def decoded(frame: bytes) -> Transcript | None:
