@@ -7,7 +7,14 @@ from collections.abc import Iterator, Mapping
 import polars as pl
 
 from codebotler.simulator.robot import resolve_room
-from roboeval.analysis.metrics import Estimate, by_formula, completions_of, prompt_scores, task_scores
+from roboeval.analysis.metrics import (
+    Estimate,
+    by_formula,
+    completions_of,
+    mean_of,
+    prompt_scores,
+    task_scores,
+)
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import KEY
 from roboeval.evaluation.runs.results import Results
@@ -59,10 +66,14 @@ def coming_back(results: Results) -> pl.DataFrame:
             never_returned=pl.col("away").sum(),
             lost=(pl.col("failure_kind") == LOST).sum(),
         )
-        .join(scores.with_columns(pl.col("pass@1").list.mean()), on="reports")
+        .join(scores.with_columns(_mean("pass@1")), on="reports")
         .sort("reports", descending=True)
     )
     return found.filter(pl.col("reports").any())
+
+
+def _mean(lists: str) -> pl.Expr:
+    return pl.col(lists).map_elements(lambda values: mean_of([values]), return_dtype=pl.Float64)
 
 
 def never_returned(row: RowData, suite: Suite) -> bool:
@@ -109,7 +120,7 @@ def phrasing(scores: pl.DataFrame) -> pl.DataFrame:
     and how many of the `models` it `hurts`. Prompts that are alone in their task are left out.
     """
     several = scores.filter(pl.col("prompt").n_unique().over("task") > 1)
-    means = several.group_by("model", "task").agg("pass@1").with_columns(mean=pl.col("pass@1").list.mean())
+    means = several.group_by("model", "task").agg("pass@1").with_columns(mean=_mean("pass@1"))
     better = pl.col("pass@1") - pl.col("mean")
     return (
         several.join(means.drop("pass@1"), on=["model", "task"], maintain_order="left")

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from math import fsum
 from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import Estimate, by_formula
+from roboeval.analysis.metrics import Estimate, by_formula, mean_of
 from roboeval.analysis.statistics import (
     DIFFERENCE,
     ROUNDING,
@@ -71,8 +70,8 @@ def compared(first: PromptScores, second: PromptScores) -> Comparison:
     tasks = [[b - a for a, b in pairs] for pairs in by_task.values()]
     prompts = [[b - a] for a, b in pairs]
     return Comparison(
-        first=fsum(a for a, _ in pairs) / len(pairs),
-        second=fsum(b for _, b in pairs) / len(pairs),
+        first=mean_of([[a for a, _ in pairs]]),
+        second=mean_of([[b for _, b in pairs]]),
         prompts=len(pairs),
         left_out=len({*first, *second}) - len(keys),
         over_prompts=by_formula(prompts, within=DIFFERENCE),
@@ -89,7 +88,7 @@ def _by_task(by_task: Mapping[str, Sequence[tuple[float, float]]]) -> Iterator[T
     total = sum(map(len, by_task.values()))
     for task, pairs in by_task.items():
         n = len(pairs)
-        first, second = fsum(a for a, _ in pairs) / n, fsum(b for _, b in pairs) / n
+        first, second = mean_of([[a for a, _ in pairs]]), mean_of([[b for _, b in pairs]])
         yield TaskDifference(task, first, second, (second - first) * n / total, n)
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import polars as pl
 
 from roboeval.analysis.metrics import completions_of
-from roboeval.analysis.resample import LIMITS, CheckedPrompt, chances, trials_by_prompt
+from roboeval.analysis.resample import LIMITS, chances, rejected_share, requests, trials_by_prompt
 
 MILLION = 1_000_000
 
@@ -75,8 +75,9 @@ def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LI
     means = completions.group_by("task", "prompt").agg(pl.col("input_tokens", "output_tokens").mean())
     tokens = {} if None in _tokens(completions) else {row[:2]: row[2:] for row in means.iter_rows()}
     each = [tokens.get((prompt.task, prompt.prompt), (0.0, 0.0)) for prompt in prompts]
+    rejected = [rejected_share(prompt.trials) for prompt in prompts]
     for retries in limits:
-        asked = [requests(prompt, retries) for prompt in prompts]
+        asked = [requests(share, retries) for share in rejected]
         passed = sum(chances(prompt.trials, retries).passed for prompt in prompts)
         there, back = (math.fsum(n * t[at] for n, t in zip(asked, each, strict=True)) for at in (0, 1))
         yield Budget(
@@ -86,12 +87,6 @@ def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LI
             per_million_tokens=_per(MILLION * passed, there + back),
             per_money=None if price is None else _per(MILLION * passed, price.of_millions(there, back)),
         )
-
-
-def requests(prompt: CheckedPrompt, retries: int) -> float:
-    """The requests that a program takes on average: until one is accepted, or no retry is left."""
-    rejected = sum(not trial.accepted for trial in prompt.trials) / len(prompt.trials)
-    return sum(rejected**n for n in range(retries + 1))
 
 
 def _per(total: float | None, count: float) -> float | None:

@@ -122,7 +122,9 @@ def prompt_scores(table: pl.DataFrame) -> pl.DataFrame:
     """
     counted = completions_of(table).group_by("task", "prompt", maintain_order=True)
     return counted.agg(n=pl.len(), c=pl.col("passed").sum()).with_columns(
-        (pl.col("c") / pl.col("n")).alias("pass@1")
+        pl.struct("n", "c")
+        .map_elements(lambda one: pass_at_k(one["n"], one["c"], 1), return_dtype=pl.Float64)
+        .alias("pass@1")
     )
 
 
@@ -141,9 +143,9 @@ def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskSco
     return tuple(TaskScore(task, tuple(scores)) for task, scores in prompts.items() if scores)
 
 
-def pass_at_1(table: pl.DataFrame) -> dict[tuple[str, int], float]:
-    """pass@1 by task and prompt, of a table that `load_results` gives."""
-    return {(p.task, p.prompt): p.pass_at(1) for score in task_scores(table) for p in score.prompts}
+def pass_at_1(tasks: Iterable[TaskScore]) -> dict[tuple[str, int], float]:
+    """pass@1 by task and prompt."""
+    return {(p.task, p.prompt): p.pass_at(1) for score in tasks for p in score.prompts}
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
@@ -184,7 +186,7 @@ def by_formula(clusters: Clusters, *, within: tuple[float, float] = SHARE) -> Es
 
 
 def mean_of(clusters: Clusters) -> float:
-    """The mean of all values, of which there is one at least."""
+    """The mean of all values, of which there is one at least; that of prompts is the same everywhere."""
     return math.fsum(value for values in clusters for value in values) / sum(map(len, clusters))
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import polars as pl
 
-from roboeval.analysis.metrics import Estimate, by_formula, share_at_least
+from roboeval.analysis.metrics import Estimate, by_formula, mean_of, share_at_least
 from roboeval.evaluation.runs.completions import KEY
 
 LIMITS = (0, 2, 4, 8, 100)
@@ -40,16 +40,34 @@ class Chances:
 
 
 def chances(trials: Sequence[Trial], retries: int) -> Chances:
-    """What is to be expected of a prompt, exactly, where each completion is drawn as often as any other."""
-    accepted = [trial for trial in trials if trial.accepted]
-    rejected = [trial for trial in trials if not trial.accepted]
-    none = (len(rejected) / len(trials)) ** (retries + 1)
+    """What is to be expected of a prompt, exactly, where each completion is drawn as often as any other.
+
+    Each request brings each completion with the same chance. It is kept if it is accepted, or if this is the
+    last request. So without retries the chance to pass is the prompt's pass@1, to the last digit.
+    """
+    rejected = rejected_share(trials)
+    asked, is_last = requests(rejected, retries), rejected**retries
 
     def chance(end: Callable[[Trial], bool]) -> float:
-        kept = (accepted, 1 - none), (rejected, none)
-        return sum(weight * sum(map(end, those)) / len(those) for those, weight in kept if those)
+        accepted = sum(trial.accepted and end(trial) for trial in trials)
+        others = sum(end(trial) for trial in trials) - accepted
+        return min(1.0, (asked * accepted + is_last * others) / len(trials))
 
-    return Chances(1 - none, chance(lambda trial: trial.ran), chance(lambda trial: trial.passed))
+    return Chances(
+        min(1.0, asked * sum(trial.accepted for trial in trials) / len(trials)),
+        chance(lambda trial: trial.ran),
+        chance(lambda trial: trial.passed),
+    )
+
+
+def rejected_share(trials: Sequence[Trial]) -> float:
+    """The share of completions that the check rejects."""
+    return sum(not trial.accepted for trial in trials) / len(trials)
+
+
+def requests(rejected: float, retries: int) -> float:
+    """The requests for a program on average, of which such a share is rejected, with so many retries."""
+    return sum(rejected**number for number in range(retries + 1))
 
 
 @dataclass(frozen=True)
@@ -93,22 +111,18 @@ def resampled(prompts: Sequence[CheckedPrompt], retries: int) -> Limit:
     each = tuple(chances(prompt.trials, retries) for prompt in prompts)
     return Limit(
         retries=retries,
-        passed=by_formula([[min(one.passed, 1.0)] for one in each]),
-        accepted=_mean([one.accepted for one in each]),
-        ran=_mean([one.ran for one in each]),
+        passed=by_formula([[one.passed] for one in each]),
+        accepted=mean_of([[one.accepted for one in each]]),
+        ran=mean_of([[one.ran for one in each]]),
         prompts={t: share_at_least([one.passed for one in each], t) for t in THRESHOLDS},
         by_prompt=each,
     )
 
 
-def _mean(values: Sequence[float]) -> float:
-    return sum(values) / len(values)
-
-
 def accepted_after(prompts: Sequence[CheckedPrompt], most: int) -> list[float]:
     """The share of programs that the check accepts after 0, 1, ... `most` retries."""
-    rejected = [sum(not t.accepted for t in prompt.trials) / len(prompt.trials) for prompt in prompts]
-    return [_mean([1 - share ** (n + 1) for share in rejected]) for n in range(most + 1)]
+    rejected = [rejected_share(prompt.trials) for prompt in prompts]
+    return [mean_of([[1 - share ** (n + 1) for share in rejected]]) for n in range(most + 1)]
 
 
 def curve_data(prompts: Sequence[CheckedPrompt], limits: Sequence[int]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import completions_of, pass_at_k
+from roboeval.analysis.metrics import completions_of, prompt_scores
 from roboeval.evaluation.explanation import reason
 from roboeval.evaluation.runs.completions import KEY, Completion, Key
 from roboeval.evaluation.runs.results import Results
@@ -63,14 +63,15 @@ def _reason(results: Results, key: Key) -> dict[str, Any]:
 def _prompt_head(results: Results, of_prompt: pl.DataFrame) -> dict[str, Any]:
     keys = [*of_prompt.filter(~pl.col("stale")).select(KEY).iter_rows()]
     written = [results.completions[key] for key in keys]
+    ((_, prompt, n, c, share),) = prompt_scores(of_prompt).iter_rows()
     return {
-        "prompt": of_prompt["prompt"][0],
+        "prompt": prompt,
         "instructions": _different(written, "instruction"),
         "models": _different(written, "model"),
-        "completions": of_prompt.height,
-        "gone": of_prompt.height - len(written),
-        "passed": int(of_prompt["passed"].sum()),
-        "pass@1": pass_at_k(of_prompt.height, int(of_prompt["passed"].sum()), 1),
+        "completions": n,
+        "gone": n - len(written),
+        "passed": c,
+        "pass@1": share,
     }
 
 

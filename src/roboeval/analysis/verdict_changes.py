@@ -11,7 +11,7 @@ from typing import Any
 from codebotler.core.errors import UserError
 from roboeval.analysis.cluster import Cluster, cluster_data, clusters, groups
 from roboeval.analysis.compare import Comparison, PromptScores, compared, comparison_data
-from roboeval.analysis.metrics import pass_at_1
+from roboeval.analysis.metrics import pass_at_1, task_scores
 from roboeval.analysis.statistics import ROUNDING
 from roboeval.evaluation.runs.completions import KEY, Key, how_many
 from roboeval.evaluation.runs.results import Results
@@ -74,7 +74,7 @@ def verdict_changes(name: str, first: Results, second: Results) -> VerdictChange
 
 def _pass_at_1(results: Results, other: Results) -> PromptScores:
     """pass@1 of each prompt, of the completions that were judged in the other results as well."""
-    return pass_at_1(results.table.join(other.table.select(KEY).unique(), on=KEY, how="semi"))
+    return pass_at_1(task_scores(results.table.join(other.table.select(KEY).unique(), on=KEY, how="semi")))
 
 
 def _by_task(first: Results, second: Results, keys: Iterable[Key]) -> Iterator[TaskChanges]:

@@ -67,12 +67,12 @@ PAIR = 2
 def compare_runs(paths: Sequence[Path], suite: str, *, ablated: bool, as_json: bool) -> None:
     """Print by how much the second of two runs is better."""
     from roboeval.analysis.compare import compared, comparison_data, unlike
-    from roboeval.analysis.metrics import pass_at_1
+    from roboeval.analysis.metrics import pass_at_1, task_scores
     from roboeval.cli.views.comparison import comparison_view
 
     opened = [open_current(path, suite, ablated=ablated) for path in paths]
     expect_same_suite(opened)
-    result = compared(*(pass_at_1(one.results.table) for one in opened))
+    result = compared(*(pass_at_1(task_scores(one.results.table)) for one in opened))
     warnings = unlike(*(one.results for one in opened))
     for warning in warnings:
         note(f"warning: {warning}")

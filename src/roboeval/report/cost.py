@@ -32,7 +32,7 @@ def rejection_sampling(runs: Sequence[JudgedRun]) -> Section:
 def curves(prompts: Sequence[CheckedPrompt]) -> dict[int, list[tuple[float, float]]]:
     """For each limit of retries, the share of prompts by threshold of pass@1."""
     found = {limit: resampled(prompts, limit).by_prompt for limit in LIMITS}
-    return {limit: threshold_curve([min(one.passed, 1.0) for one in each]) for limit, each in found.items()}
+    return {limit: threshold_curve([one.passed for one in each]) for limit, each in found.items()}
 
 
 def retries_sheet(checked: Mapping[str, Sequence[CheckedPrompt]]) -> Sheet:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import polars as pl
 
 from codebotler.core.cachedproperty import cached_property
-from roboeval.analysis.metrics import TaskScore, completions_of, task_scores
+from roboeval.analysis.metrics import TaskScore, completions_of, overall, pass_at_1, task_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
 from roboeval.report.drawing import brief
@@ -66,12 +66,12 @@ class JudgedRun:
     @cached_property
     def by_prompt(self) -> dict[tuple[str, int], float]:
         """pass@1 of each prompt."""
-        return {(p.task, p.prompt): p.pass_at(1) for score in self.scores for p in score.prompts}
+        return pass_at_1(self.scores)
 
     @property
     def mean(self) -> float:
         """The mean pass@1 over prompts."""
-        return sum(self.by_prompt.values()) / len(self.by_prompt)
+        return overall(self.scores, 1).mean
 
     @cached_property
     def instructions(self) -> Mapping[tuple[str, int], str]:

@@ -8,6 +8,7 @@ from typing import Any
 from urllib.parse import quote
 
 from codebotler.core.terminal import shortened
+from roboeval.analysis.metrics import mean_of
 from roboeval.analysis.summary import Failures
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.failures import label_of
@@ -77,7 +78,7 @@ class TaskCells:
         """The cells of a task."""
         prompts = self.tasks.get(task, {})
         shares = [each["share"] for each in prompts.values() if each["share"] is not None]
-        mean = self._mean(task, sum(shares) / len(shares) if shares else None) if prompts else EMPTY
+        mean = self._mean(task, mean_of([shares]) if shares else None) if prompts else EMPTY
         return [mean, *(self._cell(prompts[n]) if n in prompts else EMPTY for n in range(self._prompts))]
 
     def _mean(self, task: str, mean: float | None) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
+from roboeval.analysis.metrics import pass_at_1
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import GONE, completion_data
 from roboeval.evaluation.runs.completions import KEY, Key, how_many, name_of
@@ -134,9 +135,10 @@ class RunList:
 def run_details(run: Snapshot) -> dict[str, Any]:
     """A run with its tasks, prompts and kinds of failures."""
     means = {score.task: score.pass_at(1).mean for score in run.scores}
+    shares = pass_at_1(run.scores)
     tasks: dict[str, list[dict[str, Any]]] = {}
     for prompt in run.prompts(Filter(passed=True)):
-        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite))
+        tasks.setdefault(prompt["task"], []).append(_prompt_data(prompt, run.suite, shares))
     kinds = [(of.name, kind) for of in run.failures for kind in of.kinds]
     kinds.sort(key=lambda each: (-each[1].count, each[0], each[1].name))
     return {
@@ -149,7 +151,9 @@ def run_details(run: Snapshot) -> dict[str, Any]:
     }
 
 
-def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, Any]:
+def _prompt_data(
+    prompt: Mapping[str, Any], suite: Suite | None, shares: Mapping[tuple[str, int], float]
+) -> dict[str, Any]:
     task = None if suite is None else suite.tasks.get(prompt["task"])
     instructions = dict(enumerate(task.prompts)) if task is not None else {}
     return {
@@ -158,7 +162,7 @@ def _prompt_data(prompt: Mapping[str, Any], suite: Suite | None) -> dict[str, An
         "completions": prompt["written"],
         "judged": prompt["judged"],
         "passed": prompt["counted"],
-        "pass@1": prompt["share"],
+        "pass@1": shares.get((prompt["task"], prompt["prompt"])),
     }
 
 

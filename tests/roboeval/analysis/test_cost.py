@@ -8,8 +8,8 @@ import polars as pl
 import pytest
 
 from made_up_runs import UNCHECKED, made_up
-from roboeval.analysis.cost import Price, budgets, requests, spent
-from roboeval.analysis.resample import CheckedPrompt, Trial
+from roboeval.analysis.cost import Price, budgets, spent
+from roboeval.analysis.resample import Trial, rejected_share, requests
 
 GOOD = Trial(accepted=True, ran=True, passed=True)
 BAD = Trial(accepted=False, ran=False, passed=False)
@@ -55,10 +55,10 @@ def test_sums_do_not_depend_on_the_order_of_completions() -> None:
 
 
 def test_requests_by_hand() -> None:
-    assert requests(CheckedPrompt("T", 0, (GOOD, BAD)), 0) == 1
-    assert requests(CheckedPrompt("T", 0, (GOOD, BAD)), 2) == 1 + 1 / 2 + 1 / 4
-    assert requests(CheckedPrompt("T", 0, (BAD,)), 4) == 5
-    assert requests(CheckedPrompt("T", 0, (GOOD,)), 100) == 1
+    assert requests(rejected_share((GOOD, BAD)), 0) == 1
+    assert requests(rejected_share((GOOD, BAD)), 2) == 1 + 1 / 2 + 1 / 4
+    assert requests(rejected_share((BAD,)), 4) == 5
+    assert requests(rejected_share((GOOD,)), 100) == 1
 
 
 def test_a_budget_by_hand() -> None:

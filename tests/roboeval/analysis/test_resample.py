@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from made_results import table_of
+from roboeval.analysis.metrics import PromptScore, TaskScore, overall, pass_at_1
 from roboeval.analysis.resample import (
     LIMITS,
     Chances,
@@ -49,6 +50,30 @@ def test_without_retries_it_is_the_plain_share() -> None:
     trials = [GOOD, WRONG, REJECTED, UNJUST]
     exact = chances(trials, 0)
     assert (exact.accepted, exact.ran, exact.passed) == pytest.approx((2 / 4, 3 / 4, 2 / 4))
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_without_retries_the_mean_is_pass_at_1_to_the_last_digit(seed: int) -> None:
+    chance = random.Random(seed)
+    kinds = [GOOD, WRONG, UNSEEN, REJECTED, UNJUST]
+    prompts = [
+        CheckedPrompt("Visit", number, tuple(chance.choices(kinds, k=chance.randint(1, 20))))
+        for number in range(chance.randint(1, 80))
+    ]
+    scores = [PromptScore("Visit", p.prompt, len(p.trials), sum(t.passed for t in p.trials)) for p in prompts]
+    score = TaskScore("Visit", tuple(scores))
+    found = resampled(prompts, 0)
+    assert found.passed == overall([score], 1)
+    assert {("Visit", n): one.passed for n, one in enumerate(found.by_prompt)} == pass_at_1([score])
+
+
+@pytest.mark.parametrize("retries", [1, 3, 100])
+def test_no_chance_is_above_one(retries: int) -> None:
+    for accepted in range(1, 30):
+        trials = [GOOD] * accepted + [UNJUST] * (30 - accepted)
+        exact = chances(trials, retries)
+        assert max(exact.accepted, exact.ran, exact.passed) <= 1
+        assert exact.passed == pytest.approx(1)
 
 
 def test_one_retry_by_hand() -> None:
