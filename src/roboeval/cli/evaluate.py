@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -15,9 +15,11 @@ from roboeval.cli.options import (
     IsolationOption,
     JsonOption,
     ProcessOption,
+    SeedOption,
     SuiteOption,
     TasksOption,
     WorkersOption,
+    WorldsOption,
     command,
     engine_named,
     load,
@@ -47,13 +49,8 @@ def evaluate(
     ablation: AblationOption = False,
     redo: Annotated[bool, typer.Option("--redo", help="Start over.")] = False,
     workers: WorkersOption = None,
-    worlds: Annotated[
-        int | None,
-        typer.Option(min=1, max=10_000, help="Draw this many worlds a task, if the suite draws worlds."),
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
-    ] = None,
+    worlds: WorldsOption = None,
+    seed: SeedOption = None,
     engine: EngineOption = "local",
     require_isolation: IsolationOption = False,
     one_process_per_run: ProcessOption = False,
@@ -98,9 +95,14 @@ def evaluate(
     if run is not None:
         _name_next_command(run, table, suite=suite, ablated=ablation)
     if (left_out := scope.total - judged_count(counted.prompts)) > 0:
-        again = "the others are judged" if run is None else "the same command tries again"
-        note(f"roboeval: not judged: {how_many(left_out)} of {scope.total:,}; {again}")
-        raise SystemExit(1)
+        _fail_with_some_left(how_many(left_out), scope.total, is_kept=run is not None)
+
+
+def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoReturn:
+    """End with status 1, since some completions have no verdict."""
+    again = "the same command tries again" if is_kept else "the others are judged"
+    note(f"roboeval: not judged: {left_out} of {total:,}; {again}")
+    raise SystemExit(1)
 
 
 def _name_next_command(run: Run, table: DataFrame, *, suite: str, ablated: bool) -> None:

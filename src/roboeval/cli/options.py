@@ -96,6 +96,13 @@ IsolationOption = Annotated[
 ProcessOption = Annotated[
     bool, typer.Option("--one-process-per-run", help="Let no two runs share a process, which takes longer.")
 ]
+WorldsOption = Annotated[
+    int | None,
+    typer.Option(min=1, max=10_000, help="Draw this many worlds a task, if the suite draws worlds."),
+]
+SeedOption = Annotated[
+    int | None, typer.Option(min=0, help="Draw the worlds from this seed instead of the suite's own.")
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 OutOption = Annotated[
     Path | None, typer.Option(help="The run; by default runs/MODEL.", parser=named("a run"))
