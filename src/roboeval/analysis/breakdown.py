@@ -53,20 +53,17 @@ def coming_back(results: Results) -> pl.DataFrame:
     suite = results.known_suite
     reports = pl.col("task").is_in([name for name, task in suite.tasks.items() if REPORTS in task.abilities])
     table = results.table.with_columns(reports=reports)
-    scores = prompt_scores(table).group_by(reports=reports).agg("pass@1")
+    scores = prompt_scores(table).group_by(reports=reports)
+    counts = scores.agg("pass@1", completions=pl.col("n").sum(), failed=(pl.col("n") - pl.col("c")).sum())
     away = [key for key in results.failed if never_returned(results.failed_row(key), suite)]
     gone = pl.DataFrame(away, schema={name: table.schema[name] for name in KEY}, orient="row")
     found = (
         completions_of(table)
         .join(gone.with_columns(away=True), on=KEY, how="left")
         .group_by("reports")
-        .agg(
-            completions=pl.len(),
-            failed=(~pl.col("passed")).sum(),
-            never_returned=pl.col("away").sum(),
-            lost=(pl.col("failure_kind") == LOST).sum(),
-        )
-        .join(scores.with_columns(_mean("pass@1")), on="reports")
+        .agg(never_returned=pl.col("away").sum(), lost=(pl.col("failure_kind") == LOST).sum())
+        .join(counts.with_columns(_mean("pass@1")), on="reports")
+        .select("reports", "completions", "failed", "never_returned", "lost", "pass@1")
         .sort("reports", descending=True)
     )
     return found.filter(pl.col("reports").any())

@@ -8,21 +8,9 @@ from typing import NamedTuple
 
 import polars as pl
 
-from roboeval.analysis.metrics import completions_of
+from roboeval.analysis.metrics import completions_of, passed_count, prompts_of, task_scores
 from roboeval.analysis.resample import LIMITS, chances, rejected_share, requests, trials_by_prompt
-
-MILLION = 1_000_000
-
-
-class Price(NamedTuple):
-    """What a million tokens of input and of output cost."""
-
-    input: float
-    output: float
-
-    def of_millions(self, input_tokens: float, output_tokens: float) -> float:
-        """What so many million tokens cost."""
-        return input_tokens * self.input + output_tokens * self.output
+from roboeval.evaluation.runs.table import MILLION, Price
 
 
 class Spent(NamedTuple):
@@ -42,13 +30,11 @@ class Spent(NamedTuple):
 def spent(table: pl.DataFrame, price: Price | None = None) -> Spent:
     """What the completions of a run took."""
     took = completions_of(table)
-    passed = int(took["passed"].sum())
+    passed = passed_count(prompts_of(task_scores(table)))
     there, back = _tokens(took)
     seconds = (not took["latency_s"].null_count() and math.fsum(took["latency_s"])) or None
     tokens = None if there is None or back is None else there + back
-    money = (
-        None if price is None or there is None or back is None else price.of_millions(there, back) / MILLION
-    )
+    money = None if price is None or there is None or back is None else price.of(there, back)
     each = (_per(total, passed) for total in (tokens, seconds, money))
     return Spent(took.height, passed, there, back, seconds, money, *each)
 
@@ -85,7 +71,7 @@ def budgets(table: pl.DataFrame, price: Price | None, limits: Sequence[int] = LI
             requests=sum(asked) / len(asked),
             per_thousand_requests=1_000 * passed / sum(asked),
             per_million_tokens=_per(MILLION * passed, there + back),
-            per_money=None if price is None else _per(MILLION * passed, price.of_millions(there, back)),
+            per_money=None if price is None else _per(passed, price.of(there, back)),
         )
 
 

@@ -143,9 +143,24 @@ def task_scores(table: pl.DataFrame, order: Iterable[str] = ()) -> tuple[TaskSco
     return tuple(TaskScore(task, tuple(scores)) for task, scores in prompts.items() if scores)
 
 
+def judged_count(prompts: Iterable[PromptScore]) -> int:
+    """How many completions of some prompts were judged."""
+    return sum(prompt.n for prompt in prompts)
+
+
+def passed_count(prompts: Iterable[PromptScore]) -> int:
+    """How many completions of some prompts passed."""
+    return sum(prompt.c for prompt in prompts)
+
+
+def prompts_of(tasks: Iterable[TaskScore]) -> list[PromptScore]:
+    """The scores of all prompts of some tasks."""
+    return [prompt for task in tasks for prompt in task.prompts]
+
+
 def pass_at_1(tasks: Iterable[TaskScore]) -> dict[tuple[str, int], float]:
     """pass@1 by task and prompt."""
-    return {(p.task, p.prompt): p.pass_at(1) for score in tasks for p in score.prompts}
+    return {(p.task, p.prompt): p.pass_at(1) for p in prompts_of(tasks)}
 
 
 def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
@@ -154,7 +169,7 @@ def overall(tasks: Iterable[TaskScore], k: int) -> Estimate:
     Raises:
         ValueError: a prompt, which is named, has fewer than k completions.
     """
-    return by_formula([[prompt.pass_at(k)] for task in tasks for prompt in task.prompts])
+    return by_formula([[prompt.pass_at(k)] for prompt in prompts_of(tasks)])
 
 
 def share_at_least(values: Sequence[float], threshold: float) -> float:

@@ -9,9 +9,12 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
 
+import polars as pl
+
 from codebotler.core.trace import Trace, trace_from
 from codebotler.rtl import Formula, Inconclusive, holds, parse
-from roboeval.evaluation.runs.completions import Key
+from roboeval.analysis.metrics import completions_of
+from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.rows import key_of
 
 BATCH = 100  # rows that a process looks through at a time
@@ -33,7 +36,6 @@ class Found:
     """A completion, and the worlds, by number from 1 and name, in which it does what is looked for."""
 
     key: Key
-    passed: bool
     worlds: tuple[tuple[int, str], ...]
     undecided: tuple[tuple[int, str], ...] = ()  # whose trace was too long to be kept
 
@@ -71,6 +73,18 @@ class Search:
                 yield from future.result()
 
 
+def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
+    """How many completions of each `task` were `found`, and how many of these `passed`."""
+    keys = pl.DataFrame(
+        [one.key for one in found], schema={name: table.schema[name] for name in KEY}, orient="row"
+    )
+    verdicts = completions_of(table).select(*KEY, "passed")
+    counted = keys.join(verdicts, on=KEY, how="left", maintain_order="left").group_by(
+        "task", maintain_order=True
+    )
+    return counted.agg(found=pl.len(), passed=pl.col("passed").sum())
+
+
 def look_through(lines: Sequence[bytes], question: Question) -> list[Found]:
     """Answer for some rows; the work of one process."""
     formula = None if question.formula is None else parse(question.formula)
@@ -85,7 +99,7 @@ def answer(row: Mapping[str, Any], question: Question, formula: Formula | None) 
             undecided.append((number, verdict["world"]))
         elif formula is None or _holds(formula, verdict["trace"]) != question.negated:
             worlds.append((number, verdict["world"]))
-    return Found(key_of(row), row["passed"], tuple(worlds), tuple(undecided))
+    return Found(key_of(row), tuple(worlds), tuple(undecided))
 
 
 def _asked(row: Mapping[str, Any], question: Question) -> Iterator[tuple[int, Mapping[str, Any]]]:

@@ -11,7 +11,17 @@ import polars as pl
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import visible
-from roboeval.analysis.metrics import Estimate, PromptScore, TaskScore, completions_of, overall, task_scores
+from roboeval.analysis.metrics import (
+    Estimate,
+    PromptScore,
+    TaskScore,
+    completions_of,
+    judged_count,
+    overall,
+    passed_count,
+    prompts_of,
+    task_scores,
+)
 from roboeval.evaluation.failures import CLASSES
 from roboeval.evaluation.runs.completions import how_many
 from roboeval.evaluation.runs.results import Scope
@@ -43,7 +53,7 @@ class Summary:
     @property
     def prompts(self) -> list[PromptScore]:
         """The scores of all prompts of all tasks."""
-        return [prompt for task in self.tasks for prompt in task.prompts]
+        return prompts_of(self.tasks)
 
 
 @dataclass(frozen=True)
@@ -70,7 +80,7 @@ def summary(
     try:
         estimates = tuple(overall(tasks, tries) for tries in k)
     except ValueError as error:
-        fewest = min(prompt.n for task in tasks for prompt in task.prompts)
+        fewest = min(prompt.n for prompt in prompts_of(tasks))
         raise UserError(f"{visible(str(error))}; choose k from 1 to {fewest}") from None
     scored = {score.task for score in tasks}
     expected = [n for n, task in suite.tasks.items() if task.ablation is not None or not ablated]
@@ -121,10 +131,10 @@ class Causes:
 def causes(table: pl.DataFrame) -> Causes:
     """How the completions of a run, one or more, ended (paper, section V.B)."""
     found = failures(table)
-    failed = sum(one.count for one in found)
+    ended = completions_of(table)
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
     return Causes(
-        {PASSED: 1 - failed / completions_of(table).height, **{one.name: one.share for one in found}},
+        {PASSED: int(ended["passed"].sum()) / ended.height, **{one.name: one.share for one in found}},
         {one.name: {kind: count / one.count for kind, count in kinds[one.name]} for one in found},
         {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
     )
@@ -135,11 +145,6 @@ def kinds_in_order(found: Iterable[Causes], name: str) -> list[str]:
     there = {kind for one in found for kind in one.kinds.get(name, {})}
     known = [kind for kind in CLASSES[name].kinds if kind in there]
     return [*known, *sorted(there - {*known})]
-
-
-def judged_count(prompts: Iterable[PromptScore]) -> int:
-    """How many completions of some prompts were judged."""
-    return sum(prompt.n for prompt in prompts)
 
 
 def summary_data(summary: Summary) -> dict[str, Any]:
@@ -173,7 +178,7 @@ def _task_score_data(task: TaskScore, ks: Sequence[int]) -> dict[str, Any]:
 
 
 def _counts(prompts: Sequence[PromptScore]) -> dict[str, int]:
-    return {"completions": judged_count(prompts), "passed": sum(prompt.c for prompt in prompts)}
+    return {"completions": judged_count(prompts), "passed": passed_count(prompts)}
 
 
 def _failure_data(failures: Failures, what: str) -> dict[str, Any]:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import combinations
 from typing import Any
 
+import polars as pl
+
 from codebotler.core.errors import UserError
 from roboeval.analysis.cluster import Cluster, cluster_data, clusters, groups
 from roboeval.analysis.compare import Comparison, PromptScores, compared, comparison_data
-from roboeval.analysis.metrics import pass_at_1, task_scores
+from roboeval.analysis.metrics import completions_of, pass_at_1, task_scores
 from roboeval.analysis.statistics import ROUNDING
-from roboeval.evaluation.runs.completions import KEY, Key, how_many
+from roboeval.evaluation.runs.completions import KEY, how_many
 from roboeval.evaluation.runs.results import Results
 
 
@@ -54,21 +55,22 @@ class VerdictChanges:
 
 def verdict_changes(name: str, first: Results, second: Results) -> VerdictChanges:
     """Find the completions whose verdicts differ; raises UserError if none was judged by both."""
-    both = first.places.keys() & second.places.keys()
-    if not both:
+    one, other = completions_of(first.table), completions_of(second.table)
+    both = one.select(*KEY, "passed").join(other.select(*KEY, then="passed"), on=KEY).sort(KEY)
+    if both.is_empty():
         raise UserError("no completion was judged by both suites", file=name)
-    lost = [key for key in sorted(both) if key in second.failed and key not in first.failed]
-    won = [key for key in sorted(both) if key in first.failed and key not in second.failed]
+    lost = [*both.filter("passed", ~pl.col("then")).select(KEY).iter_rows()]
+    won = [*both.filter("then", ~pl.col("passed")).select(KEY).iter_rows()]
     programs = first.programs
     return VerdictChanges(
         name=name,
         suites=(first.known_suite.name, second.known_suite.name),
         comparison=compared(_pass_at_1(first, second), _pass_at_1(second, first)),
-        tasks=tuple(_by_task(first, second, both)),
+        tasks=tuple(_by_task(both, first.known_suite.tasks)),
         first_only=tuple(clusters(groups(map(second.failed_row, lost), programs), second)),
         second_only=tuple(clusters(groups(map(first.failed_row, won), programs), first)),
         programs=len({(key[0], programs.get(key)) for key in lost + won}),
-        left_out=len(first.places.keys() | second.places.keys()) - len(both),
+        left_out=one.height + other.height - 2 * both.height,
     )
 
 
@@ -77,18 +79,16 @@ def _pass_at_1(results: Results, other: Results) -> PromptScores:
     return pass_at_1(task_scores(results.table.join(other.table.select(KEY).unique(), on=KEY, how="semi")))
 
 
-def _by_task(first: Results, second: Results, keys: Iterable[Key]) -> Iterator[TaskChanges]:
-    counts = Counter((key[0], key not in first.failed, key not in second.failed) for key in keys)
-    there = {task for task, *_ in counts}
-    for task in dict.fromkeys([*first.known_suite.tasks, *sorted(there)]):
-        if task in there:
-            yield TaskChanges(
-                task,
-                both=counts[task, True, True],
-                first_only=counts[task, True, False],
-                second_only=counts[task, False, True],
-                neither=counts[task, False, False],
-            )
+def _by_task(both: pl.DataFrame, order: Iterable[str]) -> Iterator[TaskChanges]:
+    first, second = pl.col("passed"), pl.col("then")
+    counted = both.group_by("task", maintain_order=True).agg(
+        both=(first & second).sum(),
+        first_only=(first & ~second).sum(),
+        second_only=(~first & second).sum(),
+        neither=(~first & ~second).sum(),
+    )
+    changes = {row["task"]: TaskChanges(**row) for row in counted.iter_rows(named=True)}
+    return (changes[task] for task in dict.fromkeys([*order, *changes]) if task in changes)
 
 
 # --- the order of models

@@ -98,7 +98,8 @@ def compare_suites(paths: Sequence[Path], suites: str, *, most: int, ablated: bo
         fail(f'--suites takes two suites separated by a comma, such as paper,plus, not "{suites}"')
     found = []
     for path in paths:
-        first, second = (open_current(path, name, ablated=ablated).results for name in names)
+        first = open_current(path, names[0], ablated=ablated).results
+        second = open_current(path, names[1], ablated=ablated, beside=first).results
         found.append(verdict_changes(str(path), first, second))
     for one in found:
         if one.left_out:

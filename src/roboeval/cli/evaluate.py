@@ -57,7 +57,8 @@ def evaluate(
     json: JsonOption = False,
 ) -> None:
     """Judge whether each completion does what was asked."""
-    from roboeval.analysis.summary import judged_count, summary
+    from roboeval.analysis.metrics import judged_count
+    from roboeval.analysis.summary import summary
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, tasks_to_judge
     from roboeval.evaluation.runs.results import Scope

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -21,6 +21,7 @@ from roboeval.cli.output import fail, note, print_json, print_rich, watched
 
 if TYPE_CHECKING:
     from roboeval.analysis.search import Found, Question
+    from roboeval.evaluation.runs.completions import Key
     from roboeval.suites.load import Suite
 
 
@@ -51,7 +52,8 @@ def find(
     It takes the completions that did something in some world, and groups those that fail by reason.
     """
     from roboeval.analysis.cluster import cluster_data, clusters, groups
-    from roboeval.analysis.search import Question, Search
+    from roboeval.analysis.metrics import completions_of
+    from roboeval.analysis.search import Question, Search, found_by_task
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, as_judged
@@ -59,14 +61,16 @@ def find(
     if negated and formula is None:
         fail("--not needs a formula; add one, or leave --not out")
     known = as_judged(Run(run), load(suite), ablated=ablation)
-    question = Question(formula, negated, None if task is None else known.task(task).name, world)
+    task = None if task is None else known.task(task).name
+    question = Question(formula, negated, task, world)
     expect_question(question, known, ablated=ablation)
     searching = Search(question, workers=workers or cores())
     results = open_current(run, suite, ablated=ablation, see=searching.see).results
     every = list(watched(searching.found(), "looking", len(results.places)))
     found = [one for one in every if one.worlds]
-    failed = [results.failed_row(one.key) for one in found if not one.passed]
-    total = sum(question.task in {None, one.key[0]} for one in every)
+    failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
+    asked_of = results.table if task is None else results.table.filter(task=task)
+    total = completions_of(asked_of).height
     together = groups(failed, results.programs)
     shown = together if json else together[:most]
     telling = clusters(shown, results)
@@ -75,16 +79,18 @@ def find(
     if undecided:
         note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")
     if json:
+        passed = {*results.passed}
         print_json(
             {
                 "looked_at": total,
-                "found": [found_data(one, one.worlds) for one in found],
-                "undecided": [found_data(one, one.undecided) for one in undecided],
+                "found": [found_data(one, one.worlds, passed) for one in found],
+                "undecided": [found_data(one, one.undecided, passed) for one in undecided],
                 "groups": list(map(cluster_data, told)),
             }
         )
     else:
-        print_rich(found_view(found, total, told, failed=len(failed), groups=len(together)))
+        counts = found_by_task(found, results.table)
+        print_rich(found_view(found, counts, total, told, groups=len(together)))
 
 
 def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
@@ -108,12 +114,12 @@ def expect_question(question: Question, suite: Suite, *, ablated: bool) -> None:
         fail(f'{where} has no world "{question.world}"; `roboeval tasks TASK` lists the worlds of a task')
 
 
-def found_data(one: Found, worlds: Sequence[tuple[int, str]]) -> dict[str, Any]:
+def found_data(one: Found, worlds: Sequence[tuple[int, str]], passed: Container[Key]) -> dict[str, Any]:
     """A completion and the worlds in which it was found, as JSON."""
     from roboeval.evaluation.runs.completions import name_of
 
     return {
         "completion": name_of(one.key),
-        "passed": one.passed,
+        "passed": one.key in passed,
         "worlds": [{"number": number, "world": world} for number, world in worlds],
     }

@@ -176,16 +176,29 @@ def expect_same_suite(opened: Sequence[Opened]) -> None:
 
 
 def open_run(
-    run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
+    run: Path,
+    suite_name: str,
+    *,
+    ablated: bool,
+    beside: Results | None = None,
+    see: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run; `see` is called with each line of its verdicts."""
+    """Read a judged run; `see` is called with each line of its verdicts.
+
+    With another evaluation of the same run `beside`, its completions are not read again.
+    """
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results
 
     again = command("evaluate", run, suite=suite_name, ablated=ablated)
     folder, key, suite = evaluation_of(run, load(suite_name), ablated=ablated, again=again)
     results = read_results(
-        folder, key, suite, see=see, watch=lambda lines, total: watched(lines, "reading", total)
+        folder,
+        key,
+        suite,
+        beside=beside,
+        see=see,
+        watch=lambda lines, total: watched(lines, "reading", total),
     )
     if results.head.get("digest") != suite.digest:
         note("the suite has changed since this run was judged; explanations may be missing")
@@ -194,15 +207,20 @@ def open_run(
 
 
 def open_current(
-    run: Path, suite_name: str, *, ablated: bool, see: Callable[[bytes], None] | None = None
+    run: Path,
+    suite_name: str,
+    *,
+    ablated: bool,
+    beside: Results | None = None,
+    see: Callable[[bytes], None] | None = None,
 ) -> Opened:
-    """Read a judged run of which every verdict counts.
+    """Read a judged run of which every verdict counts, as `open_run` does.
 
     Raises UserError if there is none, or if the programs were changed since.
     """
     from codebotler.core.errors import UserError
 
-    opened = open_run(run, suite_name, ablated=ablated, see=see)
+    opened = open_run(run, suite_name, ablated=ablated, beside=beside, see=see)
     if (complaint := complaint_of(opened.results)) is not None:
         raise UserError(f"{complaint}; `{opened.again} --redo` judges the current programs")
     if opened.results.table.is_empty():

@@ -94,11 +94,11 @@ def judged_run(results: Results, suite: str, *, beside: str | None, engine: Open
     run = results.run
     ablated = other = None
     if run.rows(evaluation_key(results.known_suite, ablated=True)).is_file():
-        ablated = open_current(run.path, suite, ablated=True).results
+        ablated = open_current(run.path, suite, ablated=True, beside=results).results
     if engine is None:
         table = results.table.with_columns(accepted=pl.lit(None, dtype=pl.Boolean))
     else:
         table = checked(results, engine=engine)
     if beside is not None:
-        other = open_current(run.path, beside, ablated=False).results
+        other = open_current(run.path, beside, ablated=False, beside=results).results
     return JudgedRun(results, table, ablated=ablated, beside=other)

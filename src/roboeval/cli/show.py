@@ -108,16 +108,24 @@ def export(
     ] = None,
     suite: SuiteOption = "paper",
     ablation: AblationOption = False,
+    price: Annotated[
+        str | None, typer.Option(help="INPUT/OUTPUT, the prices of a million tokens, for the column cost.")
+    ] = None,
 ) -> None:
     """Write a run's verdicts as one flat table."""
     from codebotler.core.files import expect_replaceable
-    from roboeval.evaluation.runs.table import BEGINNINGS, kind_of, write_table
+    from roboeval.evaluation.runs.table import BEGINNINGS, Price, kind_of, with_cost, write_table
 
     kind = format or kind_of(out)
+    try:
+        cost = None if price is None else Price.read(price)
+    except ValueError:
+        fail(f'"{price}" is not a price; write INPUT/OUTPUT, each for a million tokens')
     results = open_current(run, suite, ablated=ablation).results
+    table = results.table if cost is None else with_cost(results.table, cost)
     path = out or results.run.rows(str(results.key)).with_suffix(f".{kind}")
     expect_replaceable(path, *BEGINNINGS)
-    write_table(results.table, path, kind)
+    write_table(table, path, kind)
     note(f"the table is in {path}")
 
 

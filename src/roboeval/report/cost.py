@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from codebotler.core.errors import UserError
-from roboeval.analysis.cost import MILLION, Price, budgets, spent
+from roboeval.analysis.cost import budgets, spent
 from roboeval.analysis.metrics import threshold_curve
 from roboeval.analysis.resample import LIMITS, CheckedPrompt, accepted_after, resampled
+from roboeval.evaluation.runs.table import Price
 from roboeval.report import figures
 from roboeval.report.runs import JudgedRun
 from roboeval.report.sheets import Cell, Picture, Section, Sheet, section, sheet
@@ -83,15 +84,14 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
-        try:
-            price = Price(*map(float, numbers.split("/")))
-        except (ValueError, TypeError):
-            price = Price(-1.0, -1.0)
-        if not model or not all(0 <= number < MILLION for number in price):
-            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, each for a million tokens')
         if model in prices:
             raise UserError(f'--price names "{model}" twice; give one price')
-        prices[model] = price
+        try:
+            prices[model] = Price.read(numbers)
+        except ValueError:
+            model = ""
+        if not model:
+            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, each for a million tokens')
     return prices
 
 

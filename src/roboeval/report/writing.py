@@ -9,8 +9,8 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import write_whole
-from roboeval.analysis.cost import Price
 from roboeval.evaluation.runs.completions import how_many
+from roboeval.evaluation.runs.table import Price
 from roboeval.report import breakdown, cost, failures, scores
 from roboeval.report.drawing import darkened, styled, written
 from roboeval.report.page import GENERATOR, Drawn, page

@@ -11,7 +11,15 @@ import polars as pl
 from fastapi import Query
 
 from codebotler.core.cachedproperty import cached_property
-from roboeval.analysis.metrics import Estimate, TaskScore, overall, task_scores
+from roboeval.analysis.metrics import (
+    Estimate,
+    TaskScore,
+    judged_count,
+    overall,
+    passed_count,
+    prompts_of,
+    task_scores,
+)
 from roboeval.analysis.summary import Failures, failures
 from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.results import Results
@@ -141,12 +149,12 @@ class Snapshot:
     @property
     def judged(self) -> int:
         """How many completions were judged."""
-        return self.completions["passed"].count()
+        return judged_count(prompts_of(self.scores))
 
     @property
     def passed(self) -> int:
         """How many completions passed."""
-        return int(self.completions["passed"].sum())
+        return passed_count(prompts_of(self.scores))
 
     @cached_property
     def scores(self) -> tuple[TaskScore, ...]:

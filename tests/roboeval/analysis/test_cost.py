@@ -8,8 +8,9 @@ import polars as pl
 import pytest
 
 from made_up_runs import UNCHECKED, made_up
-from roboeval.analysis.cost import Price, budgets, spent
+from roboeval.analysis.cost import budgets, spent
 from roboeval.analysis.resample import Trial, rejected_share, requests
+from roboeval.evaluation.runs.table import Price
 
 GOOD = Trial(accepted=True, ran=True, passed=True)
 BAD = Trial(accepted=False, ran=False, passed=False)

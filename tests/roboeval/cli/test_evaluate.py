@@ -652,6 +652,19 @@ def test_export_writes_a_row_for_each_completion_and_world(run: Path) -> None:
     assert (run / "t.parquet").read_bytes().startswith(b"PAR1")
 
 
+def test_a_table_with_costs(tmp_path: Path) -> None:
+    usage = {"input_tokens": 1_000, "output_tokens": 100}
+    (tmp_path / "a.jsonl").write_text(json.dumps({**json.loads(row()), "usage": usage}) + "\n" + row(index=1))
+    assert roboeval("evaluate", "a.jsonl", "--out", "run", cwd=tmp_path).status == 0
+    assert roboeval("export", "run", "--price", "3/15", "--out", "t.csv", cwd=tmp_path).status == 0
+    costs = {
+        one["index"]: one["cost"] for one in csv.DictReader((tmp_path / "t.csv").read_text().splitlines())
+    }
+    assert costs == {"0": "0.0045", "1": ""}
+    for price in ("3", "3/15/1", "a/b", "-1/2", "nan/1"):
+        assert price in refused("export", "run", "--price", price, cwd=tmp_path).sentence
+
+
 def test_an_evaluation_goes_on_without_judging_again(run: Path) -> None:
     before = (run / "evaluations" / "paper.jsonl").read_bytes()
     ended = roboeval("evaluate", run)

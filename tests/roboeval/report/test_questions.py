@@ -9,7 +9,7 @@ import pytest
 
 from codebotler.core.errors import UserError
 from made_up_runs import SUITE, made_up, usual
-from roboeval.analysis.cost import Price
+from roboeval.evaluation.runs.table import Price
 from roboeval.report.breakdown import (
     ability_sheet,
     coming_back_sentences,

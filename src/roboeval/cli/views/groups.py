@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 
+import polars as pl
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
@@ -22,11 +22,12 @@ MOST_LINES = 60  # of a difference between programs
 
 
 def found_view(
-    found: Sequence[Found], total: int, told: Sequence[Cluster], *, failed: int, groups: int
+    found: Sequence[Found], counts: pl.DataFrame, total: int, told: Sequence[Cluster], *, groups: int
 ) -> RenderableType:
-    """The completions found, by task, and some groups of those that failed."""
+    """The completions found, with counts by task, and some groups of those that failed."""
+    failed = len(found) - int(counts["passed"].sum())
     parts: list[RenderableType] = [Text(f"found {len(found):,} of {how_many(total)}", "bold")]
-    parts += [Text(), _by_task(found)] if found else []
+    parts += [Text(), _by_task(found, counts)] if found else []
     if told:
         what = f"{how_many(failed)} of these failed, in {groups:,} group{'s' * (groups != 1)}:"
         parts += [Text(), Text(what, "bold"), Text(), *map(cluster_view, told)]
@@ -35,16 +36,13 @@ def found_view(
     return Group(*parts)
 
 
-def _by_task(found: Sequence[Found]) -> Table:
+def _by_task(found: Sequence[Found], counts: pl.DataFrame) -> Table:
     table = ruled("task", "found", "passed")
     table.add_column("such as")
-    by_task: defaultdict[str, list[Found]] = defaultdict(list)
-    for one in found:
-        by_task[one.key[0]].append(one)
-    for task, those in by_task.items():
-        passed = sum(one.passed for one in those)
-        example = f"{name_of(those[0].key)}, world {those[0].worlds[0][0]}"
-        table.add_row(Text(visible(task)), f"{len(those):,}", f"{passed:,}", Text(visible(example), "dim"))
+    for task, count, passed in counts.iter_rows():
+        first = next(one for one in found if one.key[0] == task)
+        example = f"{name_of(first.key)}, world {first.worlds[0][0]}"
+        table.add_row(Text(visible(task)), f"{count:,}", f"{passed:,}", Text(visible(example), "dim"))
     return table
 
 

@@ -14,7 +14,8 @@ from rich.text import Text
 
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import visible
-from roboeval.analysis.summary import Failures, Missing, Summary, judged_count
+from roboeval.analysis.metrics import judged_count
+from roboeval.analysis.summary import Failures, Missing, Summary
 from roboeval.analysis.tasks import by_hand
 from roboeval.evaluation.explanation import NOT_RECORDED
 from roboeval.evaluation.failures import label_of, plural_of

@@ -26,7 +26,7 @@ from roboeval.evaluation.runs.rows import (
     read_checks,
     read_lines_of,
 )
-from roboeval.evaluation.runs.table import TableBuilder
+from roboeval.evaluation.runs.table import Price, TableBuilder, with_cost
 from roboeval.suites.load import ABLATED, Suite, load_suite
 
 
@@ -59,12 +59,8 @@ def load_results(
         UserError: there is no such run or suite, the suite has not judged it, or one of its files is damaged.
     """
     known = load_suite(suite)
-    results = read_results(*evaluation_of(Path(run), known, ablated=ablation), keep_failed=False)
-    if price is None:
-        return results.table
-    return results.table.with_columns(
-        cost=(pl.col("input_tokens") * price[0] + pl.col("output_tokens") * price[1]) / 1e6
-    )
+    table = read_results(*evaluation_of(Path(run), known, ablated=ablation), keep_failed=False).table
+    return table if price is None else with_cost(table, Price(*price))
 
 
 @dataclass(frozen=True)
@@ -183,6 +179,7 @@ def read_results(
     key: str | None,
     suite: Suite | None = None,
     *,
+    beside: Results | None = None,  # another evaluation of the run, whose completions need no second reading
     keep_failed: bool = True,  # may take much memory
     faults: list[UserError] | None = None,
     see: Callable[[bytes], None] | None = None,  # gets the line of each row
@@ -190,12 +187,8 @@ def read_results(
 ) -> Results:
     """Read an evaluation of a run, each file once; what is wrong is added to `faults`, or else raised."""
     head = {} if key is None else _head(run.head(key), faults)
-    about = _head(run.about, faults) if run.about.exists() else {}
     tasks = selected_tasks(head)
-    completions = {
-        (sys.intern(completion.task), completion.prompt, completion.index): completion
-        for completion in read_completions(run.completions, growing=True, faults=faults)
-    }
+    about, completions = (beside.about, beside.completions) if beside else _completions(run, faults)
     total = sum(tasks is None or task in tasks for task, _, _ in completions)
     builder = TableBuilder(completions, _categories(suite), _accepted(run, key, faults))
     places: dict[Key, tuple[int, int]] = {}
@@ -218,6 +211,15 @@ def read_results(
         places=places,
         faults=tuple(faults or ()),
     )
+
+
+def _completions(
+    run: Run, faults: list[UserError] | None
+) -> tuple[Mapping[str, Any], Mapping[Key, Completion]]:
+    """How a run's completions were asked for, and they themselves."""
+    about = _head(run.about, faults) if run.about.exists() else {}
+    completions = read_completions(run.completions, growing=True, faults=faults)
+    return about, {(sys.intern(one.task), one.prompt, one.index): one for one in completions}
 
 
 def _head(path: Path, faults: list[UserError] | None) -> Mapping[str, Any]:

@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import UnionType
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import polars as pl
@@ -16,6 +16,8 @@ from codebotler.core.files import write_whole
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.rows import JudgedRow
 
+Tokens = TypeVar("Tokens", float, pl.Expr)
+MILLION = 1_000_000
 CHUNK = 10_000  # rows of the table that are held as Python objects at one time
 MOST = 10**12  # tokens or seconds; a reply of which more is recorded was not counted
 
@@ -52,6 +54,33 @@ WORLD_COLUMNS: Mapping[str, type[pl.DataType]] = {
     "events": pl.Int64,
 }
 """What a row says of one world."""
+
+
+class Price(NamedTuple):
+    """What a million tokens of input and of output cost."""
+
+    input: float
+    output: float
+
+    @classmethod
+    def read(cls, text: str) -> Price:
+        """Read `INPUT/OUTPUT`; raises ValueError unless both are numbers from 0 up to a million."""
+        try:
+            price = cls(*map(float, text.split("/")))
+        except TypeError as error:
+            raise ValueError(text) from error
+        if not all(0 <= number < MILLION for number in price):
+            raise ValueError(text)
+        return price
+
+    def of(self, input_tokens: Tokens, output_tokens: Tokens) -> Tokens:
+        """What so many tokens cost, as a number or as a column of the table."""
+        return (input_tokens * self.input + output_tokens * self.output) / MILLION
+
+
+def with_cost(table: pl.DataFrame, price: Price) -> pl.DataFrame:
+    """A table whose `cost` is what the tokens of a completion cost at a price."""
+    return table.with_columns(cost=price.of(pl.col("input_tokens"), pl.col("output_tokens")))
 
 
 def with_answers(table: pl.DataFrame, problems: Mapping[tuple[str, str], Sequence[str]]) -> pl.DataFrame:
