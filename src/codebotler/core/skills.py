@@ -1,7 +1,6 @@
 """The skill table: what a robot can do, from its Python signature to its ROS action and its verbs.
 
-Everything else is derived from it: one more skill is one more row here and one more behaviour in
-`codebotler.simulator.robot`.
+Prompts, messages, checks and robots read it; what a skill does to a world is in `codebotler.simulator.robot`.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ def mutate(
     ] = None,
     workers: WorkersOption = None,
 ) -> None:
-    """Measure which wrong programs a suite's checks let through.
+    """Measure which wrong programs survive a suite's checks.
 
     It runs and judges mutants: right programs with mistakes that models make.
     """

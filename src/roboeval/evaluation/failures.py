@@ -60,7 +60,7 @@ CLASSES: Mapping[str, FailureClass] = {
         FailureClass(TASK, "failed check", "failed checks", get_args(Category)),
     )
 }
-"""All classes; the kind of a failed check is the check's category. A new class is one more entry here."""
+"""All classes; the kind of a failed check is the check's category. `failure` assigns them."""
 
 
 def label_of(name: str) -> str:

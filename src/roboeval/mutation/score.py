@@ -19,7 +19,7 @@ class MutantStatus(StrEnum):
     SURVIVED = "survived"
     EQUIVALENT = "equivalent"
     SAME = "same traces"
-    CRASHES = "crashes everywhere"
+    CRASHES = "crashes"
 
 
 CHANGED = MutantStatus.KILLED, MutantStatus.SURVIVED, MutantStatus.EQUIVALENT  # behaviour, without crashing
@@ -80,7 +80,7 @@ class MutationScore:
 
     @property
     def survivors(self) -> tuple[Mutant, ...]:
-        """The mutants that the checks let through and no file explains."""
+        """The mutants that survive, and that no file explains."""
         return tuple(one.mutant for one in self.mutants if one.result.status is MutantStatus.SURVIVED)
 
     @property

@@ -292,7 +292,7 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
     axes.set_title("(a) how completions end", loc="left")
     left = np.zeros(len(found))
     places = range(len(found))
-    colours = chain([FAINT], cycle(COLOURS[at] for at in (1, 0, 3)))
+    colours = chain([FAINT], cycle(COLOURS[at] for at in (1, 0, 3, 2, 4, 5)))
     hatches = cycle(("", "", "////", "\\\\\\\\", "...."))
     for name, colour, hatch in zip((PASSED, *CLASSES), colours, hatches, strict=False):
         shares = np.array([one.classes.get(name, 0.0) for _, one in found])

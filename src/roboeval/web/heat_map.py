@@ -49,9 +49,11 @@ def models_of(run: Snapshot) -> str:
 
 def failure_text(chosen: Filter) -> str | None:
     """The kind or class of failures that a filter means, as text; None if it means others, too."""
-    if chosen.kind is not None:
-        return shortened(chosen.kind, MOST_NAME)
-    return None if chosen.failure is None else f"a {shortened(label_of(chosen.failure), MOST_NAME)}"
+    if chosen.failure_kind is not None:
+        return shortened(chosen.failure_kind, MOST_NAME)
+    if chosen.failure_class is not None:
+        return f"a {shortened(label_of(chosen.failure_class), MOST_NAME)}"
+    return None
 
 
 class TaskCells:
@@ -118,7 +120,9 @@ def failure_rows(runs: Sequence[Snapshot]) -> list[dict[str, Any]]:
         {
             "name": f"{shortened(label_of(failure), MOST_NAME)}: {shortened(kind, MOST_NAME)}",
             "cells": [
-                _failure_cell(run, Filter(failure=failure, kind=kind), kinds.get((failure, kind)))
+                _failure_cell(
+                    run, Filter(failure_class=failure, failure_kind=kind), kinds.get((failure, kind))
+                )
                 for run, kinds in zip(runs, found, strict=True)
             ],
         }

@@ -104,8 +104,9 @@ class _RunPage:
         run = self._run
         counts = {Filter(): ("all judged", run.judged), Filter(passed=True): ("passed", run.passed)}
         for of in run.failures:
-            counts[Filter(failure=of.name)] = plural_of(of.name), of.count
-            counts |= {Filter(failure=of.name, kind=kind.name): (kind.name, kind.count) for kind in of.kinds}
+            counts[Filter(failure_class=of.name)] = plural_of(of.name), of.count
+            for one in of.kinds:
+                counts[Filter(failure_class=of.name, failure_kind=one.name)] = one.name, one.count
         if list(self._kinds) != list(counts):
             self._ends.clear()
             with self._ends:
@@ -120,7 +121,8 @@ class _Kind:
     """A way in which programs end, as a button that chooses it."""
 
     def __init__(self, name: str, kind: Filter, choose: Callable[[Filter], None]) -> None:
-        look = "kind" + " of-class" * (kind.kind is not None) + " bad-kind" * (kind.failure is not None)
+        look = "kind" + " of-class" * (kind.failure_kind is not None)
+        look += " bad-kind" * (kind.failure_class is not None)
         with Button("", lambda: choose(kind), look) as self._button:
             PlainText("span", shortened(name, MOST_NAME))
             self._count = PlainText("b")

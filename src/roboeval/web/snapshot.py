@@ -39,22 +39,20 @@ MOST = 2**63
 
 @dataclass(frozen=True)
 class Filter:
-    """Which completions are meant, as addresses of the pages and of the API name them."""
+    """Which completions are meant, by columns of the table that addresses of the pages and the API name."""
 
     task: Annotated[str | None, Query(description="Only of this task.")] = None
     prompt: Annotated[
         int | None, Query(ge=0, lt=MOST, description="Only of this prompt, counted from 0.")
     ] = None
     passed: Annotated[bool | None, Query(description="Only those that passed, or those that failed.")] = None
-    failure: Annotated[str | None, Query(description="Only those that failed by this class.")] = None
-    kind: Annotated[str | None, Query(description="Only those that failed by this kind.")] = None
+    failure_class: Annotated[str | None, Query(description="Only those that failed by this class.")] = None
+    failure_kind: Annotated[str | None, Query(description="Only those that failed by this kind.")] = None
 
     @property
     def condition(self) -> pl.Expr:
         """It as a condition on `Snapshot.completions`."""
-        columns = ("task", "prompt", "passed", "failure_class", "failure_kind")
-        wanted = zip(columns, asdict(self).values(), strict=True)
-        conditions = [pl.col(name) == value for name, value in wanted if value is not None]
+        conditions = [pl.col(name) == value for name, value in asdict(self).items() if value is not None]
         return pl.all_horizontal(pl.lit(value=True), *conditions)
 
     @property

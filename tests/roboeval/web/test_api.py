@@ -94,9 +94,12 @@ def test_completions_are_chosen(server: PageServer) -> None:
         ("task=LunchBreak&prompt=2", lambda one: (one["task"], one["prompt"]) == ("LunchBreak", 2)),
         ("passed=true", lambda one: one["passed"]),
         ("passed=false", lambda one: not one["passed"]),
-        ("failure=PythonError", lambda one: one["failure"] and one["failure"]["class"] == "PythonError"),
         (
-            "failure=RobotExecutionError&kind=GoToInvalidLocation",
+            "failure_class=PythonError",
+            lambda one: one["failure"] and one["failure"]["class"] == "PythonError",
+        ),
+        (
+            "failure_class=RobotExecutionError&failure_kind=GoToInvalidLocation",
             lambda one: one["failure"] and one["failure"]["kind"] == "GoToInvalidLocation",
         ),
         ("task=%3Cscript%3E", lambda _: False),
@@ -194,7 +197,9 @@ def test_a_suite_of_ones_own_is_named(runs: Path, tmp_path: Path) -> None:
     with serving(runs) as server:
         run = told(server, "/api/runs/hasty")
         assert "`roboeval serve --suite FOLDER`" in run["notes"][0]
-        failed = told(server, "/api/runs/hasty/completions?failure=TaskCompletionError")["completions"][0]
+        failed = told(server, "/api/runs/hasty/completions?failure_class=TaskCompletionError")["completions"][
+            0
+        ]
         place = f"{failed['task']}/{failed['prompt']}/{failed['index']}"
         told_of = told(server, f"/api/runs/hasty/completions/{place}")
         checks = [check for world in told_of["worlds"] for check in world["failed_checks"]]

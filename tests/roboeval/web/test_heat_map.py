@@ -27,7 +27,7 @@ def test_little_is_not_nothing_and_nearly_all_is_not_all(share: float, text: str
     [
         (Filter(), "passed", True),
         (Filter("LunchBreak", 1, passed=False), "passed", False),
-        (Filter("LunchBreak", failure="PythonError"), "failure_class", "PythonError"),
+        (Filter("LunchBreak", failure_class="PythonError"), "failure_class", "PythonError"),
     ],
 )
 def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) -> None:

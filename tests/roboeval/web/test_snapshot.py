@@ -96,7 +96,7 @@ def test_filters_prompts_and_neighbours(runs: Path) -> None:
     for chosen, count in (
         (Filter("LunchBreak", 2), 3),
         (Filter(passed=False), 45 - run.passed),
-        *((Filter(failure=name, kind=kind.name), kind.count) for name, kind in kinds),
+        *((Filter(failure_class=name, failure_kind=kind.name), kind.count) for name, kind in kinds),
     ):
         found = keys(run.select(chosen))
         assert len(found) == count > 0

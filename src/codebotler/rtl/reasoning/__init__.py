@@ -1,6 +1,6 @@
 """Reasoning about formulas: can they hold together, does one follow from others, do two mean the same?
 
-Each function answers one question, and raises `Undecided` if that would take too long. A `Reasoner` answers
+Each function about formulas answers one question, and raises `Undecided` if that would take too long. A `Reasoner` answers
 several, also for the rooms of one world; `satisfiability.py` is the search behind all of them.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 from codebotler.core.trace import Trace
 from codebotler.rtl.formulas import Formula, Not
 from codebotler.rtl.reasoning.automaton import Undecided
+from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.satisfiability import Reasoner
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "distinguishing_trace",
     "is_implied",
     "is_satisfiable",
+    "samples",
     "satisfying_trace",
 ]
 
