@@ -4,6 +4,8 @@ import re
 import runpy
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parent.parent
 GLOSSARY = ROOT / "docs" / "glossary.md"
 
@@ -13,6 +15,12 @@ def test_all_modules_are_listed_as_they_describe_themselves() -> None:
     assert modules["PAGE"].read_text() == modules["page"](), (
         "`python website/modules.py` writes the list anew"
     )
+
+
+def test_the_picture_shows_the_rooms_that_the_linter_keeps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "website")
+    rooms = runpy.run_path(str(ROOT / "website" / "rooms.py"))
+    assert rooms["PICTURE"].read_text() == rooms["picture"](), "`python website/rooms.py` draws it anew"
 
 
 def test_the_glossary_names_modules_that_are_there() -> None:

@@ -27,16 +27,17 @@ def _table(room: Path) -> str:
         return ""
     name = str(room.relative_to(ROOT / "src"))
     entry = next(path for path in (room / "__init__.py", room / "__main__.py") if path.exists())
-    return "\n".join([f"| `{name}/` | {_first_line(entry)} |", "|---|---|", *rows])
+    return "\n".join([f"| `{name}/` | {first_line(entry)} |", "|---|---|", *rows])
 
 
 def _rows(room: Path) -> Iterator[str]:
     for path in sorted(room.glob("*.py")):
         if path.name not in {"__init__.py", "__main__.py"}:
-            yield f"| `{path.name}` | {_first_line(path)} |"
+            yield f"| `{path.name}` | {first_line(path)} |"
 
 
-def _first_line(path: Path) -> str:
+def first_line(path: Path) -> str:
+    """The first line of a module's docstring."""
     return (ast.get_docstring(ast.parse(path.read_text())) or "").split("\n")[0].replace("|", "\\|")
 
 

@@ -1,4 +1,4 @@
-"""Runs programs in simulated worlds, in isolated processes. Start reading at `worker`."""
+"""Programs run in simulated worlds, in isolated processes; start reading at `worker.py`."""
 
 from __future__ import annotations
 

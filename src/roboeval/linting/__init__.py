@@ -1,4 +1,4 @@
-"""Mistakes in tasks: requirements that cannot hold, checks nothing trips, regexes that match nothing.
+"""Mistakes in tasks: requirements that cannot hold, checks that never fail, regexes that match nothing.
 
 Start with `lint.py`.
 """

@@ -1,7 +1,7 @@
 """Reasoning about formulas: can they hold together, does one follow from others, do two mean the same?
 
-Each function about formulas answers one question, and raises `Undecided` if that would take too long. A `Reasoner` answers
-several, also for the rooms of one world; `satisfiability.py` is the search behind all of them.
+Each function about formulas answers one question, and raises `Undecided` if that would take too long. A
+`Reasoner` answers several, also for the rooms of one world; `satisfiability.py` is the search behind all.
 """
 
 from __future__ import annotations
