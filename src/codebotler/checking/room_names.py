@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from codebotler.core.program import names_bound
+from codebotler.core.program import names_bound, nodes
 from codebotler.core.skills import SKILLS, Skill, SkillTable
 
 DRIVE, LIST, HERE = "goto", "get_all_rooms", "get_current_location"
@@ -40,7 +40,7 @@ def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[in
     bound = names_bound(tree)
     if "*" in bound:
         return []
-    compared = {text for node in ast.walk(tree) if isinstance(node, ast.Compare) for text in _texts(node)}
+    compared = {text for node in nodes(tree) if isinstance(node, ast.Compare) for text in _texts(node)}
     drives = {name: skill for name, skill in _drives(skills).items() if name not in bound}
     return [
         (call.lineno, request.value)
@@ -52,7 +52,7 @@ def fixed_drives(tree: ast.Module, skills: SkillTable = SKILLS) -> list[tuple[in
 
 def lists_rooms(tree: ast.Module) -> bool:
     """Whether a program asks for the list of all rooms."""
-    return any(isinstance(node, ast.Name) and node.id == LIST for node in ast.walk(tree))
+    return any(isinstance(node, ast.Name) and node.id == LIST for node in nodes(tree))
 
 
 def _texts(expression: ast.expr) -> Iterator[str]:
@@ -67,7 +67,7 @@ def _drives(skills: SkillTable) -> dict[str, Skill]:
 
 def _requests(tree: ast.Module, drives: dict[str, Skill]) -> Iterator[tuple[ast.Call, ast.expr]]:
     """The calls that drive, with where to."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         match node:
             case ast.Call(ast.Name(name), [first, *_]) if name in drives:
                 yield node, first
@@ -85,12 +85,12 @@ class _Variables:
         self.held: defaultdict[str, set[Literal]] = defaultdict(set)
         self.functions = {
             node.name: [*node.args.posonlyargs, *node.args.args]
-            for node in ast.walk(tree)
+            for node in nodes(tree)
             if isinstance(node, ast.FunctionDef)
         }
         for _ in range(ROUNDS):
             before = sum(map(len, self.held.values()))
-            for node in ast.walk(tree):
+            for node in nodes(tree):
                 self._pass_on(node)
             if sum(map(len, self.held.values())) == before:
                 break
@@ -99,7 +99,7 @@ class _Variables:
         """The names of rooms, in the order of the program."""
         found = {text for _, request in _requests(self.tree, self.drives) for text in self.texts(request)}
         driven = {_name(request) for _, request in _requests(self.tree, self.drives)} - {None}
-        for node in ast.walk(self.tree):
+        for node in nodes(self.tree):
             found |= self._compared(node, driven)
         return [text for _, _, text in sorted(found - {A_ROOM}) if any(map(str.isalpha, text))]
 

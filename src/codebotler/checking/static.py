@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from codebotler.checking.problems import Problem, no_room
 from codebotler.checking.room_names import fixed_drives
-from codebotler.core.program import TASK, Flaw, flaws_of
+from codebotler.core.program import TASK, Flaw, flaws_of, nodes
 from codebotler.core.skills import SkillTable
 from codebotler.simulator.sampled_robot import RoomMap
 
@@ -42,8 +42,8 @@ def static_problems(program: str, tree: ast.Module, room_map: RoomMap, skills: S
 
 def _never(tree: ast.Module) -> Iterator[ast.stmt]:
     """The statements that never run: after a return, below what is never true, in functions never named."""
-    named = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} | {TASK}
-    for node in ast.walk(tree):
+    named = {node.id for node in nodes(tree) if isinstance(node, ast.Name)} | {TASK}
+    for node in nodes(tree):
         match node:
             case ast.FunctionDef(name, body=body, decorator_list=[]) if name not in named:
                 yield from body
@@ -60,7 +60,7 @@ def _never(tree: ast.Module) -> Iterator[ast.stmt]:
 
 def _caught(tree: ast.Module) -> Iterator[tuple[range, frozenset[str]]]:
     """The lines in a `try` or `with`, and the kinds of errors that it may catch."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         if isinstance(node, ast.Try | ast.TryStar) and node.handlers:
             yield _lines(node.body), frozenset().union(*map(_kinds, node.handlers))
         elif isinstance(node, ast.With):  # which may swallow anything

@@ -88,13 +88,13 @@ def step_text(step: Mapping[str, Any]) -> Text:
     if step["kind"] == "goto":
         return _drive(step, text)
     match step["kind"]:
-        case "check":
-            told = f"looked for {text}: {'found' if step.get('found') else 'not found'}"
         case "ask":
             answer = "no answer" if step["answer"] is None else shortened(step["answer"])
             told = f"asked {text} {_options(step['options'])} → {answer}"
         case kind:
-            told = f"{VERBS[kind].past if kind in VERBS else visible(kind)} {text}"
+            verb, result = VERBS.get(kind), step.get("found")
+            told = f"{visible(kind) if verb is None else verb.past} {text}"
+            told += f": {verb.results[result]}" if verb and result is not None else ""
     return Text(told)
 
 

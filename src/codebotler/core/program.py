@@ -9,6 +9,8 @@ import threading
 import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 from codebotler.core.skills import SKILLS, Parameter, Skill, SkillTable
 from codebotler.core.words import counted, listed
@@ -62,10 +64,25 @@ class Program:
 # --- parsing
 
 
+@lru_cache(maxsize=8)
 def parse(source: str) -> ast.Module:
-    """The syntax tree of a source, with the errors of `ast.parse`."""
+    """The syntax tree of a source, which nobody may change, with the errors of `ast.parse`."""
     with _PARSING:
         return ast.parse(source, FILE)
+
+
+@lru_cache(maxsize=8)
+def nodes(tree: ast.Module) -> tuple[ast.AST, ...]:
+    """All nodes of a program's tree, in the order of `ast.walk`."""
+    found: list[ast.AST] = [tree]
+    for node in found:  # which grows meanwhile
+        for name in node._fields:
+            part = getattr(node, name, None)
+            if isinstance(part, ast.AST):
+                found.append(part)
+            elif isinstance(part, list):
+                found += [one for one in part if isinstance(one, ast.AST)]
+    return tuple(found)
 
 
 def parse_expression(source: str) -> ast.expr:
@@ -136,7 +153,7 @@ def names_bound(tree: ast.Module, besides: Iterable[ast.AST] = ()) -> set[str]:
     """The names that a program defines anywhere, in whatever scope; `*` after `from x import *`."""
     names: set[str] = set()
     skipped = {id(node) for node in besides}
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         if id(node) in skipped:
             continue
         match node:
@@ -155,7 +172,7 @@ def called_skills(tree: ast.Module, skills: SkillTable = SKILLS) -> dict[str, in
     """The skills that a program names, unless it redefines them, each with the first line."""
     rebound = names_bound(tree)
     lines: dict[str, int] = {}
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         if isinstance(node, ast.Name) and node.id in skills and node.id not in rebound:
             lines[node.id] = min(node.lineno, lines.get(node.id, node.lineno))
     return lines
@@ -167,10 +184,17 @@ def undefined_names(tree: ast.Module, skills: SkillTable) -> list[tuple[int, str
     from pyflakes import messages  # type: ignore[import-untyped] # noqa: PLC0415 - see above
     from pyflakes.checker import Checker  # type: ignore[import-untyped] # noqa: PLC0415 - the same
 
+    class Names(Checker):  # type: ignore[misc]  # which has no types
+        def addBinding(self, node: ast.AST | None, value: Any) -> None:  # noqa: ANN401, N802 - pyflakes' own
+            if node is None:  # built in, like some 170 others of each program
+                self.scope[value.name] = value
+            else:
+                super().addBinding(node, value)
+
     # Names in annotations that are texts are never looked up when a program runs.
-    spelled = {(n.lineno, n.col_offset) for n in ast.walk(tree) if isinstance(n, ast.Name)}
+    spelled = {(n.lineno, n.col_offset) for n in nodes(tree) if isinstance(n, ast.Name)}
     with _PARSING:
-        found = Checker(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
+        found = Names(tree, builtins={*skills, *GIVEN}, withDoctest=False).messages
     return [
         # pyflakes gives the bare name, not a tuple, where a local variable hides something built in
         (m.lineno, m.message_args if isinstance(m.message_args, str) else m.message_args[0], is_local)
@@ -225,7 +249,7 @@ def _call_flaws(tree: ast.Module, skills: SkillTable) -> Iterator[Flaw]:
     rebound = names_bound(tree)
     if "*" in rebound:
         return
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         match node:
             case ast.Call(ast.Name(name)) if name in skills and name not in rebound:
                 yield from _wrong_call(node, skills[name])

@@ -25,6 +25,8 @@ class Recording:
     kind: str  # of the event, and its name in RTL, such as `goto`
     text: str  # the parameter whose value is the event's text
     options: str | None = None  # the parameter whose value is the event's list of options
+    names: str = ""  # the sort of thing that the text names, such as `room`; empty for what is spoken
+    when_tried: bool = False  # whether an attempt that fails is an event, too
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class Verb:
     past: str  # `picked up`
     ing: str  # `picking up`
     alone: str = ""  # `picked something up`, where no object follows
+    results: tuple[str, str] = ("no", "yes")  # what False and True mean
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,7 @@ class Skill:
         recording: its event in the trace; None for skills without one.
         ros: the action on a robot.
         verb: for people; without one, they read the skill's name and its arguments.
+        seconds: how long the simulated robot takes by its clock, besides driving.
     """
 
     name: str
@@ -76,6 +80,7 @@ class Skill:
     recording: Recording | None = None
     ros: RosAction | None = None
     verb: Verb | None = None
+    seconds: float = 0.0
 
     @property
     def signature(self) -> str:
@@ -137,7 +142,7 @@ class SkillTable(Mapping[str, Skill]):
 
 
 def _verb(base: str, rest: str) -> Verb:
-    return Verb(*(f"{base}{end} {rest}" for end in ("", "s", "ed", "ing")))
+    return Verb(f"{base} {rest}", f"{base}s {rest}", f"{base}ed {rest}", f"{base}ing {rest}")
 
 
 SKILLS = SkillTable(
@@ -163,16 +168,20 @@ SKILLS = SkillTable(
             (Parameter("entity"),),
             "bool",
             "Look whether an object or a person is in the room the robot is in.",
-            Recording("check", "entity"),
+            Recording("check", "entity", names="object or person"),
             RosAction("IsInRoom", "/is_in_room_server", ("string object",), "bool"),
-            Verb("look for", "looks for", "looked for", "looking for", "looked around"),
+            Verb(
+                *("look for", "looks for", "looked for", "looking for", "looked around"),
+                results=("not found", "found"),
+            ),
+            seconds=1.0,
         ),
         Skill(
             "go_to",
             (Parameter("location"),),
             "None",
             "Drive to a room.",
-            Recording("goto", "location"),
+            Recording("goto", "location", names="room", when_tried=True),
             RosAction("GoTo", "/go_to_server", ("string location",), failure="GoToInvalidLocation"),
             Verb("go to", "drives to", "went to", "going to"),
         ),
@@ -181,38 +190,42 @@ SKILLS = SkillTable(
             (Parameter("person"), Parameter("question"), Parameter("options", list, "list[str]")),
             "str",
             "Ask a person in the same room a question and return the option that they choose.",
-            Recording("ask", "question", "options"),
+            Recording("ask", "question", "options", when_tried=True),
             RosAction(
                 "Ask", "/ask_server", ("string person", "string question", "string[] options"), "string"
             ),
             Verb("ask", "asks", "asked", "asking", "asked something"),
+            seconds=3.0,
         ),
         Skill(
             "say",
             (Parameter("message"),),
             "None",
             "Say a message aloud in the room the robot is in.",
-            Recording("say", "message"),
+            Recording("say", "message", when_tried=True),
             RosAction("Say", "/say_server", ("string message",)),
             Verb("say", "says", "said", "saying", "spoke"),
+            seconds=1.0,
         ),
         Skill(
             "pick",
             (Parameter("obj"),),
             "None",
             "Pick up an object in the room; the robot can hold one at a time.",
-            Recording("pick", "obj"),
+            Recording("pick", "obj", names="object"),
             RosAction("Pick", "/pick_server", ("string obj",)),
             Verb("pick up", "picks up", "picked up", "picking up", "picked something up"),
+            seconds=5.0,
         ),
         Skill(
             "place",
             (Parameter("obj"),),
             "None",
             "Put down the object that the robot holds.",
-            Recording("place", "obj"),
+            Recording("place", "obj", names="object"),
             RosAction("Place", "/place_server", ("string obj",), failure="PlaceNoObject"),
             Verb("put down", "puts down", "put down", "putting down", "put something down"),
+            seconds=3.0,
         ),
     )
 )

@@ -32,7 +32,7 @@ class Event:
         text: the program's request, without spaces at its ends.
         options: what a question offered; empty for other kinds.
         answer: the text of the chosen option; None without an answer, and for other kinds.
-        found: the result of a look; None for other kinds.
+        found: what a look, or another skill that answers yes or no, has returned; None for other kinds.
         place: the room where it happened, as the world names it (for a drive, the room where it started).
         time: simulated seconds since the start of the run.
     """

@@ -15,9 +15,6 @@ from codebotler.robots.base import CancelledError, Picture, RobotLostError
 from codebotler.simulator.robot import Argument, Result, RobotError
 from codebotler.simulator.rules import ENDLESS, Rules
 
-BEGINS = frozenset({"goto", "ask", "say"})
-"""Kinds of events that count when tried; all others count only when they succeed."""
-
 RETURNS: Mapping[str, type] = {"str": str, "bool": bool, "list[str]": list, "None": type(None)}
 
 
@@ -89,12 +86,12 @@ class LiveRobot:
         row = self.skills[skill]
         event = _event(row, arguments)
         event = event and replace(event, place=self._place, time=self.now)
-        if event and event.kind in BEGINS:
+        if event and row.recording and row.recording.when_tried:
             self._events.append(event)
         result = self._logged(row, [_text(argument) for argument in arguments], event)
-        if event is None:
+        if event is None or row.recording is None:
             return result
-        if event.kind in BEGINS:
+        if row.recording.when_tried:
             self._events.pop()
         self._events.append(replace(event, **_seen(row, result)))
         if event.kind == "goto":

@@ -14,9 +14,6 @@ from codebotler.simulator.sampled_robot import RoomMap
 MOST_ROOMS = 1_000
 """Of a robot, for a check: each drive is compared with all of them."""
 
-WITH_PATTERNS = frozenset({"simulated", "pyrobosim"})
-"""Robots whose rooms have regexes for names, as in the world files they come from."""
-
 
 def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
     """Ask a connected robot for its rooms and for the room it is in.
@@ -56,7 +53,7 @@ def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
     if place and place not in rooms:
         note(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
     names = dict.fromkeys([*rooms, place] if place else rooms)
-    return RoomMap(tuple(names), place or rooms[0], plain=robot.name not in WITH_PATTERNS), place
+    return RoomMap(tuple(names), place or rooms[0], plain=not robot.rooms_are_regexes), place
 
 
 def unknown_rooms(program: str, room_map: RoomMap) -> list[str]:

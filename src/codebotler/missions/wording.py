@@ -39,8 +39,9 @@ def _result(line: Line) -> str:
     match line["result"]:
         case None:
             return ""
-        case bool(found):
-            return "→ found" if found else "→ not found"
+        case bool(result):
+            skill = SKILLS.get(line["skill"])
+            return f"→ {skill.verb.results[result]}" if skill and skill.verb else f"→ {result}"
         case list(texts):
             return f"→ {shortened(', '.join(map(str, texts)))}"
         case result:

@@ -59,6 +59,10 @@ class Robot(Protocol):
         """What happens to a running skill when this process is killed, as a clause without a full stop."""
 
     @property
+    def rooms_are_regexes(self) -> bool:
+        """Whether the rooms that it lists are regexes, as world files write them, and not plain names."""
+
+    @property
     def skills(self) -> SkillTable:
         """The skills it may be asked to perform."""
 

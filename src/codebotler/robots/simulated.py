@@ -27,9 +27,6 @@ from codebotler.simulator.rules import ENDLESS, Rules
 
 ROBOT_RULES = Rules(literals="as-written", limits=ENDLESS)
 METRES_PER_SECOND = 0.5
-SECONDS: Mapping[str, float] = {"is_in_room": 1.0, "say": 1.0, "ask": 3.0, "pick": 5.0, "place": 3.0}
-"""How long skills take by the robot's clock; `go_to` depends on the distance, and others take no time."""
-
 FEEDBACK_EVERY = 0.25  # real seconds
 
 
@@ -47,7 +44,7 @@ class Simulated:
     """
 
     name, address = "simulated", ""
-    if_tool_dies = "the simulated robot ended with the tool"
+    if_tool_dies, rooms_are_regexes = "the simulated robot ended with the tool", True
     missing: Mapping[str, str] = MappingProxyType({})
 
     def __init__(
@@ -83,7 +80,7 @@ class Simulated:
             if room is not None:
                 self._drive(room, feedback)
         else:
-            self._wait(SECONDS.get(skill, 0.0))
+            self._wait(self.skills[skill].seconds)
         return performed(self._robot, skill, arguments)
 
     def cancel(self) -> None:

@@ -140,7 +140,16 @@ class SimulatedRobot:
 
     def perform(self, skill: str, arguments: Sequence[Argument]) -> Result:
         """Execute one skill; a question is answered by the position of the chosen option."""
-        return self.behaviours[skill](self, *arguments)
+        result = self.behaviours[skill](self, *arguments)
+        if isinstance(result, bool) and self.events and self.events[-1].found is None:
+            self._add_result(skill, found=result)
+        return result
+
+    def _add_result(self, skill: str, *, found: bool) -> None:
+        """Add to the event of a skill what it returned, where its behaviour has not done so."""
+        recording, last = self.skills[skill].recording, self.events[-1]
+        if recording is not None and last.kind == recording.kind:
+            self.events[-1] = replace(last, found=found)
 
     def sleep_until(self, now: float) -> None:
         """Let simulated time pass, until `now` seconds since the start."""

@@ -136,7 +136,8 @@ def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
             return (Deed("check", f"{verb} {text}, {seen}", number),)
         case "say":
             return (Deed("say", text, number),)
-    return (Deed(kind, f"{verb} {text}", number),)
+    result = f": {VERBS[kind].results[step['found']]}" if kind in VERBS and "found" in step else ""
+    return (Deed(kind, f"{verb} {text}{result}", number),)
 
 
 # --- what a world is like

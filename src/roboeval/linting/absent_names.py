@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from codebotler.core.program import parse_expression
+from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room
 from codebotler.rtl import EventPattern, Regex
 from codebotler.rtl.reasoning.alphabet import elements
@@ -31,15 +32,14 @@ def _named(
     """Sort and name of each, and what of this sort the world has; of people also the owners of rooms."""
     objects = [label for room in rooms for label in room.objects]
     people = [person.name for room in rooms for person in room.people]
-    sorts: dict[str, tuple[str, list[str]]] = {
-        "goto": ("room", [room.name for room in rooms]),
-        "pick": ("object", objects),
-        "place": ("object", objects),
-        "check": ("object or person", [*objects, *people, *ANYBODY]),
+    there = {
+        "room": [room.name for room in rooms],
+        "object": objects,
+        "object or person": [*objects, *people, *ANYBODY],
     }
     for element in elements(requirement.formula):
-        if element.kind in sorts:
-            what, known = sorts[element.kind]
+        if (what := SKILLS.recordings[element.kind].names) in there:
+            known = there[what]
             found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
             yield from ((what, one, known) for one in found)
         else:

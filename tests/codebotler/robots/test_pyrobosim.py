@@ -17,6 +17,7 @@ from pathlib import Path
 
 import pytest
 
+from codebotler.core.skills import SKILLS
 from codebotler.core.world import Person, Point, Room, World
 from codebotler.missions.live import LiveRobot
 from codebotler.missions.preflight import preflight
@@ -25,7 +26,7 @@ from codebotler.robots.base import CancelledError, NotReadyError, Picture
 from codebotler.robots.open import all_readiness
 from codebotler.robots.pyrobosim.robot import Pyrobosim
 from codebotler.robots.reservation import Reservation
-from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, ROBOT_RULES, SECONDS
+from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, ROBOT_RULES
 from codebotler.simulator.engine import run
 from codebotler.simulator.robot import RobotError
 from codebotler.simulator.worker import Worker
@@ -240,7 +241,7 @@ def test_it_drives_around_walls_and_takes_its_time() -> None:
     assert length / METRES_PER_SECOND - 1 < robot.clock.now < 2 * length / METRES_PER_SECOND
     now = robot.clock.now
     robot.perform("say", ["hello"])
-    assert robot.clock.now == now + SECONDS["say"]
+    assert robot.clock.now == now + SKILLS["say"].seconds
 
 
 def test_feedback_tells_places_on_the_way() -> None:
@@ -404,7 +405,7 @@ def test_cancel_before_the_hand_has_closed_leaves_the_object(monkeypatch: pytest
     wait = robot.clock.wait
 
     def cancelled_meanwhile(seconds: float) -> bool:
-        if seconds == SECONDS["pick"]:
+        if seconds == SKILLS["pick"].seconds:
             robot.cancel()
         return wait(seconds)
 

@@ -34,7 +34,7 @@ class Pyrobosim(Simulated):
     """
 
     name = "pyrobosim"
-    if_tool_dies = "the robot in pyrobosim ended with the tool"
+    if_tool_dies, rooms_are_regexes = "the robot in pyrobosim ended with the tool", True
     _drivable: DrivableWorld
 
     def connect(self) -> None:

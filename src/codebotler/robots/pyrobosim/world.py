@@ -20,11 +20,12 @@ from pyrobosim.utils.pose import Pose, wrap_angle
 from pyrobosim.utils.trajectory import Trajectory, get_constant_speed_trajectory
 from shapely.geometry import LineString
 
+from codebotler.core.skills import SKILLS
 from codebotler.core.world import World
 from codebotler.robots.base import CancelledError, Feedback, no_feedback
 from codebotler.robots.clock import Clock
 from codebotler.robots.pyrobosim.floorplan import RADIUS, Floorplan, Table, plan_floor
-from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND, SECONDS
+from codebotler.robots.simulated import FEEDBACK_EVERY, METRES_PER_SECOND
 from codebotler.simulator.robot import RobotError
 
 RADIANS_PER_SECOND = math.pi / 2
@@ -91,7 +92,7 @@ class DrivableWorld:
         """Drive to the table with an object of this room, and take it; programs call it `name`."""
         what = f'pick up "{name}"'
         self._navigate(thing.parent, feedback, "PickFailed", what)
-        self._wait(SECONDS["pick"])
+        self._wait(SKILLS["pick"].seconds)
         _succeed(self.robot.pick_object(thing), "PickFailed", what)
 
     def place(self, room: str, name: str, feedback: Feedback) -> None:
@@ -100,7 +101,7 @@ class DrivableWorld:
         if table is None:
             raise RobotError("PlaceFailed", f'the robot cannot {what}: no table fits into "{room}"')
         self._navigate(table, feedback, "PlaceFailed", what)
-        self._wait(SECONDS["place"])
+        self._wait(SKILLS["place"].seconds)
         taken = {(lying.pose.x, lying.pose.y) for lying in table.children}
         x, y = next(cell for cell in self._cells[room] if cell not in taken)
         _succeed(self.robot.place_object(Pose(x, y)), "PlaceFailed", what)

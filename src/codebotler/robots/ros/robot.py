@@ -62,6 +62,7 @@ class RosRobot:
     """
 
     if_tool_dies = "the worker then cancels the robot's goal, unless it was killed as well"
+    rooms_are_regexes = False
 
     def __init__(
         self,

@@ -1,0 +1,146 @@
+"""How fast is this version beside another one, each in an environment of its own?
+
+    OTHER=../before/.venv/bin python bench/beside.py
+
+Both do the same in turns: `roboeval evaluate` of the published completions of two models (where
+CODEBOTLER_CORPUS names the corpus; else of the recorded models), and of 4,000 made from them by renaming
+variables; `reward` under `plus`; `check` of one program after the other in 5 worlds each, on an engine that
+is there, and with a new one. Printed are medians of TURNS turns and the ratio of this version to the other.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from itertools import cycle, islice
+from pathlib import Path
+from statistics import median
+
+from codebotler.core.files import to_line
+from completions import models
+from roboeval.evaluation.runs.completions import Completion, read_completions
+
+TURNS = int(os.environ.get("TURNS", "3"))
+WORKERS = os.environ.get("WORKERS", "2")
+MANY = 4_000
+FIRST_VARIABLE = re.compile(r"^\s+(\w+) = ", re.MULTILINE)
+
+READ = """
+import json, sys, time
+rows = [json.loads(line) for line in open(sys.argv[1])]
+programs = list(dict.fromkeys((row["task"], row["program"]) for row in rows))
+"""
+REWARD = (
+    READ
+    + """
+from itertools import groupby
+from roboeval import reward
+reward("LunchTime", 0, [""], suite="plus")
+began = time.perf_counter()
+for task, those in groupby(sorted(programs)[::4], lambda one: one[0]):
+    reward(task, 0, [program for _, program in those], suite="plus")
+print(time.perf_counter() - began)
+"""
+)
+CHECK = (
+    READ
+    + """
+from codebotler import check
+try:
+    from codebotler.simulator.pool import WorkerPool
+    engine, name = WorkerPool(1), "pool"
+except ImportError:
+    from codebotler.simulator.engine import Lanes
+    engine, name = Lanes(1), "lanes"
+with engine:
+    check(programs[0][1], **{name: engine})
+    began = time.perf_counter()
+    for _, program in programs[::5]:
+        check(program, **{name: engine})
+    print(time.perf_counter() - began)
+"""
+)
+CHECK_ANEW = (
+    READ
+    + """
+from codebotler import check
+check(programs[0][1])
+began = time.perf_counter()
+for _, program in programs[::60]:
+    check(program)
+print(time.perf_counter() - began)
+"""
+)
+
+
+def main() -> None:
+    """Print a line for each measure."""
+    other = os.environ.get("OTHER")
+    if other is None:
+        sys.exit("OTHER names the bin folder of the other environment")
+    folders = Path(sys.executable).parent, Path(other)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        real = [one for file in models(folder).values() for one in read_completions(file)]
+        few, many = folder / "real.jsonl", folder / "many.jsonl"
+        few.write_bytes(b"".join(map(to_line, (one.row for one in numbered(real)))))
+        many.write_bytes(b"".join(map(to_line, (one.row for one in numbered(renamed(real))))))
+        compare(f"evaluate, {len(real):,} completions", evaluated(few), folders)
+        compare(f"evaluate, {MANY:,} completions", evaluated(many), folders)
+        compare("reward under plus", told(REWARD, few), folders)
+        compare("check in 5 worlds", told(CHECK, few), folders)
+        compare("check with a new engine", told(CHECK_ANEW, few), folders)
+
+
+def numbered(completions: list[Completion]) -> Iterator[Completion]:
+    """The same, so that no two have the same key."""
+    return (replace(one, index=index) for index, one in enumerate(completions))
+
+
+def renamed(completions: list[Completion]) -> list[Completion]:
+    """So many that they are MANY; copies have another name for their first variable."""
+    found = []
+    for number, one in enumerate(islice(cycle(completions), MANY)):
+        copy, variable = number // len(completions), FIRST_VARIABLE.search(one.program)
+        new = rf"\g<0>_{copy}"
+        if copy and variable is not None:
+            one = replace(one, program=re.sub(rf"\b{variable[1]}\b", new, one.program))  # noqa: PLW2901
+        found.append(one)
+    return found
+
+
+def evaluated(file: Path) -> Callable[[Path], float]:
+    """Times the whole command."""
+
+    def time_it(folder: Path) -> float:
+        start = time.perf_counter()
+        command = [str(folder / "roboeval"), "evaluate", str(file), "--workers", WORKERS]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        return time.perf_counter() - start
+
+    return time_it
+
+
+def told(script: str, file: Path) -> Callable[[Path], float]:
+    """Lets a script time itself, without its imports."""
+
+    def time_it(folder: Path) -> float:
+        command = [str(folder / "python"), "-c", script, str(file)]
+        return float(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+
+    return time_it
+
+
+def compare(what: str, time_it: Callable[[Path], float], folders: tuple[Path, Path]) -> None:
+    """Time both in turns."""
+    times = [tuple(map(time_it, folders)) for _ in range(TURNS)]
+    ours, theirs = (median(column) for column in zip(*times, strict=True))
+    print(f"{what}: {ours:.2f} s, the other {theirs:.2f} s: {ours / theirs:.2f} of its time", flush=True)
+
+
+if __name__ == "__main__":
+    main()
