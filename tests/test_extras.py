@@ -54,6 +54,19 @@ def test_a_missing_extra_is_one_sentence(command: str, extra: str, tmp_path: Pat
     assert len(ended.stderr.splitlines()) == 1
 
 
+PAGES = f"""
+import sys
+for package in {sorted(package for package, extra in EXTRAS.items() if extra == "robots")}:
+    sys.modules[package] = None
+import codebotler.web.server, codebotler.web.page, roboeval.web.pages
+"""
+
+
+def test_pages_need_no_other_extra() -> None:
+    assert len(PAGES.split(",")) > 2
+    subprocess.run([sys.executable, "-c", PAGES], check=True)
+
+
 @pytest.mark.parametrize(
     "command",
     [

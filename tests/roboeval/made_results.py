@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,10 +10,11 @@ from typing import Any
 import polars as pl
 
 from codebotler.core.files import to_line
+from roboeval.evaluation.judge import row_line
 from roboeval.evaluation.runs.completions import Completion, Key
 from roboeval.evaluation.runs.folder import Run
 from roboeval.evaluation.runs.results import Results, without_other_traces
-from roboeval.evaluation.runs.rows import JudgedRow, RowData, judged_row, key_of
+from roboeval.evaluation.runs.rows import JudgedRow, Row, RowData, judged_row, key_of
 from roboeval.evaluation.runs.table import TableBuilder
 from roboeval.suites.load import Suite
 
@@ -30,6 +32,12 @@ VERDICT = {
 def judged_rows(rows: Iterable[RowData], programs: Mapping[Key, str] = {}) -> list[JudgedRow]:
     """Rows as they are read; what a test leaves out is filled in."""
     return [judged_row(to_line(_whole(row, programs.get(key_of(row), "")))) for row in rows]
+
+
+def row_of(completion: Completion, judgement: bytes) -> Row:
+    """The row of an evaluation, as it is read."""
+    row: Row = json.loads(row_line(completion, judgement))
+    return row
 
 
 def _whole(row: RowData, program: str) -> dict[str, Any]:

@@ -95,6 +95,8 @@ def _prepared(session: MissionSession) -> SessionView:
         before = view.busy
         with busy(before or "ending"):
             view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]  # mypy does not infer such lambdas
+    for remark in view.remarks:
+        note(remark)
     if session.error is not None:
         raise session.error
     return view

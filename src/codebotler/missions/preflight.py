@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from codebotler.checking.problems import no_room
 from codebotler.checking.room_names import named_rooms
 from codebotler.core.program import called_skills, tree_of
-from codebotler.core.terminal import note, shortened, visible
+from codebotler.core.terminal import shortened, visible
 from codebotler.missions.live import answered
 from codebotler.robots.base import CancelledError, NotReadyError, Result, Robot, RobotLostError
 from codebotler.simulator.robot import RobotError
@@ -15,8 +17,8 @@ MOST_ROOMS = 1_000
 """Of a robot, for a check: each drive is compared with all of them."""
 
 
-def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
-    """Ask a connected robot for its rooms and for the room it is in.
+def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | None, str]:
+    """Ask a connected robot for its rooms and for the room it is in; what is odd is a remark, a sentence.
 
     Returns:
         the rooms, None if it does not list them; and the room it is in, empty if it does not say.
@@ -32,7 +34,7 @@ def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
         try:
             return answered(robot.skills[skill], robot.perform(skill, ()))
         except RobotError as error:
-            note(f"the robot did not report {what}: {visible(str(error))}")
+            remark(f"the robot did not report {what}: {visible(str(error))}")
             return None
         except RobotLostError as error:
             raise NotReadyError(f"the robot did not report {what}: {error.sentence}") from None
@@ -45,13 +47,13 @@ def preflight(robot: Robot) -> tuple[RoomMap | None, str]:
     if not isinstance(rooms, list) or not rooms:
         return None, place
     if len(rooms) > MOST_ROOMS:
-        note(
+        remark(
             f"the robot knows {len(rooms):,} rooms, and a check takes {MOST_ROOMS:,} at most: the check uses "
             "those that the program names instead"
         )
         return None, place
     if place and place not in rooms:
-        note(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
+        remark(shortened(f'the robot says it is in "{place}", which is not one of the rooms that it knows'))
     names = dict.fromkeys([*rooms, place] if place else rooms)
     return RoomMap(tuple(names), place or rooms[0], plain=not robot.rooms_are_regexes), place
 

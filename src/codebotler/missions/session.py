@@ -173,7 +173,7 @@ class MissionSession:
             if self._is_stopped():
                 mission.stop(self._stopped_by or "")
                 return
-            room_map, place = preflight(self._robot)
+            room_map, place = preflight(self._robot, self._remark)
             self._show(room_map=room_map)
             if order.program:
                 self._take(mission, order.program)
@@ -279,6 +279,11 @@ class MissionSession:
 
     # --- what observers see
 
+    def _remark(self, sentence: str) -> None:
+        assert self._mission is not None, "the robot is asked for a mission"
+        self._mission.note(sentence)
+        self._show(remarks=(*self._view.remarks, sentence))
+
     def _note(self, line: Line) -> None:
         """Take an event of the mission, which holds its lock meanwhile."""
         with self._lock:
@@ -287,6 +292,7 @@ class MissionSession:
             changes: dict[str, object] = {"progress": view.progress.after(line, view.program)}
             if line["event"] == "state":
                 changes |= {"state": State(line["state"]), "reason": line.get("reason", "")}
+                changes["line"] = line.get("line")
                 if line["state"] not in STEPS:
                     changes["busy"] = ""
             self._change(**changes)

@@ -28,6 +28,7 @@ class SessionView:
     id: str = ""  # of the mission; empty until it exists
     state: State | None = None  # of the mission
     reason: str = ""  # why it came to that state
+    line: int | None = None  # of the program, where it failed
     busy: str = ""  # what goes on before the robot moves, such as `checking`
     trouble: str = ""  # why it could not go on, in a sentence
     order: Order = field(default_factory=Order)
@@ -38,6 +39,7 @@ class SessionView:
     missing_skills: tuple[str, ...] = ()  # that the program calls and the robot lacks, in sentences
     unknown_rooms: tuple[str, ...] = ()  # that the program names and the robot does not know, in sentences
     room_map: RoomMap | None = None  # of the robot, as far as it says
+    remarks: tuple[str, ...] = ()  # what is odd about the robot, in sentences
     progress: Progress = field(default_factory=Progress)
     is_over: bool = True
 

@@ -18,11 +18,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS, Line, Summary, events_of
-from codebotler.missions.mcap import write_mcap
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.store import find, missions
 from codebotler.missions.view import Order, SessionView
+from codebotler.models.open import from_extra
 from codebotler.web.console import MOST_PROGRAM, Console
 
 HERE = "current"
@@ -129,6 +129,9 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions/{mission}/events.mcap")
     def mcap(mission: str, clock: Literal["wall", "robot"] = "wall") -> Response:
         """The events as MCAP, which Foxglove opens."""
+        with _refusing(), from_extra("robots", "MCAP"):
+            from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
+
         summary, events = _past(console, mission)
         file = io.BytesIO()
         write_mcap(file, summary, events, folder=console.home / "missions" / summary.id, clock=clock)
@@ -239,8 +242,10 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "is_written": view.is_written,
         "problems": list(view.problems),
         "unknown_rooms": list(view.unknown_rooms),
+        "remarks": list(view.remarks),
         "check": None if view.check is None else view.check.data(),
         "reason": view.reason,
+        "line": view.line,
         "doing": view.progress.doing,
         "clock": view.progress.clock,
         "is_over": view.is_over,

@@ -131,10 +131,10 @@ class Causes:
 def causes(table: pl.DataFrame) -> Causes:
     """How the completions of a run, one or more, ended (paper, section V.B)."""
     found = failures(table)
-    ended = completions_of(table)
+    passed = passed_count(prompts_of(task_scores(table)))
     kinds = {one.name: sorted((k.name, k.count) for k in one.kinds if k.count) for one in found}
     return Causes(
-        {PASSED: int(ended["passed"].sum()) / ended.height, **{one.name: one.share for one in found}},
+        {PASSED: passed / completions_of(table).height, **{one.name: one.share for one in found}},
         {one.name: {kind: count / one.count for kind, count in kinds[one.name]} for one in found},
         {(one.name, kind): n for one in found for kind, n in [(ALL, one.count), *kinds[one.name]]},
     )

@@ -54,6 +54,19 @@ def prompt_data(results: Results, task: str, prompt: int) -> dict[str, Any]:
     }
 
 
+def prompt_counts(completions: pl.DataFrame, condition: pl.Expr) -> pl.DataFrame:
+    """How many completions of each prompt are `written`, `judged`, and `counted` by a condition.
+
+    Of completions, judged or not, with `written` and `passed` (null where not judged); their `share` is
+    that of the judged ones which are counted, null where there are none.
+    """
+    judged = pl.col("judged")
+    counts = completions.group_by("task", "prompt", maintain_order=True).agg(
+        written=pl.col("written").sum(), judged=pl.col("passed").count(), counted=condition.sum()
+    )
+    return counts.with_columns(share=pl.col("counted") / pl.when(judged > 0).then(judged))
+
+
 def _reason(results: Results, key: Key) -> dict[str, Any]:
     if key not in results.failed:
         return {"passed": True, "failure": None}

@@ -137,7 +137,7 @@ def sentences(found: Sequence[VerdictChanges]) -> list[str]:
 def said(found: VerdictChanges) -> str:
     """What changes for a run, in a sentence."""
     first, second = found.suites
-    lost, won = (sum(len(one.members) for one in those) for those in (found.first_only, found.second_only))
+    lost, won = (sum(getattr(task, side) for task in found.tasks) for side in ("first_only", "second_only"))
     if not lost and not won:
         return f"{found.name}: {first} and {second} agree on all of {how_many(found.completions)}."
     passing = lost + sum(task.both for task in found.tasks)

@@ -146,9 +146,8 @@ def _judged(
     engine: OpenEngine,
 ) -> Iterator[JudgedRow]:
     """Judge completions, in a run if there is one to keep the rows."""
-    from codebotler.core.files import to_line
-    from roboeval.evaluation import judge
     from roboeval.evaluation.evaluate import evaluate_run
+    from roboeval.evaluation.judge import judgements, row_line
     from roboeval.evaluation.runs.rows import judged_row
 
     if run is not None:
@@ -156,8 +155,8 @@ def _judged(
         return evaluate_run(
             run, suite, ablated=ablated, tasks=tasks, redo=redo, engine=engine, completions=completions
         )
-    rows = judge.evaluate(source.of(tasks), suite, ablated=ablated, engine=engine)
-    return (judged_row(to_line(row)) for row in rows)
+    told = judgements(source.of(tasks), suite, ablated=ablated, engine=engine)
+    return (judged_row(row_line(completion, one)) for completion, one in told if one is not None)
 
 
 def import_(

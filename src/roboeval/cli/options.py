@@ -185,7 +185,7 @@ def open_run(
 ) -> Opened:
     """Read a judged run; `see` is called with each line of its verdicts.
 
-    With another evaluation of the same run `beside`, its completions are not read again.
+    The completions are taken over from `beside`, another evaluation of the same run.
     """
     from roboeval.evaluation.runs.folder import evaluation_of
     from roboeval.evaluation.runs.results import read_results

@@ -90,7 +90,7 @@ def evaluate(
     """
     chosen = engine or Local(workers, require_isolation=require_isolation)
     told = judgements(completions, suite, ablated=ablated, engine=chosen)
-    return (evaluation(completion, one) for completion, one in told if one is not None)
+    return (json.loads(row_line(completion, one)) for completion, one in told if one is not None)
 
 
 def judgements(
@@ -154,14 +154,8 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
         return None
 
 
-def evaluation(completion: Completion, told: bytes) -> Row:
-    """The row of an evaluation for a completion whose judgement is given as JSON."""
-    row: Row = json.loads(row_line(completion, told))
-    return row
-
-
 def row_line(completion: Completion, told: bytes) -> bytes:
-    """The same as a line."""
+    """The row of an evaluation for a completion whose judgement is given as JSON, as a line."""
     of_whom = {
         "task": completion.task,
         "prompt": completion.prompt,

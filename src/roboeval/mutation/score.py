@@ -105,7 +105,7 @@ class MutationScore:
                 {"original": original.name, "world": fault.world, "why": fault.why}
                 for original, fault in self.wrong
             ],
-            **{status.name.lower(): self.count(status) for status in MutantStatus},
+            **{status.value.replace(" ", "_"): self.count(status) for status in MutantStatus},
             "score": self.score,
             "score_of_all": self.score_of_all,
         }

@@ -84,14 +84,15 @@ def read_prices(texts: Sequence[str]) -> dict[str, Price]:
     prices: dict[str, Price] = {}
     for text in texts:
         model, _, numbers = text.rpartition("=")
+        try:
+            price = Price.read(numbers)
+        except ValueError:
+            price = None
+        if price is None or not model:
+            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, each for a million tokens')
         if model in prices:
             raise UserError(f'--price names "{model}" twice; give one price')
-        try:
-            prices[model] = Price.read(numbers)
-        except ValueError:
-            model = ""
-        if not model:
-            raise UserError(f'"{text}" is not a price; write MODEL=INPUT/OUTPUT, each for a million tokens')
+        prices[model] = price
     return prices
 
 

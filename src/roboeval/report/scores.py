@@ -7,7 +7,14 @@ from itertools import chain, combinations
 
 from codebotler.core.errors import UserError
 from roboeval.analysis.compare import compared, unlike, verdict
-from roboeval.analysis.metrics import by_formula, share_at_least, threshold_curve
+from roboeval.analysis.metrics import (
+    by_formula,
+    judged_count,
+    overall,
+    prompts_of,
+    share_at_least,
+    threshold_curve,
+)
 from roboeval.analysis.statistics import FEW, by_bootstrap
 from roboeval.report import figures, paper
 from roboeval.report.runs import JudgedRun, tasks_of
@@ -27,10 +34,11 @@ def overall_sheet(runs: Sequence[JudgedRun]) -> Sheet:
     rows: list[list[Cell]] = []
     for run in runs:
         tasks = [[prompt.pass_at(1) for prompt in score.prompts] for score in run.scores]
-        prompts = [[value] for values in tasks for value in values]
-        found = [by_formula(prompts), by_formula(tasks), by_bootstrap(tasks)]
+        found = [overall(run.scores, 1), by_formula(tasks), by_bootstrap(tasks)]
         ends = [end for estimate in found for end in (estimate.low, estimate.high)]
-        rows.append([run.name, run.completions.height, len(prompts), len(tasks), found[0].mean, *ends])
+        prompts = prompts_of(run.scores)
+        counts = judged_count(prompts), len(prompts), len(tasks)
+        rows.append([run.name, *counts, found[0].mean, *ends])
     return sheet("overall", rows, notes=[*_few_tasks(runs), *_unfinished(runs)])
 
 
@@ -44,7 +52,7 @@ def _few_tasks(runs: Sequence[JudgedRun]) -> list[str]:
 
 
 def _unfinished(runs: Sequence[JudgedRun]) -> list[str]:
-    counts = [(run.name, run.completions.height, run.results.scope.total) for run in runs]
+    counts = [(run.name, judged_count(prompts_of(run.scores)), run.results.scope.total) for run in runs]
     return [
         f"{name}: only {count:,} of {total:,} completions are judged, and only these count."
         for name, count, total in counts

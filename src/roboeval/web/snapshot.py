@@ -21,6 +21,7 @@ from roboeval.analysis.metrics import (
     task_scores,
 )
 from roboeval.analysis.summary import Failures, failures
+from roboeval.analysis.tasks import prompt_counts
 from roboeval.evaluation.runs.completions import KEY, Key
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.table import storable
@@ -39,7 +40,7 @@ MOST = 2**63
 
 @dataclass(frozen=True)
 class Filter:
-    """Which completions are meant, by columns of the table that addresses of the pages and the API name."""
+    """Which completions are meant, as addresses of the pages and of the API say it: values by column."""
 
     task: Annotated[str | None, Query(description="Only of this task.")] = None
     prompt: Annotated[
@@ -135,14 +136,7 @@ class Snapshot:
 
     def prompts(self, chosen: Filter) -> list[dict[str, Any]]:
         """All prompts, and how many completions are `written`, `judged` and `counted` (meant by a filter)."""
-        judged = pl.col("judged")
-        counts = self.completions.group_by("task", "prompt", maintain_order=True).agg(
-            written=pl.col("written").sum(),
-            judged=pl.col("passed").count(),
-            counted=chosen.verdict.condition.sum(),  # whatever its task and prompt
-        )
-        share = pl.col("counted") / pl.when(judged > 0).then(judged)  # null where nothing was judged
-        return counts.with_columns(share=share).to_dicts()
+        return prompt_counts(self.completions, chosen.verdict.condition).to_dicts()  # whatever its prompt
 
     @property
     def judged(self) -> int:

@@ -45,7 +45,7 @@ def knowing(rooms: object, here: object = "") -> Callable[[str, str], Result]:
 )
 def test_answer_that_is_none_is_said_before_the_robot_moves(rooms: object, here: object, named: str) -> None:
     with pytest.raises(NotReadyError, match=named):
-        preflight(Answering(knowing(rooms, here)))
+        preflight(Answering(knowing(rooms, here)), print)
 
 
 def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
@@ -56,15 +56,15 @@ def test_rooms_are_known_from_a_robot_that_does_not_know_where_it_is(
             raise RobotError("GetCurrentLocationFailed", "not localised")
         return ["hall", "lab"]
 
-    plan, place = preflight(Answering(answers))
+    plan, place = preflight(Answering(answers), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab"), "hall", "")
-    assert re.fullmatch(r"[^\n]*where it is\b[^\n]*: not localised\n", capsys.readouterr().err)
+    assert re.fullmatch(r"[^\n]*where it is\b[^\n]*: not localised\n", capsys.readouterr().out)
 
 
 def test_robot_that_somebody_stops_before_it_moves_is_not_ready() -> None:
     with pytest.raises(NotReadyError, match=r"rooms .*stopped"):
-        preflight(Answering(raising(CancelledError())))
+        preflight(Answering(raising(CancelledError())), print)
 
 
 @pytest.mark.parametrize("fault", [None, ImportError("a library failed to import")])
@@ -123,7 +123,7 @@ def nobody(_name: str) -> Writing:
 
 
 def test_a_check_sees_the_robots_own_words() -> None:
-    plan, place = preflight(Answering(knowing(["hall", LAB], LAB)))
+    plan, place = preflight(Answering(knowing(["hall", LAB], LAB)), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", LAB), LAB, LAB)
     assert check(TO_THE_LAB, room_map=plan).problems == ()
@@ -149,7 +149,7 @@ def test_a_model_is_told_the_robots_own_words(
 def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
     robot = Simulated(World((Room("hall"), Room("kitchen|cafe")), "hall"), speed=None)
     robot.connect()
-    plan, _ = preflight(robot)
+    plan, _ = preflight(robot, print)
     assert plan is not None
     assert plan.room("the cafe") == "kitchen|cafe"
 
@@ -157,16 +157,16 @@ def test_rooms_of_the_simulated_robot_are_regexes_as_in_its_world() -> None:
 def test_robot_is_where_it_says_even_if_it_does_not_list_that_room(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    plan, place = preflight(Answering(knowing(["hall", "lab"], "dock")))
+    plan, place = preflight(Answering(knowing(["hall", "lab"], "dock")), print)
     assert plan is not None
     assert (plan.rooms, plan.start, place) == (("hall", "lab", "dock"), "dock", "dock")
-    assert '"dock"' in capsys.readouterr().err
+    assert '"dock"' in capsys.readouterr().out
     starts_there = 'def task_program():\n    if get_current_location() != "dock":\n        raise ValueError\n'
     assert check(starts_there, room_map=plan).problems == ()
 
 
 def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
-    plan, place = preflight(Answering(knowing(["hall", "lab"])))
+    plan, place = preflight(Answering(knowing(["hall", "lab"])), print)
     assert plan is not None
     assert (plan.start, place) == ("hall", "")
 
@@ -174,10 +174,10 @@ def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
 def test_more_rooms_than_a_check_takes_are_said(capsys: pytest.CaptureFixture[str]) -> None:
     rooms = [f"room {number} (of many)" for number in range(100_000)]
     began = time.monotonic()
-    assert preflight(Answering(knowing(rooms, rooms[7]))) == (None, rooms[7])
+    assert preflight(Answering(knowing(rooms, rooms[7])), print) == (None, rooms[7])
     assert time.monotonic() - began < 2, "that is no more than a look at each"
-    assert re.search(r"\b100,000 rooms\b.*\b1,000\b", capsys.readouterr().err)
-    plan, _ = preflight(Answering(knowing(rooms[:1_000], rooms[7])))
+    assert re.search(r"\b100,000 rooms\b.*\b1,000\b", capsys.readouterr().out)
+    plan, _ = preflight(Answering(knowing(rooms[:1_000], rooms[7])), print)
     assert plan is not None
     assert len(plan.rooms) == 1_000
 

@@ -19,10 +19,10 @@ from codebotler.rtl.reasoning import (
     distinguishing_trace,
     is_implied,
     is_satisfiable,
+    samples,
     satisfying_trace,
 )
 from codebotler.rtl.reasoning.automaton import Automaton
-from codebotler.rtl.reasoning.regex_samples import samples
 from codebotler.rtl.reasoning.sample_strings import can_match, distinct_strings
 
 SPEAKS, GOES, STAYS = map(

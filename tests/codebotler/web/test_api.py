@@ -65,6 +65,16 @@ def stream(server: PageServer, mission: str, last: int = 0) -> list[tuple[int, d
     return found
 
 
+def test_where_a_program_failed_is_told(server: PageServer) -> None:
+    fails = "def task_program():\n    go_to('kitchen')\n    raise ValueError('odd')\n"
+    view = begun(server, fails)
+    approval = {"program": view["digest"], "despite_problems": True}
+    assert server.call("POST", f"/api/missions/{view['id']}/approve", approval).status == 200
+    over = until(server, lambda now: now["is_over"])
+    assert (over["state"], over["line"]) == ("failed", 3)
+    assert "odd" in over["reason"]
+
+
 def test_a_mission_from_its_program_to_its_files(server: PageServer) -> None:
     view = begun(server, HELLO)
     approval = {"program": view["digest"]}

@@ -102,6 +102,11 @@ def test_the_command(runs: Path) -> None:
     failed = sum(not one["passed"] for one in data["found"])
     assert sum(group["size"] for group in data["groups"]) == failed > 0
     assert all(group["why"] for group in data["groups"])
+    counts = [row.split()[1:3] for row in roboeval("find", runs).out.splitlines() if "world 1" in row]
+    assert [sum(map(int, column)) for column in zip(*counts, strict=True)] == [
+        len(data["found"]),
+        len(data["found"]) - failed,
+    ]
     few = roboeval("find", runs, "--groups", "1").out
     assert "--groups" in few
 

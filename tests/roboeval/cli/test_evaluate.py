@@ -661,7 +661,7 @@ def test_a_table_with_costs(tmp_path: Path) -> None:
         one["index"]: one["cost"] for one in csv.DictReader((tmp_path / "t.csv").read_text().splitlines())
     }
     assert costs == {"0": "0.0045", "1": ""}
-    for price in ("3", "3/15/1", "a/b", "-1/2", "nan/1"):
+    for price in ("3", "3/15/1", "a/b", "-1/2", "nan/1", "1/1000000"):
         assert price in refused("export", "run", "--price", price, cwd=tmp_path).sentence
 
 

@@ -5,16 +5,11 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from command_line import refused, roboeval
-from roboeval.cli.options import open_current
-from roboeval.cli.report import judged_run
-from roboeval.evaluation.runs.completions import Completion, read_completions
 from seals import unseal
 
 
@@ -52,25 +47,30 @@ def test_a_report_of_two_runs(runs: Path) -> None:
         assert (runs / file).read_bytes() == (runs / "first" / file).read_bytes(), file
 
 
-def test_completions_are_read_once_for_all_evaluations(
-    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+COUNTING = """
+import sys
+from collections import Counter
+from roboeval.cli.app import main
+
+opened = Counter()
+sys.addaudithook(lambda event, told: event == "open" and opened.update([str(told[0]).rpartition("/")[2]]))
+try:
+    main()
+finally:
+    print([opened[name] for name in ("completions.jsonl", "run.json")], file=sys.stderr)
+"""
+
+
+@pytest.mark.parametrize(
+    "command", ["report run --out report --beside plus", "compare run --suites paper,plus", "show run"]
+)
+def test_completions_are_read_once_for_all_evaluations(command: str, runs: Path, tmp_path: Path) -> None:
     shutil.copytree(runs / "hasty", tmp_path / "run")
     for other in (("--ablation",), ("--suite", "plus")):
         assert roboeval("evaluate", "run", *other, cwd=tmp_path).status == 0
-    reads: list[Path] = []
-
-    def counted(path: Path, **how: Any) -> Iterator[Completion]:  # noqa: ANN401 - as it is called
-        reads.append(path)
-        return read_completions(path, **how)
-
-    monkeypatch.setattr("roboeval.evaluation.runs.results.read_completions", counted)
-    results = open_current(tmp_path / "run", "paper", ablated=False).results
-    read = judged_run(results, "paper", beside="plus", engine=None)
-    assert reads == [tmp_path / "run" / "completions.jsonl"]
-    assert read.ablated is not None
-    assert read.beside is not None
-    assert (len(read.ablated.places), len(read.beside.places)) == (20, 40)  # one task has no ablation
+    code = [sys.executable, "-c", COUNTING, *command.split()]
+    ended = subprocess.run(code, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert ended.stderr.splitlines()[-1] == "[1, 1]"
 
 
 def test_an_unfinished_run_is_reported_as_far_as_it_goes(runs: Path) -> None:

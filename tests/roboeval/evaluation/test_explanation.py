@@ -16,13 +16,13 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.core.world import Person, Room, World
 from codebotler.rtl import Explanation, Formula, explain, parse
 from codebotler.simulator.rules import Rules
-from made_results import results_of
+from made_results import results_of, row_of
 from roboeval.analysis.tasks import prompt_data, task_data
 from roboeval.cli.views.completions import completion_view as view_of_completion
 from roboeval.cli.views.completions import prompt_view
 from roboeval.cli.views.results import task_view
 from roboeval.evaluation.explanation import completion_data
-from roboeval.evaluation.judge import evaluation, judge, judgement
+from roboeval.evaluation.judge import judge, judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.results import Results
 from roboeval.evaluation.runs.rows import RowData
@@ -72,7 +72,7 @@ def completion(index: int = 0, program: str = "x = 1\ny = 2\n", **fields: Any) -
 def row(written: Completion, *outcomes: Outcome, ablated: bool = False) -> dict[str, Any]:
     scenarios = TASK.judged_in(ablated=ablated)
     verdicts = [judge(o, s) for o, s in zip(outcomes, scenarios, strict=False)]
-    return json.loads(json.dumps(evaluation(written, judgement(verdicts))))  # type: ignore[no-any-return]  # JSON
+    return dict(row_of(written, judgement(verdicts)))
 
 
 def failed(status: Status, kind: str, message: str, *events: Event, line: int | None = None) -> Outcome:
@@ -234,7 +234,7 @@ def test_worlds_of_one_name_are_told_apart_by_their_order() -> None:
         SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, ()), Scenario(WORLD, (BIDS,))))}
     )
     verdicts = [judge(MUTE, scenario) for scenario in suite.tasks["Visit"].scenarios]
-    data = completion_data(evaluation(completion(), judgement(verdicts)), completion(), suite)
+    data = completion_data(row_of(completion(), judgement(verdicts)), completion(), suite)
     assert '"bye"' in data["worlds"][1]["failed_checks"][0]["explanation"]
 
 
@@ -273,7 +273,7 @@ def test_a_step_that_an_explanation_names_is_never_left_out() -> None:
     suite = replace(SUITE, tasks={"Visit": replace(TASK, scenarios=(Scenario(WORLD, (once,)),))})
     trace = (*[Event("check", f"n{i}", found=False) for i in range(500)], Event("say", "hm"), *[GOTO] * 100)
     verdict = judge(Outcome(Status.FINISHED, trace), suite.tasks["Visit"].scenarios[0])
-    text = printed(completion_view(evaluation(completion(), judgement([verdict])), completion(), suite))
+    text = printed(completion_view(row_of(completion(), judgement([verdict])), completion(), suite))
     assert '\n     ... 488 more ...\n501      said "hm"\n     ... 94 more ...\n' in text
 
 
@@ -332,7 +332,7 @@ def test_of_very_long_traces_only_the_first_are_explained(monkeypatch: pytest.Mo
     task = replace(TASK, scenarios=tuple(Scenario(replace(WORLD, about=str(n)), (BIDS,)) for n in range(30)))
     suite = replace(SUITE, tasks={"Visit": task})
     verdicts = [judge(Outcome(Status.FINISHED, tuple(told)), s) for s in task.scenarios]
-    one = evaluation(completion(), judgement(verdicts))
+    one = row_of(completion(), judgement(verdicts))
     compared = []
 
     def noting(formula: Formula, trace: Trace) -> Explanation | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from roboeval.evaluation.runs.folder import Run
-from roboeval.web.heat_map import TaskCells, failure_rows, percent, shade
+from roboeval.web.heat_map import TaskCells, failure_rows, failure_text, percent, shade
 from roboeval.web.run_store import RunStore
 from roboeval.web.snapshot import Filter
 
@@ -52,6 +52,12 @@ def test_cells_of_a_run(runs: Path, chosen: Filter, column: str, value: object) 
             assert f"task={task}&prompt={number}" in cell["href"]
         assert mean["text"] == (percent(sum(shares) / len(shares)) if shares else "-")
     assert cells.row("NoTask") == [{"text": "", "shade": "none"}] * 6
+
+
+def test_what_a_filter_counts_is_said_in_words() -> None:
+    assert failure_text(Filter(passed=False)) is None
+    assert failure_text(Filter(failure_class="RobotExecutionError")) == "a robot error"
+    assert failure_text(Filter(failure_class="PythonError", failure_kind="NameError")) == "NameError"
 
 
 def test_kinds_of_failures_by_run(runs: Path) -> None:

@@ -1,8 +1,8 @@
 """The search for a trace on which formulas hold.
 
 Each formula becomes an automaton, and the product of the automata is searched completely. So "there is none"
-is a proof for all sequences, of any length, of events of the alphabet. The only gap is a text unlike every
-sample in the alphabet. Options that are not text are left out.
+is a proof for all sequences, of any length, of events of the alphabet. The only gap is a text that meets
+other conditions together than any in the alphabet does. Options that are not text are left out.
 """
 
 from __future__ import annotations

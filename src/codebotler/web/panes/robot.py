@@ -60,7 +60,7 @@ class RobotPane:
             [f"{progress.clock:.1f} s on the robot's clock"] if progress.moments and progress.clock else []
         )
         self._where.say(" · ".join(where))
-        self._reason.say(view.reason)
+        self._reason.say(view.reason if view.line is None else f"line {view.line}: {view.reason}")
         if self._asking is not None:
             self._asking.show(is_over=view.is_over)
         self._draw_map(view)

@@ -179,7 +179,7 @@ def read_results(
     key: str | None,
     suite: Suite | None = None,
     *,
-    beside: Results | None = None,  # another evaluation of the run, whose completions need no second reading
+    beside: Results | None = None,  # another evaluation of the same run, whose completions are taken over
     keep_failed: bool = True,  # may take much memory
     faults: list[UserError] | None = None,
     see: Callable[[bytes], None] | None = None,  # gets the line of each row

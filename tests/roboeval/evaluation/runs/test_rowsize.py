@@ -12,12 +12,12 @@ from codebotler.core.files import to_line
 from codebotler.core.trace import Event, Outcome, RunError, Status, Trace
 from codebotler.core.world import Room, World
 from codebotler.rtl import parse
-from made_results import table_of
+from made_results import row_of, table_of
 from roboeval.analysis.search import Question, answer
 from roboeval.cli.views.completions import completion_view
 from roboeval.evaluation.explanation import completion_data
 from roboeval.evaluation.failures import Verdict
-from roboeval.evaluation.judge import evaluation, judgement
+from roboeval.evaluation.judge import judgement
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import MOST, MOST_OF_WORLD, Row
 from roboeval.suites.load import Suite, load_suite
@@ -31,7 +31,7 @@ def row(traces: list[Trace], message: str = "no", completion: Completion = WORDY
     error = RunError("K" * 100, message)
     outcomes = [Outcome(Status.PYTHON_ERROR, trace, error, 1) for trace in traces]
     verdicts = [Verdict(f"World {n}", outcome, (), satisfied=False) for n, outcome in enumerate(outcomes)]
-    return evaluation(completion, judgement(verdicts))
+    return row_of(completion, judgement(verdicts))
 
 
 @pytest.mark.parametrize(("worlds", "most"), [(1, MOST), (50, MOST), (80, 80 * MOST_OF_WORLD)])
@@ -82,7 +82,7 @@ def cut_row(suite: Suite) -> Row:
     verdicts = [
         Verdict(s.world.about, o, s.require, satisfied=False) for s, o in zip(scenarios, ended, strict=True)
     ]
-    return evaluation(Completion(task="T", prompt=0, index=0, program="x = 1"), judgement(verdicts))
+    return row_of(Completion(task="T", prompt=0, index=0, program="x = 1"), judgement(verdicts))
 
 
 def test_a_cut_trace_is_said_and_not_explained(suite: Suite) -> None:
