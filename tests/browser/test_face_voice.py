@@ -59,7 +59,7 @@ def test_who_answers_needs_not_hear_the_question_to_its_end(server: PageServer, 
 def test_a_browser_that_waits_for_a_touch_says_so(server: PageServer, opened: OpenPage) -> None:
     """With the browser's own speech synthesis, which nobody hears here."""
     face = face_of(server, opened, script="")
-    expect(face.locator("#hint")).to_have_text("Touch the screen once, so that the robot can be heard.")
+    expect(face.locator("#hint")).to_have_text("Tap the screen once to turn on the sound.")
     size = face.locator("#hint").evaluate("e => parseFloat(getComputedStyle(e).fontSize)")
     assert size >= 30, "it is read from some steps away"
     face.locator("h1").click(force=True)

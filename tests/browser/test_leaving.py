@@ -51,7 +51,7 @@ def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, 
     second.context.close()
     expect(face.locator("#doing")).to_have_text("I was stopped.")
     until_over(server)
-    assert missions(server.home)[-1].reason == "stopped by the last operator, who closed the page"
+    assert missions(server.home)[-1].reason == "stopped by the last operator, closing the page"
 
 
 def test_who_comes_back_in_time_finds_it_running(server: PageServer, opened: OpenPage) -> None:

@@ -76,7 +76,7 @@ def test_from_an_instruction_to_the_end(tmp_path: Path, opened: OpenPage) -> Non
         page = opened(server)
         page.locator(".picks .pick").first.click()
         page.get_by_role("button", name="Write the program").click()
-        expect(page.get_by_text("Recorded: written by people.")).to_be_visible()
+        expect(page.get_by_text("Recorded program, written by a person.")).to_be_visible()
         expect(page.get_by_text("Checked: no problems.")).to_be_visible()
         assert page.locator(".strip .scene").count() > 3
         assert "def task_program" in text_of(page)
@@ -332,9 +332,9 @@ def test_a_stop_is_not_said_to_have_worked_before_it_has(server: PageServer, ope
     answer = {"state": "stopping", "reason": "", "is_over": False}
     page.route("**/api/robot", lambda route: route.fulfill(body=json.dumps(answer)))
     page.locator("#stop").click()
-    expect(page.locator("#stop-told")).to_have_text("Told to stop; it has not stopped yet.")
+    expect(page.locator("#stop-told")).to_have_text("Stopping: the robot has been told.")
     page.wait_for_timeout(500)
-    expect(page.locator("#stop-told")).to_have_text("Told to stop; it has not stopped yet.")
+    expect(page.locator("#stop-told")).to_have_text("Stopping: the robot has been told.")
 
 
 def test_a_tool_that_cannot_be_reached_is_said(server: PageServer, opened: OpenPage) -> None:

@@ -1,4 +1,4 @@
-"""What a check finds: problems, and the runs in sampled worlds that show them."""
+"""What a check finds: `Check`, with its problems and the samples that show them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What sampled worlds show: a program's runs in them, and the problems that these have in common."""
+"""Runs a program in sampled worlds, and groups its failures into problems."""
 
 from __future__ import annotations
 

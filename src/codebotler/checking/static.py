@@ -1,4 +1,4 @@
-"""What the text of a program shows: certain errors, unless they are never reached or are caught."""
+"""Static analysis: certain errors in code that is reached and not guarded."""
 
 from __future__ import annotations
 

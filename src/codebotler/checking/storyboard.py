@@ -1,4 +1,4 @@
-"""A trace for readers: its steps as plain data, and drawn room by room."""
+"""A trace as numbered steps, and as a storyboard on a terminal."""
 
 from __future__ import annotations
 

@@ -44,7 +44,8 @@ def generate(
         int | None, typer.Option(min=0, help="How many times to ask again if the check finds problems.")
     ] = None,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Ask again with the program and its problems; once by default.")
+        bool,
+        typer.Option("--repair", help="Ask with the rejected program and its problems; once by default."),
     ] = False,
     record: Annotated[
         Path | None, typer.Option(help="Add a line of JSON for every attempt to this file.")
@@ -89,7 +90,7 @@ def check(
     samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
     seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Do not assume that what the program never looks for is there.")
+        bool, typer.Option("--strict", help="Draw what the program takes for granted, too.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,

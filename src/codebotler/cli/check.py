@@ -36,7 +36,7 @@ def read_program(name: str) -> str:
         return text
     text = text_of(sys.stdin.buffer.read(MAX_BYTES + 1), INPUT)
     if not text.strip():
-        raise UserError("standard input is empty; pipe a program or a model's reply into it", file=INPUT)
+        raise UserError("is empty; pipe a program or a model's reply into it", file=INPUT)
     return text if TASK in bound_names(text) else program_of(text).source
 
 

@@ -1,4 +1,4 @@
-"""How a command line ends: the exit status, and one sentence for an error that a user can cause."""
+"""Runs a command line, and turns its errors into one sentence and an exit status."""
 
 from __future__ import annotations
 

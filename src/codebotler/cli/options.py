@@ -21,18 +21,18 @@ WorldOption = Annotated[Path | None, typer.Option(help="The world file with the 
 TemperatureOption = Annotated[float, typer.Option(help="The sampling temperature; higher is more random.")]
 TopPOption = Annotated[float, typer.Option(help="The share of likely tokens to sample from (top-p).")]
 MaxTokensOption = Annotated[int, typer.Option(min=1, help="How long a reply may be, in tokens.")]
-SeedOption = Annotated[int | None, typer.Option(help="Fix the random numbers, if the model takes a seed.")]
+SeedOption = Annotated[int | None, typer.Option(help="The random seed, if the model takes one.")]
 TimeoutOption = Annotated[float, typer.Option(help="Seconds that a request may take.")]
 BaseUrlOption = Annotated[
     str | None, typer.Option(help="The address of the model's server, such as http://localhost:8000/v1.")
 ]
-RosPythonOption = Annotated[Path, typer.Option(help="The Python that the robot's ROS belongs to.")]
+RosPythonOption = Annotated[Path, typer.Option(help="The Python of the robot's ROS installation.")]
 ROS_PYTHON = Path("/usr/bin/python3")
 SpeedOption = Annotated[
     float,
     typer.Option(min=0, help="How fast the robot's clock runs, such as 20 times real time; 0: no delays."),
 ]
-AddressOption = Annotated[str, typer.Option(help="The robot's address, if it is not the usual one.")]
+AddressOption = Annotated[str, typer.Option(help="The robot's address, if not the default.")]
 HostOption = Annotated[str, typer.Option(help="The address to listen on; 0.0.0.0 for all.")]
 PortOption = Annotated[
     int | None,

@@ -24,8 +24,8 @@ from codebotler.robots.base import Robot
 
 SIGNALS = {
     signal.SIGINT: "Ctrl-C",
-    signal.SIGTERM: "a signal to end",
-    signal.SIGHUP: "the end of the terminal",
+    signal.SIGTERM: "SIGTERM",
+    signal.SIGHUP: "SIGHUP, since its terminal was closed",
 }
 OF_SIGNALS = 128  # what shells add to the number of a signal, for the status of a process that it ended
 BRIEFLY = 2.0  # seconds in which what has not moved yet is tidied up after Ctrl-C

@@ -1,4 +1,4 @@
-"""The error for whatever a user can cause and mend."""
+"""`UserError`: a mistake that the user can fix, with its file and line."""
 
 from __future__ import annotations
 

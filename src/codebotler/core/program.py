@@ -1,4 +1,4 @@
-"""Robot programs, and what their text says without running it."""
+"""Programs as text: parsing, the skills they call, and what is certainly wrong with them."""
 
 from __future__ import annotations
 

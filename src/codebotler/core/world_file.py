@@ -1,4 +1,4 @@
-"""World files: a world as YAML, alone or inside a task, and what can be wrong with it."""
+"""Reads world files (a world as YAML, alone or inside a task), and says what is wrong with them."""
 
 from __future__ import annotations
 

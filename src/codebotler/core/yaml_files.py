@@ -1,4 +1,4 @@
-"""YAML files, with the line of everything in them for error messages."""
+"""Reads YAML with the line of everything in it, for error messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The robot that a running program calls: logs each skill, and starts none after a stop."""
+"""Between a running program and its robot: logs each skill, and refuses new ones after a stop."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class LiveRobot:
         except CancelledError:
             self._note("cancelled", **which, seconds=round(self.now - started, 3))
             self._check_end()
-            raise RobotLostError("somebody else stopped the robot") from None
+            raise RobotLostError("another client stopped the robot") from None
         self._note("late" if self._stopped.is_set() else "result", **which, result=result)
         self._check_end()
         return result
@@ -152,7 +152,9 @@ def answered(skill: Skill, result: base.Result) -> base.Result:
     """A robot's answer; raises RobotLostError if it does not fit the skill."""
     is_one = isinstance(result, RETURNS.get(skill.returns, object))
     if not is_one or (isinstance(result, list) and not all(isinstance(text, str) for text in result)):
-        raise RobotLostError(f"the robot answers {skill.name} with {result!r:.100}, not {skill.returns}")
+        raise RobotLostError(
+            f"the robot answered {skill.name} with {result!r:.100}, where {skill.returns} is expected"
+        )
     return result
 
 

@@ -1,4 +1,4 @@
-"""What a mission leaves on the disk: one line for each event as it happens, and a summary."""
+"""The files of a mission: a log with a line for each event as it happens, and a summary."""
 
 from __future__ import annotations
 

@@ -217,7 +217,7 @@ class Mission:
             self._wake.wait()
         except BaseException:
             with suppress(MissionError):
-                self.stop("CodeBotler, which was shutting down")
+                self.stop("CodeBotler, shutting down")
             raise
         finally:
             if not self._over.wait(GRACE):
@@ -280,7 +280,7 @@ class Mission:
 
     def _leave(self, error: BaseException | None) -> None:
         if self.state in {State.RUNNING, State.STOPPING}:
-            self.stop("CodeBotler, which was shutting down")
+            self.stop("CodeBotler, shutting down")
         elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
             self.stop("CodeBotler")
         else:
@@ -289,7 +289,7 @@ class Mission:
     def _step(self, to: State, what: str, **changes: object) -> None:
         """Go to a state and log it; the caller has the lock."""
         if to not in STEPS.get(self.state, ()):
-            raise MissionError(f"mission {self.id} is {self.state}, and cannot {what}")
+            raise MissionError(f"mission {self.id} cannot {what}: its state is {self.state}")
         self.summary.state = to
         for name, value in changes.items():
             setattr(self.summary, name, value)

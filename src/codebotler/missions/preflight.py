@@ -48,8 +48,8 @@ def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | No
         return None, place
     if len(rooms) > MOST_ROOMS:
         remark(
-            f"the robot knows {len(rooms):,} rooms, and a check takes {MOST_ROOMS:,} at most: the check uses "
-            "those that the program names instead"
+            f"the robot knows {len(rooms):,} rooms, and a check can handle {MOST_ROOMS:,}; it uses the rooms "
+            "that the program names"
         )
         return None, place
     if place and place not in rooms:

@@ -1,4 +1,4 @@
-"""One mission from an instruction to its end: written, checked, approved, run, stopped.
+"""`MissionSession`: takes one mission from writing through checking and approval to its end.
 
 The command line and the page drive a session, and observe it; it prints nothing and knows no page.
 """
@@ -20,7 +20,7 @@ from codebotler.generation.generate import write_program
 from codebotler.missions.log import STEPS, Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
-from codebotler.missions.view import Order, SessionView, digest
+from codebotler.missions.view import CHECKING, Order, SessionView, digest
 from codebotler.models.base import Model, ModelError
 from codebotler.prompts import prompt_for
 from codebotler.robots.base import NotReadyError, Robot
@@ -100,7 +100,7 @@ class MissionSession:
             if self._view.is_over or not self._view.may_be_edited:
                 raise MissionError("the program cannot be changed now")
             self._edited = program
-            self._change(program=program, author="", busy="checking", **UNCHECKED)
+            self._change(program=program, author="", busy=CHECKING, **UNCHECKED)
 
     def ask_again(self, *, repair: bool) -> None:
         """Have the model write another program; with `repair`, it is shown this one and its problems."""
@@ -255,7 +255,7 @@ class MissionSession:
             if self._edited not in {None, program}:
                 return  # another one was typed meanwhile
             self._edited = None
-            self._change(program=program, busy="checking", trouble="", **UNCHECKED)
+            self._change(program=program, busy=CHECKING, trouble="", **UNCHECKED)
             view = self._view
         try:
             mission.draft(program, view.author)

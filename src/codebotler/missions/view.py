@@ -10,6 +10,8 @@ from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
 from codebotler.simulator.sampled_robot import RoomMap
 
+CHECKING = "checking"  # what a session is busy with
+
 
 @dataclass(frozen=True)
 class Order:

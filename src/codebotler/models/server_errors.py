@@ -1,4 +1,4 @@
-"""What goes wrong between a model and its server, as errors whose sentences hold no keys."""
+"""Failures of a network or a server as errors of a model, without keys in their sentences."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def unreachable(name: str, error: Exception, url: str | None) -> ModelError | No
     failed = next((cause for cause in _causes(error) if type(cause).__name__ == NO_CONNECTION), None)
     if failed is None:
         return None
-    mend = "is there a network?" if url is None else "is the server running, and the base URL right?"
+    mend = "check the network" if url is None else "check that the server runs, and the base URL"
     sentence = f"{name}: no connection to {url or 'its server'} ({brief(failed)}); {mend}"
     return ModelError(sentence, may_pass=True)
 
@@ -50,7 +50,7 @@ def _causes(error: BaseException | None) -> Iterator[BaseException]:
 
 def broken_off(name: str, *, begun: bool) -> ModelError:
     """The error for a stream that ends too early, before or after the reply has begun."""
-    nothing = "the server's response is not a reply; is the base URL right?"
+    nothing = "the server sent no completion; check the base URL"
     return failure(name, "the reply was cut off" if begun else nothing, may_pass=True)
 
 

@@ -1,4 +1,4 @@
-"""From the name of a model to a detector."""
+"""Opens a detector by the name of its model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Robots by the name of their kind, and which kinds work on this machine."""
+"""Opens a robot by its kind, and tells which kinds work on this machine."""
 
 from __future__ import annotations
 

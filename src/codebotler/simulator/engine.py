@@ -1,4 +1,4 @@
-"""Runs many programs in worlds, in isolation, equal pairs once, with outcomes in order."""
+"""Runs programs in worlds, in isolation; equal pairs run once, and results come in order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Draws the facts of a sampled world, such as who is in a room, so that each can be drawn again."""
+"""Draws the facts of sampled worlds, each from its own name, so that they can be drawn again."""
 
 from __future__ import annotations
 

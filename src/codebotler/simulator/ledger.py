@@ -1,4 +1,4 @@
-"""The ledger of a run: what its skills cost, which limit it reached, and how the robot answered."""
+"""The limits of one run: counts what it asks of its robot, and ends it at a limit."""
 
 from __future__ import annotations
 

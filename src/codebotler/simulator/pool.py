@@ -1,4 +1,4 @@
-"""A pool of workers, in threads of this process; one of them is shared and lasts as long as the process."""
+"""A pool of workers in threads of this process, and the one that the whole process shares."""
 
 from __future__ import annotations
 

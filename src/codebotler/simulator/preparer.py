@@ -1,4 +1,4 @@
-"""The engine's handle on the preparer: sends it programs, gets their code back, and which are tame."""
+"""The engine's handle on the preparer: programs go in; their code, and which are tame, come out."""
 
 from __future__ import annotations
 

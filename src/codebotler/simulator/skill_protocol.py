@@ -1,4 +1,4 @@
-"""The protocol of skills: answers what a program asks of its robot, and says how its run ended."""
+"""Serves the skill calls of one program's child, and finds out how the run ended."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.get("/missions/{mission}")
     def show(mission: str) -> dict[str, Any]:
-        """A mission: the one at hand with its check, a past one in short."""
+        """A mission: the current one with its check, or the summary of a past one."""
         view = console.view
         if mission in {HERE, view.id}:
             return view_data(view)
@@ -171,7 +171,7 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/stop", status_code=202)
     async def stop(*, only_moving: bool = False) -> dict[str, Any]:
-        """Stop whatever goes on, or only a robot that runs; says whether there is anything to stop."""
+        """Stop the current mission, or only one whose robot moves; says whether there is any."""
         return {"stopping": console.stop_soon(STOPS, only_moving=only_moving)}
 
 

@@ -65,7 +65,7 @@ class Console:
         session = self._session
         if session is not None:
             if not session.view.is_over:
-                session.stop("CodeBotler, which was shutting down")
+                session.stop("CodeBotler, shutting down")
             session.join(GRACE + 1)
         with self._checking:
             self._held.close()

@@ -1,4 +1,4 @@
-"""What all pages share: the bar and STOP, texts and buttons; and how other packages add pages."""
+"""What all pages share: the bar with STOP, texts that stay texts, and how further pages are added."""
 
 from __future__ import annotations
 

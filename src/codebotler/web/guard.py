@@ -1,4 +1,4 @@
-"""Stands in front of the page and its API: checks hosts, origins, tokens and sizes, and adds headers."""
+"""Middleware: accepts or refuses each request by host, origin, token and size; sets security headers."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
 from codebotler.web.guard import MOST_BYTES, NO_PAGE, REFUSAL, Guard
 
 STATIC = Path(__file__).with_name("static")
-LEAVING = "the last operator, who closed the page"
+LEAVING = "the last operator, closing the page"
 RUNS = Path("runs")
 METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 SOCKETS = "/_nicegui_ws/"
@@ -200,6 +200,6 @@ class _Server(uvicorn.Server):
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         if self._console:
             threading.Thread(
-                target=self._console.stop, args=("CodeBotler, which was shutting down",), daemon=True
+                target=self._console.stop, args=("CodeBotler, shutting down",), daemon=True
             ).start()
         super().handle_exit(sig, frame)

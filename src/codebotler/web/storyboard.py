@@ -1,4 +1,4 @@
-"""What a robot would do in sampled worlds, drawn room by room."""
+"""Storyboards on the page: a strip for each kind of sampled world."""
 
 from __future__ import annotations
 

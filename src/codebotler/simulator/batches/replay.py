@@ -1,4 +1,4 @@
-"""Batches of tame programs: a child runs them, and what it says of them is replayed on robots of our own."""
+"""Replays what a batch wrote down on the engine's own robots, and refuses what does not fit."""
 
 from __future__ import annotations
 

@@ -66,7 +66,11 @@ class ProgramPane:
         self._tell(view, shown)
         self._busy.say(f"{view.busy} …" if view.busy and not view.is_over else "")
         author = view.author
-        what = "Recorded: written by people." if author.startswith("recorded") else f"Written by {author}."
+        what = (
+            "Recorded program, written by a person."
+            if author.startswith("recorded")
+            else f"Written by {author}."
+        )
         self._writer.say(what if author and view.program else "")
         self._show_verdict(view)
         self._show_approval(view)
@@ -95,7 +99,7 @@ class ProgramPane:
         if typed is None:
             self._restore(f"A program has at most {MOST_PROGRAM:,} characters.")
         elif event.args["base"] != current:
-            self._restore("Another person changed the program meanwhile; your last edit was dropped.")
+            self._restore("Another person changed the program meanwhile; your last edit was discarded.")
         elif typed != current:
             self._try(lambda: self._console.edit(typed))
         self.show(self._console.view)

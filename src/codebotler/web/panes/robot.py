@@ -7,7 +7,7 @@ from nicegui import ui
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import State
 from codebotler.missions.progress import Moment
-from codebotler.missions.view import SessionView
+from codebotler.missions.view import CHECKING, SessionView
 from codebotler.web.console import Console
 from codebotler.web.floorplan import floorplan
 from codebotler.web.frame import Button, PlainText
@@ -51,6 +51,8 @@ class RobotPane:
         headline = HEADLINES.get(state) or str(state).capitalize()
         if state is None and view.busy and not view.is_over:
             headline = "Starting"
+        elif view.busy == CHECKING:
+            headline = "The program is being checked"
         self._state.say(headline)
         self._state.classes(replace=f"headline {state or 'none'}")
         doing = progress.doing

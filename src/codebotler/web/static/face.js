@@ -109,7 +109,7 @@ async function answer(question, position) {
     const body = JSON.stringify({ question: question.number, option: position });
     const headers = { "Content-Type": "application/json" };
     const reply = await fetch("/api/face/answer", { method: "POST", headers, body });
-    if (!reply.ok) told = `Not taken: ${(await reply.json()).detail}`;
+    if (!reply.ok) told = `The answer was not accepted: ${(await reply.json()).detail}`;
   } catch {
     told = LOST;
   }

@@ -6,7 +6,7 @@
   const LOST = "The tool cannot be reached. Use the robot's emergency stop.";
   const ENDS = {
     stopped: "The robot has stopped.",
-    done: "The mission had ended by itself.",
+    done: "The mission had already ended.",
     interrupted: "The mission was interrupted.",
     null: "It was stopped before it began.",
   };
@@ -38,7 +38,7 @@
       if (!answer.ok) throw new Error(answer.status);
       const { stopping } = await answer.json();
       if (stopping) {
-        say("Told to stop; it has not stopped yet.", "busy");
+        say("Stopping: the robot has been told.", "busy");
         await watch(which);
       } else if (!onlyMoving) {
         say("Nothing is running.");
