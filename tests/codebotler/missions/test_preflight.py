@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+import rich.progress  # noqa: F401 - by now, since an interrupt in the middle of an import leaves a file open
 
 from codebotler.checking.check import check
 from codebotler.cli.run import Request
