@@ -121,9 +121,9 @@ def busy(doing: str) -> Iterator[None]:
     line = Timer(QUIET_S, note, [f"{doing} ..."])
     with progress(SpinnerColumn(), TextColumn(doing, markup=False), TimeElapsedColumn()) as shown:
         shown.add_task(doing)
-        if shown.disable:
-            line.start()
         try:
+            if shown.disable:
+                line.start()
             yield
         finally:
             line.cancel()
