@@ -8,7 +8,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from itertools import chain
 from os import PathLike
 from statistics import fmean
@@ -76,14 +76,20 @@ class Share:
     kept: float  # of the others, halved by an error
 
     @classmethod
-    def of(cls, outcome: Outcome, scenario: Scenario) -> Share:
-        """The share of a run in a world."""
+    def of(cls, outcome: Outcome, scenario: Scenario, at_start: Sequence[bool]) -> Share:
+        """The share of a run in a world, of whose requirements some were met at the start."""
         gained: list[bool] = []
         kept: list[bool] = []
-        for requirement in scenario.require:
-            (kept if is_met(requirement, ()) else gained).append(is_met(requirement, outcome.trace))
+        for requirement, was_met in zip(scenario.require, at_start, strict=True):
+            (kept if was_met else gained).append(is_met(requirement, outcome.trace))
         whole = 1.0 if may_satisfy(outcome, scenario) else ERRED
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
+
+
+@lru_cache(maxsize=1_000)
+def met_at_start(suite: Suite, task: str) -> list[list[bool]]:
+    """Whether each requirement of each world is met before the robot has done anything."""
+    return [[is_met(one, ()) for one in scenario.require] for scenario in suite.tasks[task].scenarios]
 
 
 def total(shares: Sequence[Share]) -> float:
@@ -143,10 +149,8 @@ def judged(suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
     scenarios = suite.tasks[task].scenarios
     robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario in scenarios]
     ran = shared_pool().here().run_all([(program, robots) for program in programs])
-    return [
-        total([Share.of(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
-        for outcomes in ran
-    ]
+    starts = met_at_start(suite, task)
+    return [total([*map(Share.of, outcomes, scenarios, starts)]) for outcomes in ran]
 
 
 REWARDS = Rewards()

@@ -23,7 +23,7 @@ from codebotler.simulator.isolated_process import ONE_AT_A_TIME
 from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
-from roboeval.evaluation.judge import evaluate
+from roboeval.evaluation.judge import evaluate, is_met
 from roboeval.evaluation.rewards import Share, batches, reward, total
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import Suite, load_suite
@@ -82,11 +82,12 @@ def test_what_was_let_be_only_scales_what_was_gained(paper: Suite) -> None:
         'says_nothing_like_it("amy")',
     ]
     trace = (Event("goto", "sam's lab"), Event("say", "good day"), Event("goto", "amy's lab"))
-    share = Share.of(Outcome(Status.FINISHED, trace), scenario)
+    at_start = [is_met(requirement, ()) for requirement in scenario.require]
+    share = Share.of(Outcome(Status.FINISHED, trace), scenario, at_start)
     assert share == Share(gained=1 / 2, kept=2 / 3)
     stopped = Outcome(Status.TIMEOUT, trace, RunError("TimeoutError", "an hour"))
-    assert Share.of(stopped, scenario) == Share(gained=1 / 2, kept=1 / 3)
-    assert Share.of(Outcome(Status.FINISHED, ()), scenario) == Share(gained=0.0, kept=1.0)
+    assert Share.of(stopped, scenario, at_start) == Share(gained=1 / 2, kept=1 / 3)
+    assert Share.of(Outcome(Status.FINISHED, ()), scenario, at_start) == Share(gained=0.0, kept=1.0)
 
 
 def test_a_world_that_only_asks_to_let_something_be_counts_as_the_others_do() -> None:

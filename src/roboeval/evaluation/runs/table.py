@@ -8,7 +8,6 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, NamedTuple, TypeVar
 
-import numpy as np
 import polars as pl
 
 from codebotler.core.errors import UserError
@@ -162,7 +161,7 @@ class TableBuilder:
     def _store(self) -> None:
         completions = pl.DataFrame(self._rows, schema=dict(COMPLETION_COLUMNS), orient="row")
         worlds = pl.DataFrame(self._worlds, schema=dict(WORLD_COLUMNS), orient="row")
-        each = np.repeat(np.arange(len(self._counts)), self._counts)
+        each = [number for number, count in enumerate(self._counts) for _ in range(count)]
         self._frame.vstack(completions[each].hstack(worlds), in_place=True)
         self._start()
 
