@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.check import check
+from codebotler.checking.storyboard import step_text, steps_of
 from codebotler.core.errors import UserError
 from codebotler.core.program import Flaw, Program
-from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable
+from codebotler.core.skills import SKILLS, Parameter, Recording, RosAction, Skill, SkillTable, Verb
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, trace_data, trace_from
 from codebotler.core.world import Person, Room, World
 from codebotler.prompts import prompt_for
@@ -48,6 +49,23 @@ def test_simulated_robot_performs_it() -> None:
     robot.perform("go_to", ["lab"])
     robot.perform("wave", ["alice"])
     assert robot.trace == (Event("wave", "alice"), Event("goto", "lab"), Event("wave", "alice"))
+
+
+def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> None:
+    verb = Verb("open", "opens", "opened", "opening", results=("it would not move", "it moved"))
+    row = Skill("open_door", (Parameter("door"),), "bool", "Open it.", Recording("open", "door"), verb=verb)
+
+    def open_door(robot: SimulatedRobot, door: str) -> bool:
+        robot.record("open", door)
+        return door == "glass door"
+
+    table, does = SKILLS.with_skill(row), {**BEHAVIOURS, "open_door": open_door}
+    robot = SimulatedRobot(WORLD, skills=table, behaviours=does)
+    assert [robot.perform("open_door", [door]) for door in ("glass door", "gate")] == [True, False]
+    assert [(event.text, event.found) for event in robot.trace] == [("glass door", True), ("gate", False)]
+    robot.perform("say", ["done"])
+    assert robot.trace[-1].found is None
+    assert str(step_text(steps_of(robot.trace)[1])) == 'open "gate"'
 
 
 PROGRAMS = {

@@ -90,7 +90,7 @@ def check(
     samples: Annotated[int, typer.Option(min=1, max=10_000, help="How many worlds to imagine.")] = 5,
     seed: Annotated[int, typer.Option(help="The random seed of the imagined worlds.")] = 0,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Draw what the program takes for granted, too.")
+        bool, typer.Option("--strict", help="Also vary what the program takes for granted.")
     ] = False,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
     workers: Annotated[int, typer.Option(min=1, help="How many programs to run at the same time.")] = 1,

@@ -280,7 +280,7 @@ class MissionSession:
     # --- what observers see
 
     def _remark(self, sentence: str) -> None:
-        assert self._mission is not None, "the robot is asked for a mission"
+        assert self._mission is not None, "it has begun when the robot is asked"
         self._mission.note(sentence)
         self._show(remarks=(*self._view.remarks, sentence))
 

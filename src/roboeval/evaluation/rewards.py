@@ -86,7 +86,7 @@ class Share:
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
 
 
-@lru_cache(maxsize=1_000)
+@lru_cache(maxsize=32)  # tasks of a suite, twice
 def met_at_start(suite: Suite, task: str) -> list[list[bool]]:
     """Whether each requirement of each world is met before the robot has done anything."""
     return [[is_met(one, ()) for one in scenario.require] for scenario in suite.tasks[task].scenarios]

@@ -38,8 +38,8 @@ def _named(
         "object or person": [*objects, *people, *ANYBODY],
     }
     for element in elements(requirement.formula):
-        if (what := SKILLS.recordings[element.kind].names) in there:
-            known = there[what]
+        what = SKILLS.recordings[element.kind].names
+        if (known := there.get(what)) is not None:
             found = (one for pattern in patterns(element.text) for one in _alternatives(pattern))
             yield from ((what, one, known) for one in found)
         else:

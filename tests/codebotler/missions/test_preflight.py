@@ -17,9 +17,10 @@ from codebotler.checking.check import check
 from codebotler.cli.run import Request
 from codebotler.cli.run import run as run_mission
 from codebotler.core.world import Room, World
-from codebotler.missions.log import State
+from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import preflight, unknown_rooms
+from codebotler.missions.store import missions
 from codebotler.models.base import Heard, Reply, Usage, unheard
 from codebotler.prompts import Prompt
 from codebotler.robots.base import CancelledError, NotReadyError, Result
@@ -164,6 +165,17 @@ def test_robot_is_where_it_says_even_if_it_does_not_list_that_room(
     assert '"dock"' in capsys.readouterr().out
     starts_there = 'def task_program():\n    if get_current_location() != "dock":\n        raise ValueError\n'
     assert check(starts_there, room_map=plan).problems == ()
+
+
+def test_what_is_odd_about_a_robot_is_told_to_who_runs_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "go.py").write_text("def task_program():\n    say('hello')\n")
+    robot = Answering(knowing(["hall", "lab"], "dock"))
+    assert run_mission(robot, Request(str(tmp_path / "go.py"), yes=True), tmp_path, nobody) == 0
+    assert '"dock"' in capsys.readouterr().err
+    (mission,) = missions(tmp_path)
+    assert any('"dock"' in line.get("text", "") for line in events_of(tmp_path / "missions" / mission.id))
 
 
 def test_robot_that_does_not_know_where_it_is_is_nowhere() -> None:
