@@ -13,11 +13,14 @@ from codebotler.rtl.pattern import compile_regex
 from codebotler.rtl.reasoning.regex_samples import Tree, inner_trees, parse_tree, spelled
 
 SIZES = (10, 14, 20, 28, 100, 300, 1_000, 10_000)  # of texts, in characters
-FACTOR = 3
-LINEAR = 5.5  # times as long for a text `FACTOR` times as long; 9 would be quadratic
+FACTOR = 3  # how much longer one text is than another, about
+LINEAR = 1.8  # times as long as a text so much longer should take; 3 would be quadratic
 
 FLOOR = 0.001  # seconds below which a measurement says nothing
+WIDE, CLEAR = 100, 0.005  # the same from so many characters on: what looks at a few around each is linear
 ENOUGH = 0.02  # seconds beyond which no longer text is needed
+LONG = 0.1  # seconds beyond which a measurement is hardly disturbed
+TRIES = 10  # of a shorter one that seems to be superlinear
 MOST = 40  # texts that are tried with a regex
 MANY = 50  # repetitions from which a repeat counts as endless
 
@@ -43,14 +46,20 @@ class Attack(NamedTuple):
 def is_superlinear(read: Callable[[str], object], attack: Attack) -> bool:
     """Whether a function takes more than linear time to read a text as it grows."""
     for size in SIZES:
-        spent = _seconds(read, attack.text(size))
-        if spent < FLOOR:
+        short, long = attack.text(size // FACTOR), attack.text(size)
+        most = LINEAR * len(long) / len(short)
+        spent = _seconds(read, long)
+        floor = FLOOR if size < WIDE else CLEAR
+        if spent < floor:
             continue
-        shorter = _seconds(read, attack.text(size // FACTOR))
-        if spent > LINEAR * shorter:  # or the machine was busy
-            shorter = min(shorter, *(_seconds(read, attack.text(size // FACTOR)) for _ in range(2)))
-            spent = min(spent, *(_seconds(read, attack.text(size)) for _ in range(2)))
-            if spent > max(FLOOR, LINEAR * shorter):
+        before = _seconds(read, short)
+        for _ in range(TRIES if spent < LONG else 2):  # the machine may have been busy
+            if spent <= max(floor, most * before):
+                break
+            before = min(before, _seconds(read, short))
+            spent = min(spent, _seconds(read, long))
+        else:
+            if spent > max(floor, most * before):
                 return True
         if spent > ENOUGH:
             return False
