@@ -73,6 +73,11 @@ class Search:
                 yield from future.result()
 
 
+def looked_at(table: pl.DataFrame, task: str | None) -> int:
+    """How many judged completions a question is about, of one task or of all."""
+    return completions_of(table if task is None else table.filter(task=task)).height
+
+
 def found_by_task(found: Sequence[Found], table: pl.DataFrame) -> pl.DataFrame:
     """How many completions of each `task` were `found`, and how many of these `passed`."""
     keys = pl.DataFrame(

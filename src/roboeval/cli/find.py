@@ -52,8 +52,7 @@ def find(
     It takes the completions that did something in some world, and groups those that fail by reason.
     """
     from roboeval.analysis.cluster import cluster_data, clusters, groups
-    from roboeval.analysis.metrics import completions_of
-    from roboeval.analysis.search import Question, Search, found_by_task
+    from roboeval.analysis.search import Question, Search, found_by_task, looked_at
     from roboeval.cli.views.groups import found_view
     from roboeval.evaluation.runs.completions import how_many
     from roboeval.evaluation.runs.folder import Run, as_judged
@@ -69,8 +68,6 @@ def find(
     every = list(watched(searching.found(), "looking", len(results.places)))
     found = [one for one in every if one.worlds]
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
-    asked_of = results.table if task is None else results.table.filter(task=task)
-    total = completions_of(asked_of).height
     together = groups(failed, results.programs)
     shown = together if json else together[:most]
     telling = clusters(shown, results)
@@ -78,16 +75,14 @@ def find(
     undecided = [one for one in every if one.undecided]
     if undecided:
         note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")
+    total, passed = looked_at(results.table, task), {*results.passed}
     if json:
-        passed = {*results.passed}
-        print_json(
-            {
-                "looked_at": total,
-                "found": [found_data(one, one.worlds, passed) for one in found],
-                "undecided": [found_data(one, one.undecided, passed) for one in undecided],
-                "groups": list(map(cluster_data, told)),
-            }
-        )
+        data = {
+            "looked_at": total,
+            "found": [found_data(one, one.worlds, passed) for one in found],
+            "undecided": [found_data(one, one.undecided, passed) for one in undecided],
+        }
+        print_json({**data, "groups": list(map(cluster_data, told))})
     else:
         counts = found_by_task(found, results.table)
         print_rich(found_view(found, counts, total, told, groups=len(together)))
