@@ -70,8 +70,7 @@ def find(
     failed = [results.failed_row(one.key) for one in found if one.key in results.failed]
     together = groups(failed, results.programs)
     shown = together if json else together[:most]
-    telling = clusters(shown, results)
-    told = list(watched(telling, "comparing", len(shown)))
+    told = list(watched(clusters(shown, results), "comparing", len(shown)))
     undecided = [one for one in every if one.undecided]
     if undecided:
         note(f"undecided, since their traces were too long to keep: {how_many(len(undecided))}")

@@ -79,6 +79,13 @@ def going(does: Callable[[], object]) -> Iterator[list[object]]:
     assert not thread.is_alive()
 
 
+@pytest.mark.parametrize("are_regexes", [True, False])
+def test_its_rooms_are_what_those_of_the_other_robot_are(are_regexes: bool) -> None:  # noqa: FBT001 - a parameter
+    inner = Answering()
+    inner.rooms_are_regexes = are_regexes
+    assert RobotWithFace(inner, Face()).rooms_are_regexes is are_regexes
+
+
 def test_what_is_spoken_goes_to_the_face_and_all_else_to_the_robot() -> None:
     inner, face = Answering(lambda skill, _: ["hall"] if skill == "get_all_rooms" else None), Face()
     robot = RobotWithFace(inner, face)
