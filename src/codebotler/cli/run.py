@@ -130,14 +130,13 @@ def _watched(session: MissionSession, view: SessionView, robot: Robot, request: 
         session.on_event = watcher
         with suppress(MissionError):  # it was stopped before it could run
             session.approve(view.digest, despite_problems=request.despite_problems)
-        session.wait_until(lambda _: False)
+        view = session.wait_until(lambda _: False)
     if session.error is not None:
         raise session.error
-    assert session.mission is not None, "it has run"
-    print_rich(ending(session.mission.summary))
-    if session.mission.state is State.STOPPED and got:
+    print_rich(ending(view))
+    if view.state is State.STOPPED and got:
         return OF_SIGNALS + got[0]
-    return 0 if session.mission.state is State.DONE else 1
+    return 0 if view.state is State.DONE else 1
 
 
 @contextmanager

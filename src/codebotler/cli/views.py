@@ -14,6 +14,7 @@ from rich.text import Text
 from codebotler.checking.storyboard import grid
 from codebotler.core.terminal import console, shortened, visible
 from codebotler.missions.log import Line, State, Summary
+from codebotler.missions.view import SessionView
 from codebotler.missions.wording import event_text
 from codebotler.robots.base import Readiness
 
@@ -87,19 +88,20 @@ def _event_line(line: Line) -> Text:
     return text
 
 
-def ending(summary: Summary) -> Group:
+def ending(ended: Summary | SessionView) -> Group:
     """How a mission ended, and how to see it again, in a line that is not broken, to be pasted."""
-    state = summary.state
-    text = Text.assemble((state, STYLES.get(state, "bold")), _why(summary))
+    state = ended.state
+    assert state is not None, "it has begun"
+    text = Text.assemble((state, STYLES.get(state, "bold")), _why(ended))
     if state is State.STOPPED:
         text.append("\nthe robot has stopped")
-    again = f"`codebotler missions {summary.id}` shows this mission again"
+    again = f"`codebotler missions {ended.id}` shows this mission again"
     return Group(text, Text(again, "dim", no_wrap=True, overflow="ignore"))
 
 
-def _why(summary: Summary) -> str:
-    line = "" if summary.line is None else f" in line {summary.line}"
-    return f"{line}: {shortened(summary.reason)}" if summary.reason else line
+def _why(ended: Summary | SessionView) -> str:
+    line = "" if ended.line is None else f" in line {ended.line}"
+    return f"{line}: {shortened(ended.reason)}" if ended.reason else line
 
 
 def list_view(summaries: Sequence[Summary]) -> RenderableType:

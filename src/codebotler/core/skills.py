@@ -28,6 +28,11 @@ class Recording:
     names: str = ""  # the sort of thing that the text names, such as `room`; empty for what is spoken
     when_tried: bool = False  # whether an attempt that fails is an event, too
 
+    @property
+    def is_spoken(self) -> bool:
+        """Whether the text is said aloud."""
+        return not self.names
+
 
 @dataclass(frozen=True)
 class Verb:

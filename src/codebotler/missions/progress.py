@@ -19,7 +19,7 @@ from codebotler.missions.wording import event_text
 AT = re.compile(r"at \((-?\d+(?:\.\d+)?), (-?\d+(?:\.\d+)?)\)")
 MOST = 200
 ENDS = frozenset({"result", "error", "cancelled", "late"})
-HEARD = {"say": "says", "ask": "asks"}
+ANSWER = "answer"  # the kind of moment at which the robot hears something
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Moment:
     """Something that happened, in words."""
 
     clock: float  # seconds by the robot's clock since the program began
-    kind: str  # of the event; `says`, `asks` and `hears` for what is spoken
+    kind: str  # of the event; the skill's own, such as `say`, for what is spoken, and `ANSWER`
     text: str
 
 
@@ -76,14 +76,15 @@ class Progress:
 
 def _moment(line: Line, words: str) -> Moment:
     event, clock = line["event"], line["clock"]
-    skill = line.get("skill", "")
-    if event == "skill" and skill in HEARD:
-        spoken = line["arguments"].get("message" if skill == "say" else "question", "")
-        options = line["arguments"].get("options")
+    skill = SKILLS.get(line.get("skill", ""))
+    spoken = skill.recording if skill and skill.recording and skill.recording.is_spoken else None
+    if event == "skill" and spoken:
+        arguments = line["arguments"]
+        options = arguments.get(spoken.options or "")
         offered = f" [{' | '.join(map(str, options))}]" if options else ""
-        return Moment(clock, HEARD[skill], shortened(f"{spoken}{offered}"))
-    if event == "result" and skill == "ask":
-        return Moment(clock, "hears", shortened(str(line["result"])))
+        return Moment(clock, spoken.kind, shortened(f"{arguments.get(spoken.text, '')}{offered}"))
+    if event == "result" and spoken and spoken.options:
+        return Moment(clock, ANSWER, shortened(str(line["result"])))
     return Moment(clock, event, words)
 
 

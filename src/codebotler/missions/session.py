@@ -85,11 +85,6 @@ class MissionSession:
         """It at this moment."""
         return self._view
 
-    @property
-    def mission(self) -> Mission | None:
-        """Its mission, once the robot is reserved."""
-        return self._mission
-
     def events(self, start: int = 0) -> list[Line]:
         """The events of the mission, from one on."""
         return self._events[start:]

@@ -7,6 +7,7 @@ import keyword
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from codebotler.core.program import TASK, Flaw, Program, bound_names, entries, parsed, undefined_names
 from codebotler.core.skills import SKILLS
@@ -253,7 +254,12 @@ def _undefined(tree: ast.Module | None) -> set[str]:
 
 
 def _tree(lines: Sequence[str]) -> ast.Module | None:
-    tree = parsed("\n".join(lines))
+    return _tree_of("\n".join(lines))
+
+
+@lru_cache(maxsize=64)  # more than the texts of a reply that are tried, so that each is parsed once
+def _tree_of(text: str) -> ast.Module | None:
+    tree = parsed(text)
     return None if isinstance(tree, Flaw) else tree
 
 

@@ -41,7 +41,7 @@ def _wanted(element: EventPattern, thing: str) -> str:
     if element.kind == "goto":
         return room(element.text, "any" if thing == "anything" else "a")
     match element.text:
-        case Regex(pattern) if element.kind not in {"say", "ask"} and _ALTERNATIVES.fullmatch(pattern):
+        case Regex(pattern) if not _is_spoken(element.kind) and _ALTERNATIVES.fullmatch(pattern):
             return named(pattern)
     return f"{thing} {described(element.text)}".rstrip()
 
@@ -62,6 +62,10 @@ def verb(kind: str) -> Verb:
     """The verb for a kind of event, also for one of a further skill."""
     other = Verb(f"do {kind}", f"does {kind}", f"did {kind}", f"doing {kind}", f"did {kind}")
     return SKILLS.verbs.get(kind, other)
+
+
+def _is_spoken(kind: str) -> bool:
+    return kind in SKILLS.recordings and SKILLS.recordings[kind].is_spoken
 
 
 def room(text: Text, article: str = "a") -> str:

@@ -23,16 +23,13 @@ from codebotler.missions.session import MissionSession
 from codebotler.missions.store import find, missions
 from codebotler.missions.view import Order, SessionView
 from codebotler.models.open import from_extra
-from codebotler.web.console import MOST_PROGRAM, Console
+from codebotler.web.console import MOST_PROGRAM, QUIET, Console
 
 HERE = "current"
 """The mission at hand, in an address."""
 
 STOPS = "the page"
 """Who stops a mission over the API."""
-
-QUIET = 15.0
-"""Seconds between signs of life in a stream."""
 
 Text = Annotated[str, Field(max_length=MOST_PROGRAM)]
 
@@ -103,9 +100,8 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
         """Begin a mission; its program is written and checked meanwhile. Refused while a mission runs."""
-        model = new.model or ("" if new.program else console.models[0])
         with _refusing():
-            session = console.begin(Order(new.instruction, model, new.program))
+            session = console.begin(Order(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
         if not session.view.id:
             raise HTTPException(409, session.view.trouble or "the mission was stopped before it started")
@@ -194,9 +190,9 @@ def _add_rest(api: APIRouter, console: Console) -> None:
             return console.check(new.program, console.view.room_map).data()
 
     @api.get("/robot", tags=["robot"])
-    def robot() -> dict[str, Any]:
-        """The robot, its skills and its mission."""
-        view = console.view
+    async def robot(*, once_over: bool = False) -> dict[str, Any]:
+        """The robot, its skills and its mission; with `once_over` when that is over, or after 15 s."""
+        view = await console.view_over() if once_over else console.view
         return {
             "robot": console.robot.name,
             "skills": [skill.signature for skill in console.robot.skills.values()],

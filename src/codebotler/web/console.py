@@ -27,6 +27,9 @@ from codebotler.simulator.sampled_robot import RoomMap
 MOST_PROGRAM = 200_000
 """The longest program or instruction, in characters."""
 
+QUIET = 15.0
+"""Seconds after which somebody who waits for something gets an answer in any case."""
+
 
 class Console:
     """Holds a robot, connected by missions only, and the mission at hand, for viewers on any threads.
@@ -81,10 +84,19 @@ class Console:
         session = self._session
         return SessionView() if session is None else session.view
 
+    async def view_over(self) -> SessionView:
+        """What all viewers see once the mission is over, or after some seconds."""
+        await self.notifier.until(lambda: self.view.is_over, QUIET)
+        return self.view
+
     def begin(self, order: Order) -> MissionSession:
-        """Begin a mission; one that is not running yet makes room for it, another raises MissionError."""
-        order = Order(order.instruction.strip(), order.model.strip(), order.program)
-        if not order.program.strip() and not (order.instruction and order.model):
+        """Begin a mission, by default with the first model.
+
+        One at hand that is not running makes room for it; another one raises MissionError.
+        """
+        instruction, model = order.instruction.strip(), order.model.strip()
+        order = Order(instruction, model or ("" if order.program else self.models[0]), order.program)
+        if not (order.program.strip() or instruction):
             raise MissionError("the instruction is empty; say what the robot should do")
         for text in (order.instruction, order.program):
             _check_length(text)
@@ -116,6 +128,11 @@ class Console:
             return self.begin(Order(self.view.order.instruction, program=program))
         session.edit(program)
         return session
+
+    def dismiss(self) -> None:
+        """Mention the interrupted missions no more."""
+        self.interrupted = ()
+        self.notifier.change()
 
     def stop(self, by: str) -> None:
         """Stop the mission at hand, if there is one; returns when the robot has been told."""

@@ -48,8 +48,13 @@ def router(console: Console, face: Face) -> APIRouter:
         return FileResponse(PAGE, media_type="text/html", headers=headers)
 
     @here.get("/api/face")
-    def show() -> dict[str, Any]:
-        """What the face shows: what the robot does, says and asks. `question` has the number to answer."""
+    async def show(*, once_over: bool = False) -> dict[str, Any]:
+        """What the face shows: what the robot does, says and asks; with `once_over` after the mission.
+
+        `question` has the number to answer.
+        """
+        if once_over:
+            await console.view_over()
         return face_data(console, face)
 
     @here.post("/api/face/answer")

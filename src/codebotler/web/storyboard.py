@@ -19,7 +19,7 @@ from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6
 VERBS = SKILLS.verbs
-SPOKEN = frozenset({"say", "ask", "answer"})
+SPOKEN = frozenset({*(kind for kind, one in SKILLS.recordings.items() if one.is_spoken), "answer"})
 PLAIN = re.compile(r"[\w' -]+")
 """Names of rooms that need no quotes; others could be read as part of the sentence."""
 
@@ -126,16 +126,11 @@ def scenes(
 def _deeds(step: Mapping[str, Any]) -> Sequence[Deed]:
     kind, text, number = step["kind"], shortened(step["text"], MOST_TEXT), step["step"]
     verb = VERBS[kind].third if kind in VERBS else shortened(kind)
-    match kind:
-        case "ask":
-            answer = step["answer"]
-            heard = "no answer" if answer is None else shortened(str(answer), MOST_TEXT)
-            return (Deed("ask", text, number), Deed("answer", heard))
-        case "check":
-            seen = "and finds it" if step.get("found") else "but does not find it"
-            return (Deed("check", f"{verb} {text}, {seen}", number),)
-        case "say":
-            return (Deed("say", text, number),)
+    if "answer" in step:
+        heard = "no answer" if step["answer"] is None else shortened(str(step["answer"]), MOST_TEXT)
+        return (Deed(kind, text, number), Deed("answer", heard))
+    if kind in SPOKEN:
+        return (Deed(kind, text, number),)
     result = f": {VERBS[kind].results[step['found']]}" if kind in VERBS and "found" in step else ""
     return (Deed(kind, f"{verb} {text}{result}", number),)
 

@@ -281,6 +281,28 @@ def test_the_work_grows_with_the_reply_and_no_faster(monkeypatch: pytest.MonkeyP
     assert work(80) < 10 * work(10)
 
 
+def test_no_text_of_a_reply_is_parsed_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    parse = ast.parse
+
+    def counted(text: str, name: str) -> ast.Module:
+        texts.append(text)
+        return parse(text, name)
+
+    monkeypatch.setattr(ast, "parse", counted)
+
+    for reply in (
+        TASK,
+        BODY,
+        BODY.lstrip(),
+        f"Here it is for you:\n\n{fenced(TASK)}\nIt drives there.\nThen it speaks.\n",
+    ):
+        new = reply.replace("hello", "good day")  # which no other test has parsed
+        texts.clear()
+        source(new)
+        assert 0 < len(texts) == len(set(texts))
+
+
 @pytest.mark.parametrize(
     "reply",
     [

@@ -101,7 +101,7 @@ def test_an_instruction_becomes_a_mission_that_is_done(tmp_path: Path) -> None:
         session.approve(view.digest)
         view = until(console, lambda view: view.is_over)
         assert view.state is State.DONE
-        assert [m.text for m in view.progress.moments if m.kind == "says"] == ["hello"]
+        assert [m.text for m in view.progress.moments if m.kind == "say"] == ["hello"]
         assert [line["event"] for line in session.events()][-1] == "state"
     (summary,) = missions(tmp_path)
     assert (summary.state, summary.model, summary.instruction) == (
@@ -302,11 +302,16 @@ def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
         assert (view.trouble, view.state) == ("the model is not there", State.FAILED)
 
 
+def test_the_first_model_writes_where_none_is_named(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author(HELLO)) as console:
+        console.begin(Order("say hello"))
+        assert until(console, lambda view: view.may_be_approved).order.model == console.models[0]
+
+
 @pytest.mark.parametrize(
     ("order", "told"),
     [
         (Order("   ", "author"), "instruction is empty"),
-        (Order("say hello"), "instruction is empty"),
         (Order(program="#" * (MOST_PROGRAM + 1)), "too many"),
     ],
 )

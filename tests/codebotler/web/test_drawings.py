@@ -72,9 +72,9 @@ def test_what_is_spoken_is_told_apart() -> None:
         call("say", message="fine"),
     )
     assert asked.moments == (
-        Moment(1.0, "asks", "tea? [yes | no]"),
-        Moment(1.0, "hears", "yes"),
-        Moment(1.0, "says", "fine"),
+        Moment(1.0, "ask", "tea? [yes | no]"),
+        Moment(1.0, "answer", "yes"),
+        Moment(1.0, "say", "fine"),
     )
 
 

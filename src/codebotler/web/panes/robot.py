@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from nicegui import ui
 
+from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room, World, laid_out
-from codebotler.missions.log import State
-from codebotler.missions.progress import Moment
+from codebotler.missions.log import State, Summary
+from codebotler.missions.progress import ANSWER, Moment
 from codebotler.missions.view import CHECKING, SessionView
 from codebotler.web.console import Console
 from codebotler.web.floorplan import floorplan
@@ -19,7 +20,7 @@ HEADLINES = {
     State.CHECKED: "Ready: waiting for your approval",
     State.APPROVED: "Starting",
 }
-SPOKEN = {"says": "said", "asks": "asked", "hears": "heard"}
+SPOKEN = {**{kind: verb.past for kind, verb in SKILLS.verbs.items()}, ANSWER: "heard"}
 MOST_MOMENTS = 60
 
 
@@ -42,10 +43,12 @@ class RobotPane:
             self._reason = PlainText("p", "", "reason")
             self._map = ui.html("", sanitize=False).classes("map")
             self._log = ui.element("ol").classes("moments").props('tabindex=0 aria-label="What happened"')
-        self._tell_interrupted()
+        self._told_interrupted: tuple[Summary, ...] = ()
+        self._gone.set_visibility(False)
 
     def show(self, view: SessionView) -> None:
         """Show a view."""
+        self._tell_interrupted(self._console.interrupted)
         progress = view.progress
         state = view.state
         headline = HEADLINES.get(state) or str(state).capitalize()
@@ -102,13 +105,13 @@ class RobotPane:
                     PlainText("span", moment.text, "text")
                 row.move(target_index=0)
 
-    def _tell_interrupted(self) -> None:
-        self._gone.set_visibility(bool(self._console.interrupted))
+    def _tell_interrupted(self, summaries: tuple[Summary, ...]) -> None:
+        if summaries == self._told_interrupted:
+            return
+        self._told_interrupted = summaries
+        self._gone.clear()
+        self._gone.set_visibility(bool(summaries))
         with self._gone:
-            for summary in self._console.interrupted:
+            for summary in summaries:
                 PlainText("p", f"Mission {summary.id} was interrupted: {summary.reason}")
-            Button("Dismiss", self._dismiss, "plain")
-
-    def _dismiss(self) -> None:
-        self._console.interrupted = ()
-        self._gone.set_visibility(False)
+            Button("Dismiss", self._console.dismiss, "plain")

@@ -19,14 +19,13 @@
 
   const watch = async (which) => {
     for (;;) {
-      const now = await (await fetch(robotAt)).json();
+      const now = await (await fetch(`${robotAt}?once_over=true`)).json();
       if (which !== pressed) return;
       if (now.is_over) {
         const text = ENDS[now.state] ?? (now.reason ? `The mission failed: ${now.reason}` : "The mission failed.");
         say(text, now.state === "failed" ? "bad" : "good");
         return;
       }
-      await new Promise((later) => setTimeout(later, 100));
     }
   };
 
