@@ -64,7 +64,7 @@ def test_from_an_instruction_to_an_answer_on_the_face(tmp_path: Path, opened: Op
         expect(operator.get_by_text("The robot's face is open on 1 screen.")).to_be_visible()
         option(face, "No").click()
         expect(operator.locator(".headline")).to_have_text("Done")
-        expect(operator.locator(".moment-hears .text")).to_have_text("No")
+        expect(operator.locator(".moment-answer .text")).to_have_text("No")
         expect(said(face)).to_have_text("Alice says: No")
         expect(face.locator("#doing")).to_have_text("I have finished.")
         assert face.evaluate("window.spoken") == ["Would you like a stapler? Yes, No", "Alice says: No"]
@@ -150,7 +150,7 @@ def test_the_operator_sees_that_no_face_is_open_and_can_answer(server: PageServe
     server.run(ASKS)
     expect(operator.get_by_text("Open the robot's face")).to_be_visible()
     operator.locator(".asking").get_by_role("button", name="Yes").click()
-    expect(operator.locator(".moment-hears .text")).to_have_text("Yes")
+    expect(operator.locator(".moment-answer .text")).to_have_text("Yes")
     expect(operator.locator(".asking")).to_be_hidden()
 
 

@@ -115,9 +115,9 @@ def test_what_is_said_and_asked_and_told_is_shown(server: PageServer, opened: Op
     expect(page.locator(".doing")).to_have_text(re.compile("Drives to"))
     expect(page.get_by_text("line 3", exact=False)).to_be_visible()
     expect(page.locator(".headline")).to_have_text("Done")
-    expect(page.locator(".moment-asks")).to_contain_text("Would you like tea?")
-    expect(page.locator(".moment-hears .text")).to_have_text("Yes")
-    expect(page.locator(".moment-says .text")).to_have_text("Tea for ann, please")
+    expect(page.locator(".moment-ask")).to_contain_text("Would you like tea?")
+    expect(page.locator(".moment-answer .text")).to_have_text("Yes")
+    expect(page.locator(".moment-say .text")).to_have_text("Tea for ann, please")
     expect(page.locator(".floorplan .here")).to_have_count(1)
 
 

@@ -107,7 +107,7 @@ def test_no_text_becomes_more_than_text(tmp_path: Path, opened: OpenPage, model:
         page.get_by_text("Run it despite the problems").click()
         page.get_by_role("button", name="Run it on the robot").click()
         expect(page.locator(".headline")).to_have_text("Failed")
-        shown = page.locator(".moment-says .text").inner_text()
+        shown = page.locator(".moment-say .text").inner_text()
         assert "".join(shown.split())[:10] == "".join(_visible(evil).split())[:10]
         expect_unharmed(page, before)
         page.reload()
