@@ -40,7 +40,8 @@ Arguments = ParamSpec("Arguments")
 class WorkerPool:
     """Threads that each own one worker; use as a context manager.
 
-    Where the kernel has no seccomp, this warns, or refuses if isolation is required.
+    The first worker is started beside whatever the caller does before it enters the context. Where the kernel
+    has no seccomp, this warns, or refuses if isolation is required.
     """
 
     def __init__(
@@ -52,6 +53,13 @@ class WorkerPool:
         self._threads = ThreadPoolExecutor(workers, thread_name_prefix="worker")
         self._local = threading.local()
         self._new_worker = partial(Worker, one_process_per_run=one_process_per_run)
+        self._workers: list[Worker] = []
+        self._idle: list[Worker] = []
+        self._stopping = False
+        # In a thread that lives as long as the pool: the processes end with the thread that started them.
+        self._first = self._threads.submit(self._start_first, require_isolation=require_isolation)
+
+    def _start_first(self, *, require_isolation: bool) -> None:
         first = self._new_worker()
         if not first.has_seccomp:
             missing = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
@@ -59,11 +67,16 @@ class WorkerPool:
                 first.close()
                 raise EngineError(missing)
             LOG.warning(missing)
-        self._workers = [first]
-        self._idle = [first]
-        self._stopping = False
+        self._workers.append(first)
+        self._idle.append(first)
 
     def __enter__(self) -> Self:
+        """Wait for the first worker."""
+        try:
+            self._first.result()
+        except BaseException:
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -79,6 +92,7 @@ class WorkerPool:
         """The worker of the calling thread."""
         worker: Worker | None = getattr(self._local, "worker", None)
         if worker is None:
+            self._first.result()
             try:
                 worker = self._idle.pop()
             except IndexError:

@@ -268,11 +268,11 @@ def cores() -> int:
 
 
 def engine_named(name: str, workers: int | None, **isolation: bool) -> OpenEngine:
-    """The engine with this name, which isolates programs as `WorkerPool` does."""
+    """The engine with this name, which isolates programs as `WorkerPool` does; a local one is being started."""
     from roboeval.evaluation.engines import Local
 
     if name == "local":
-        return Local(workers or cores(), **isolation)
+        return Local(workers or cores(), **isolation).begin()
     if name != "ray":
         fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster

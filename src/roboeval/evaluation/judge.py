@@ -9,10 +9,10 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from types import FrameType
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from msgspec import to_builtins
 
@@ -31,8 +31,40 @@ from roboeval.evaluation.runs.rows import Row, bounded
 from roboeval.suites.load import Requirement, Scenario, Suite
 
 LOG = logging.getLogger("roboeval.evaluation.judge")
+Value = TypeVar("Value")
 
 BUDGET = 60  # seconds of processor time that judging one program may take, in all its worlds
+MOST_REMEMBERED, LONGEST_REMEMBERED = 4_096, 64  # results, and events of a run
+
+
+class Remembered(Generic[Value]):
+    """Results for runs in scenarios, by the identity of both.
+
+    Many programs do the same in the same world, and then the engine gives them the very same outcome.
+    """
+
+    def __init__(self) -> None:
+        # With the value, the objects whose ids are its key, so that nothing else gets these ids.
+        self._known: dict[tuple[int, ...], tuple[Value, object, object]] = {}
+
+    def of(
+        self, outcomes: Sequence[Outcome], scenarios: Sequence[Scenario], found: Callable[[], Value]
+    ) -> Value:
+        """The result for the runs in the scenarios, found if it is not known."""
+        key = (*map(id, outcomes), *map(id, scenarios))
+        known = self._known.get(key)  # another thread may clear it at any moment
+        if known is not None:
+            return known[0]
+        value = found()
+        if len(self._known) >= MOST_REMEMBERED:
+            self._known.clear()
+        if all(len(outcome.trace) <= LONGEST_REMEMBERED for outcome in outcomes):
+            self._known[key] = value, tuple(outcomes), tuple(scenarios)
+        return value
+
+
+MET: Remembered[tuple[bool, ...]] = Remembered()
+JUDGED: Remembered[bytes] = Remembered()
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
@@ -43,7 +75,7 @@ def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
     """
     if not may_satisfy(outcome, scenario):
         return Verdict(scenario.world.about, outcome, (), satisfied=False)
-    failed = tuple(r for r in scenario.require if not is_met(r, outcome.trace))
+    failed = tuple(r for r, met in zip(scenario.require, are_met(outcome, scenario), strict=True) if not met)
     return Verdict(scenario.world.about, outcome, failed, satisfied=not failed)
 
 
@@ -51,6 +83,15 @@ def may_satisfy(outcome: Outcome, scenario: Scenario) -> bool:
     """Whether the requirements decide: the run ended by itself, or waits where that is allowed."""
     waited = outcome.status is Status.TIMEOUT and scenario.world.may_wait_forever
     return waited or outcome.status is Status.FINISHED
+
+
+def are_met(outcome: Outcome, scenario: Scenario) -> tuple[bool, ...]:
+    """Whether the trace of a run satisfies each requirement."""
+
+    def found() -> tuple[bool, ...]:
+        return tuple([is_met(one, outcome.trace) for one in scenario.require])
+
+    return MET.of([outcome], [scenario], found)
 
 
 def is_met(requirement: Requirement, trace: Trace) -> bool:
@@ -147,9 +188,13 @@ def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -
     """The judgement on a program that ran in all worlds of a task, as JSON; None if it takes too long."""
     task, outcomes = ran
     scenarios = suite.tasks[task].judged_in(ablated=ablated)
-    try:
+
+    def found() -> bytes:
         with time_limit(BUDGET):
             return judgement([judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
+
+    try:
+        return JUDGED.of(outcomes, scenarios, found)
     except TimeLimitExceeded:
         return None
 

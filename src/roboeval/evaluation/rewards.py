@@ -18,7 +18,7 @@ from codebotler.core.trace import Outcome
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import AHEAD, LARGEST, shared_pool
 from codebotler.simulator.robot import SimulatedRobot
-from roboeval.evaluation.judge import is_met, may_satisfy
+from roboeval.evaluation.judge import are_met, is_met, may_satisfy
 from roboeval.evaluation.runs.completions import unknown
 from roboeval.suites.load import Scenario, Suite, load_suite
 
@@ -80,8 +80,8 @@ class Share:
         """The share of a run in a world, of whose requirements some were met at the start."""
         gained: list[bool] = []
         kept: list[bool] = []
-        for requirement, was_met in zip(scenario.require, at_start, strict=True):
-            (kept if was_met else gained).append(is_met(requirement, outcome.trace))
+        for is_now, was_met in zip(are_met(outcome, scenario), at_start, strict=True):
+            (kept if was_met else gained).append(is_now)
         whole = 1.0 if may_satisfy(outcome, scenario) else ERRED
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
 

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import combinations, product
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from itertools import combinations
 from random import Random
 from typing import TypeAlias
 
 Row: TypeAlias = dict[str, int]  # for each factor the position of its value
-Pair: TypeAlias = tuple[tuple[str, int], tuple[str, int]]
+Pair: TypeAlias = tuple[int, int]  # the numbers of two values, the smaller one first
 
 _TRIES = 12  # candidates for each row
 
 
-def pairs(sizes: Mapping[str, int]) -> set[Pair]:
-    """All pairs of values of two factors."""
-    return {
-        ((one, i), (other, j))
-        for one, other in combinations(sorted(sizes), 2)
-        for i, j in product(range(sizes[one]), range(sizes[other]))
-    }
-
-
-def met(row: Row) -> set[Pair]:
-    """The pairs that meet in a row."""
-    return set(combinations(sorted(row.items()), 2))
+def numbered(sizes: Mapping[str, int]) -> dict[str, range]:
+    """A number for each value of each factor, of all factors by name."""
+    numbers: dict[str, range] = {}
+    start = 0
+    for factor in sorted(sizes):
+        numbers[factor] = range(start, start + sizes[factor])
+        start += sizes[factor]
+    return numbers
 
 
 def spread(sizes: Mapping[str, int], count: int, random: Random) -> list[Row]:
@@ -38,25 +35,42 @@ def covering(sizes: Mapping[str, int], random: Random) -> list[Row]:
     """Rows in which every pair of values meets; greedy, so that they are few but not the fewest."""
     if len(sizes) == 1:
         return [{factor: value} for factor, size in sizes.items() for value in range(size)]
-    left = pairs(sizes)
+    numbers = numbered(sizes)
+    owner = {number: factor for factor, those in numbers.items() for number in those}
+    left = {(a, b) for one, other in combinations(numbers.values(), 2) for a in one for b in other}
     rows: list[Row] = []
     while left:
         seeds = random.sample(sorted(left), min(_TRIES, len(left)))
-        candidates = [_row(sizes, seed, left, random) for seed in seeds]
-        rows.append(max(candidates, key=lambda row: len(met(row) & left)))
-        left -= met(rows[-1])
+        partners = partners_of(left)
+        candidates = [_row(numbers, {owner[a]: a, owner[b]: b}, partners, random) for a, b in seeds]
+        best = max(candidates, key=lambda row: len(met(row) & left))
+        left -= met(best)
+        rows.append({factor: best[factor] - numbers[factor].start for factor in sizes})
     return rows
 
 
-def _row(sizes: Mapping[str, int], seed: Pair, left: set[Pair], random: Random) -> Row:
+def met(row: Mapping[str, int]) -> set[Pair]:
+    """The pairs of numbers that meet in a row of them."""
+    return set(combinations(sorted(row.values()), 2))
+
+
+def partners_of(pairs: Iterable[Pair]) -> Mapping[int, int]:
+    """For each number those that it makes a pair with, as the bits of an integer."""
+    partners: dict[int, int] = defaultdict(int)
+    for a, b in pairs:
+        partners[a] |= 1 << b
+        partners[b] |= 1 << a
+    return partners
+
+
+def _row(numbers: Mapping[str, range], seed: Row, partners: Mapping[int, int], random: Random) -> Row:
     row = dict(seed)
-    factors = [factor for factor in sorted(sizes) if factor not in row]
+    chosen = sum(1 << number for number in row.values())
+    factors = [factor for factor in numbers if factor not in row]
     random.shuffle(factors)
     for factor in factors:
-        values = random.sample(range(sizes[factor]), sizes[factor])
-        row[factor] = max(values, key=lambda value: _gained(row, (factor, value), left))
-    return {factor: row[factor] for factor in sizes}
-
-
-def _gained(row: Row, new: tuple[str, int], left: set[Pair]) -> int:
-    return sum((min(new, old), max(new, old)) in left for old in row.items())
+        values = random.sample(numbers[factor], len(numbers[factor]))
+        best = max(values, key=lambda value: (partners[value] & chosen).bit_count())
+        row[factor] = best
+        chosen |= 1 << best
+    return row

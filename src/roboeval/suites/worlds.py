@@ -8,6 +8,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from random import Random
 from types import SimpleNamespace
 from typing import Any, TypeAlias
@@ -213,11 +214,7 @@ def _detail(factor: str, level: Level) -> str:
 
 def _required(text: str, names: Names) -> Iterator[str]:
     """The requirements that an entry stands for: `check(x)`, `... if CONDITION`, `... for NAME in LIST`."""
-    try:
-        node = parsed(f"({text})")
-    except ExpressionError:
-        node = parsed(f"({text} else None)")
-    match node:
+    match _entry(text):
         case ast.IfExp(test, body, ast.Constant(None)):
             if value(test, names):
                 yield _called(body, names)
@@ -225,7 +222,15 @@ def _required(text: str, names: Names) -> Iterator[str]:
             for each in each_of(loop, names):
                 yield _called(body, each)
         case _:
-            yield _called(node, names)
+            yield _called(_entry(text), names)
+
+
+@cache  # the same few for each of many worlds
+def _entry(text: str) -> ast.expr:
+    try:
+        return parsed(f"({text})")
+    except ExpressionError:
+        return parsed(f"({text} else None)")
 
 
 def _called(node: ast.expr, names: Names) -> str:

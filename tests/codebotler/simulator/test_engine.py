@@ -665,7 +665,7 @@ def test_an_interrupted_start_leaves_nothing_open(monkeypatch: pytest.MonkeyPatc
     compiled_file(*SIMULATION)  # a file that stays open
     before, processes = set(Path("/proc/self/fd").iterdir()), fork_servers()
     monkeypatch.setattr(BatchServer, "_set_up", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        WorkerPool(1)
+    with pytest.raises(KeyboardInterrupt), WorkerPool(1):
+        pass
     assert fork_servers() <= processes
     assert set(Path("/proc/self/fd").iterdir()) == before

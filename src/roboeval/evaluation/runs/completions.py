@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, SupportsIndex, TypeAlias
+from typing import Any, TypeAlias
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import MAX_ROW, parsed_row, read_lines, to_line
@@ -165,7 +165,7 @@ def unknown(key: Key, suite: Suite) -> str | None:
         return f'the suite "{suite.name}" has no task "{key[0]}"; its tasks are {", ".join(suite.tasks)}'
     there_are = f"the task has prompts 0 to {len(task.prompts) - 1}"
     prompt: object = key[1]
-    if isinstance(prompt, bool) or not isinstance(prompt, SupportsIndex):  # numbers of NumPy are right
+    if isinstance(prompt, bool) or not hasattr(prompt, "__index__"):  # numbers of NumPy are right
         return f"the prompt is {prompt!r}, not a whole number; {there_are}"
     return None if 0 <= key[1] < len(task.prompts) else f"{name_of(key)}: {there_are}"
 
