@@ -10,13 +10,13 @@ from typing import Literal, TypeAlias
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.claims import Claim, Number, Time
+from codebotler.rtl.text.matcher import Matcher
 
-SHORT, REMEMBERED = 200, 1_000  # characters of a text that is remembered, and how many texts
 ScopeName: TypeAlias = Literal["BeforeFirst", "BeforeLast", "AfterFirst", "AfterLast"]
 
 
 @dataclass(frozen=True)
-class Regex:
+class Regex(Matcher):
     """A text in which a regex is found, ignoring case.
 
     Args:
@@ -30,28 +30,15 @@ class Regex:
         """The compiled regex."""
         return compile_regex(self.pattern)
 
-    @cached_property
-    def _known(self) -> dict[str, bool]:
-        """In which short texts it is found, as far as it was asked."""
-        return {}
-
-    def matches(self, text: str) -> bool:
-        """Whether the regex is found in a text."""
-        if len(text) > SHORT:
-            return self.compiled.search(text) is not None
-        known = self._known
-        if text not in known:
-            if len(known) == REMEMBERED:
-                known.clear()
-            known[text] = self.compiled.search(text) is not None
-        return known[text]
+    def _matches(self, text: str) -> bool:
+        return self.compiled.search(text) is not None
 
     def __str__(self) -> str:
         return quote(self.pattern)
 
 
 @dataclass(frozen=True)
-class Without:
+class Without(Matcher):
     """A text in which a regex is not found as a whole word.
 
     Args:
@@ -65,8 +52,7 @@ class Without:
         """The compiled regex, between word boundaries."""
         return whole_word(self.pattern)
 
-    def matches(self, text: str) -> bool:
-        """Whether the regex is nowhere in a text, or only inside words."""
+    def _matches(self, text: str) -> bool:
         return self.compiled.search(text) is None
 
     def __str__(self) -> str:
@@ -74,7 +60,7 @@ class Without:
 
 
 @dataclass(frozen=True)
-class Words:
+class Words(Matcher):
     """A text in which all parts are found, in any order.
 
     Args:
@@ -83,8 +69,7 @@ class Words:
 
     parts: tuple[Text, ...]
 
-    def matches(self, text: str) -> bool:
-        """Whether every part is found somewhere in a text."""
+    def _matches(self, text: str) -> bool:
         return all(part.matches(text) for part in self.parts)
 
     def __str__(self) -> str:

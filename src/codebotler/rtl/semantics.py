@@ -44,13 +44,12 @@ def holds(formula: formulas.Formula, trace: Trace) -> bool:
     Raises:
         Inconclusive: an option that is no text had to be compared.
     """
-    match formula:
-        case formulas.And(parts):
-            return all(holds(part, trace) for part in parts)
-        case formulas.Or(parts):
-            return any(holds(part, trace) for part in parts)
-        case formulas.Not(part):
-            return not holds(part, trace)
+    if isinstance(formula, formulas.Not):
+        return not holds(formula.part, trace)
+    if isinstance(formula, formulas.And):
+        return all(holds(part, trace) for part in formula.parts)
+    if isinstance(formula, formulas.Or):
+        return any(holds(part, trace) for part in formula.parts)
     return _test_holds(formula, trace)
 
 
@@ -107,7 +106,10 @@ def _offers(element: formulas.EventPattern, event: Event, at: int) -> bool:
 def occurrences(element: formulas.EventPattern, trace: Trace, span: range) -> Iterator[int]:
     """The positions of all events that match, each found when it is asked for."""
     kind = element.kind  # of most events it is another, for which no function need be called
-    return (at for at in span if (event := trace[at]).kind == kind and _matches(element, event, at))
+    for at in span:
+        event = trace[at]
+        if event.kind == kind and _matches(element, event, at):
+            yield at
 
 
 def first(element: formulas.EventPattern, trace: Trace, span: range) -> int | None:

@@ -11,14 +11,15 @@ from functools import lru_cache
 from codebotler.core.cachedproperty import cached_property
 from codebotler.rtl.pattern import compile_regex, quote, whole_word
 from codebotler.rtl.text.clauses import clauses, sentences
+from codebotler.rtl.text.matcher import Matcher
 from codebotler.rtl.text.numbers import numerals
 from codebotler.rtl.text.polarity import Polarity, polarity, without_harmless
 from codebotler.rtl.text.times import TimeOfDay, times_in
 
 
 @dataclass(frozen=True)
-class Number:
-    """A text that gives a number of a thing.
+class Number(Matcher):
+    """A text that gives a number of a thing, and no other number of it.
 
     Args:
         number: how many.
@@ -32,8 +33,7 @@ class Number:
     others: tuple[str, ...] = ()
     other: bool = False
 
-    def matches(self, text: str) -> bool:
-        """Whether a text gives this number of the thing and no other; if `other` is set, a different one."""
+    def _matches(self, text: str) -> bool:
         given = self.given(text)
         return bool(given) and (given != {self.number}) == self.other
 
@@ -114,8 +114,10 @@ def _paired(marks: list[Mark]) -> Iterator[float]:
 
 
 @dataclass(frozen=True)
-class Time:
+class Time(Matcher):
     """A text that names times of day, all within a span.
+
+    A time that may be in the morning or in the afternoon is taken for the one within the span.
 
     Args:
         start: the earliest, such as `11:00`.
@@ -127,11 +129,7 @@ class Time:
     end: str
     other: bool = False
 
-    def matches(self, text: str) -> bool:
-        """Whether a text names times within the span, or one outside if `other` is set.
-
-        A time that may be in the morning or in the afternoon is taken for the one within the span.
-        """
+    def _matches(self, text: str) -> bool:
         named = times_in(text)
         inside = [
             any(self._minutes[0] <= time <= self._minutes[1] for time in readings) for readings in named
@@ -155,7 +153,7 @@ def minutes(time: str) -> TimeOfDay:
 
 
 @dataclass(frozen=True)
-class Claim:
+class Claim(Matcher):
     """A text in which a clause that affirms, or one that denies, names something.
 
     Args:
@@ -171,8 +169,7 @@ class Claim:
         """The compiled regex, between word boundaries."""
         return whole_word(self.pattern)
 
-    def matches(self, text: str) -> bool:
-        """Whether some clause of the right polarity names it."""
+    def _matches(self, text: str) -> bool:
         wanted = Polarity.DENIES if self.denied else Polarity.AFFIRMS
         return any(
             found is wanted and self.compiled.search(clause) is not None
