@@ -97,7 +97,7 @@ def test_answers_that_are_hard_to_tell_apart_can_be_chosen(server: PageServer, o
     options = ["", " ", "no", "no", *map(str, range(60))]
     server.run(f"def task_program():\n    say('[' + ask('', '', {options}) + ']')\n", despite_problems=True)
     expect(face.locator("#options button")).to_have_count(50)
-    expect(face.locator("#more")).to_have_text("14 more answers cannot be shown.")
+    expect(face.locator("#more")).to_have_text("14 more answers are not shown.")
     expect(face.locator("#person")).to_be_hidden()
     expect(face.locator("#question")).to_have_text("?")
     expect(face.locator("#options span").nth(1)).to_have_text("(without words)")

@@ -51,7 +51,9 @@ def test_the_robot_is_stopped_when_the_last_operator_leaves(server: PageServer, 
     second.context.close()
     expect(face.locator("#doing")).to_have_text("I was stopped.")
     until_over(server)
-    assert missions(server.home)[-1].reason == "stopped by the last operator, closing the page"
+    assert (
+        missions(server.home)[-1].reason == "stopped by CodeBotler, since the last operator closed the page"
+    )
 
 
 def test_who_comes_back_in_time_finds_it_running(server: PageServer, opened: OpenPage) -> None:
@@ -86,6 +88,6 @@ def test_a_browser_that_is_cut_off_holds_nothing_up_and_catches_up(
     here.locator("#stop").click()
     expect(here.locator("#stop-told")).to_have_text("The robot has stopped.")
     away.locator("#stop").click()
-    expect(away.locator("#stop-told")).to_contain_text("The tool cannot be reached.")
+    expect(away.locator("#stop-told")).to_contain_text("CodeBotler is not responding.")
     away.context.set_offline(False)
     expect(away.locator(".headline")).to_have_text("Stopped")

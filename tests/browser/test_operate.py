@@ -235,7 +235,7 @@ def test_who_was_slower_at_the_same_moment_is_told(server: PageServer, opened: O
     while "# of the first" not in server.call("GET", "/api/missions/current").data["program"]:
         first.wait_for_timeout(50)
     second.keyboard.insert_text("# of the second\n")
-    expect(second.get_by_text("Another person changed the program meanwhile")).to_be_visible()
+    expect(second.get_by_text("Someone else changed the program")).to_be_visible()
     assert "# of the second" not in server.call("GET", "/api/missions/current").data["program"]
 
 
@@ -248,7 +248,7 @@ def test_what_was_typed_just_before_a_click_is_checked_and_kept(server: PageServ
     page.keyboard.press("Control+End")
     page.keyboard.insert_text("# one more")
     button.evaluate("button => button.click()")
-    expect(page.get_by_text("Your last edit is checked first.")).to_be_visible()
+    expect(page.get_by_text("Checking your last edit first.")).to_be_visible()
     until(
         page,
         "fetch('/api/missions/current').then(a => a.json()).then(a => a.program.endsWith('# one more'))",
@@ -332,9 +332,9 @@ def test_a_stop_is_not_said_to_have_worked_before_it_has(server: PageServer, ope
     answer = {"state": "stopping", "reason": "", "is_over": False}
     page.route("**/api/robot?once_over=true", lambda route: route.fulfill(body=json.dumps(answer)))
     page.locator("#stop").click()
-    expect(page.locator("#stop-told")).to_have_text("Stopping: the robot has been told.")
+    expect(page.locator("#stop-told")).to_have_text("Stop sent. Waiting for the robot to confirm …")
     page.wait_for_timeout(500)
-    expect(page.locator("#stop-told")).to_have_text("Stopping: the robot has been told.")
+    expect(page.locator("#stop-told")).to_have_text("Stop sent. Waiting for the robot to confirm …")
 
 
 def test_a_tool_that_cannot_be_reached_is_said(server: PageServer, opened: OpenPage) -> None:

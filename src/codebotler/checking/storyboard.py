@@ -15,6 +15,7 @@ from codebotler.core.terminal import shortened, visible
 from codebotler.core.trace import Event, Trace
 
 VERBS = SKILLS.verbs
+ASKING = frozenset(kind for kind, recording in SKILLS.recordings.items() if recording.options is not None)
 
 MOST_STEPS, FIRST_STEPS, LAST_STEPS, LONGEST_PERIOD = 40, 12, 6, 20
 MOST_OPTIONS = 20
@@ -33,7 +34,7 @@ def _step_data(number: int, event: Event, room: Callable[[str], str | None] | No
             data["to"] = room(event.text)
     if event.found is not None:
         data["found"] = event.found
-    if event.kind == "ask":
+    if event.kind in ASKING or event.answer is not None:
         data["options"] = [o.text if o.is_text else {"no text": o.text} for o in event.options]
         data["answer"] = event.answer
     return data
@@ -87,14 +88,14 @@ def step_text(step: Mapping[str, Any]) -> Text:
     text = f'"{shortened(step["text"])}"'
     if step["kind"] == "goto":
         return _drive(step, text)
-    match step["kind"]:
-        case "ask":
-            answer = "no answer" if step["answer"] is None else shortened(step["answer"])
-            told = f"asked {text} {_options(step['options'])} → {answer}"
-        case kind:
-            verb, result = VERBS.get(kind), step.get("found")
-            told = f"{visible(kind) if verb is None else verb.past} {text}"
-            told += f": {verb.results[result]}" if verb and result is not None else ""
+    kind, result = step["kind"], step.get("found")
+    verb = VERBS.get(kind)
+    told = f"{visible(kind) if verb is None else verb.past} {text}"
+    if "answer" in step:
+        answer = "no answer" if step["answer"] is None else shortened(step["answer"])
+        told += f" {_options(step['options'])} → {answer}"
+    elif verb and result is not None:
+        told += f": {verb.results[result]}"
     return Text(told)
 
 

@@ -126,7 +126,10 @@ def check(
 @app.command()
 def run(
     program: Annotated[
-        str, typer.Argument(metavar="PROGRAM|INSTRUCTION", help="A file, -, or what to do in plain words.")
+        str,
+        typer.Argument(
+            metavar="PROGRAM|INSTRUCTION", help="A program file, - for standard input, or an instruction."
+        ),
     ],
     robot: RobotOption = "sim",
     world: Annotated[Path | None, typer.Option(help="The world file of a simulated robot.")] = None,

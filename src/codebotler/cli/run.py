@@ -50,7 +50,7 @@ class Request:
         if self.what.endswith(".py") and not self.is_program:
             raise UserError("there is no such file; name a file, or write an instruction", file=self.what)
         if self.what == "-" and not self.yes:
-            raise UserError("standard input holds the program, so it cannot hold your answer; add --yes")
+            raise UserError("the program comes from standard input, so you cannot be asked there; add --yes")
 
     @property
     def is_program(self) -> bool:
@@ -93,7 +93,7 @@ def _prepared(session: MissionSession) -> SessionView:
     view = session.view
     while not (view.is_over or view.may_be_approved):
         before = view.busy
-        with busy(before or "ending"):
+        with busy(before or "finishing"):
             view = session.wait_until(lambda now, before=before: now.busy != before)  # type: ignore[misc]  # mypy does not infer such lambdas
     for remark in view.remarks:
         note(remark)

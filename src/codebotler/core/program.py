@@ -283,7 +283,7 @@ def _mismatch(node: ast.Call, skill: Skill) -> str | None:
     count = len(node.args) + len(keywords)
     if count == len(names):
         return None
-    return f"{takes}, but {count or 'no'} argument{'s are' if count > 1 else ' is'} given"
+    return f"{takes}, but got {counted(count, 'argument') if count else 'none'}"
 
 
 def _wrong_options(node: ast.expr, skill: Skill, parameter: Parameter) -> Iterator[Flaw]:

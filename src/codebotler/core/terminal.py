@@ -162,7 +162,7 @@ def says_yes(question: str) -> bool:
 def system_sentence(error: OSError) -> str:
     """An error of the system as a sentence with the file, and the mend for a full disk."""
     where = "the output" if error.filename is None else visible(os.fsdecode(error.filename))
-    mend = "; make room and run the same command again" if error.errno in FULL else ""
+    mend = "; free some disk space and try again" if error.errno in FULL else ""
     return f"{where}: {error.strerror}{mend}"
 
 

@@ -54,7 +54,7 @@ STEPS: dict[State, frozenset[State]] = {
     State.CHECKED: frozenset(
         {State.DRAFTING, State.CHECKED, State.APPROVED, State.FAILED, State.STOPPED},
     ),
-    State.APPROVED: frozenset({State.DRAFTING, State.RUNNING, State.FAILED, State.STOPPED}),
+    State.APPROVED: frozenset({State.RUNNING, State.FAILED, State.STOPPED}),
     State.RUNNING: frozenset({State.DONE, State.FAILED, State.STOPPING}),
     State.STOPPING: frozenset({State.STOPPED, State.FAILED}),
 }

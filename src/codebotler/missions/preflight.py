@@ -39,7 +39,7 @@ def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | No
         except RobotLostError as error:
             raise NotReadyError(f"the robot did not report {what}: {error.sentence}") from None
         except CancelledError:
-            raise NotReadyError(f"the robot did not report {what}: somebody stopped it") from None
+            raise NotReadyError(f"the robot did not report {what}, because it was stopped") from None
 
     rooms = told("get_all_rooms", "which rooms it knows")
     here = told("get_current_location", "where it is")
@@ -48,8 +48,8 @@ def preflight(robot: Robot, remark: Callable[[str], None]) -> tuple[RoomMap | No
         return None, place
     if len(rooms) > MOST_ROOMS:
         remark(
-            f"the robot knows {len(rooms):,} rooms, and a check can handle {MOST_ROOMS:,}; it uses the rooms "
-            "that the program names"
+            f"the robot lists {len(rooms):,} rooms, more than the {MOST_ROOMS:,} that a check supports; "
+            "it uses only the rooms that the program names"
         )
         return None, place
     if place and place not in rooms:

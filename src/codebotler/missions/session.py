@@ -55,7 +55,9 @@ class MissionSession:
         self._open_model, self._check, self._changed, self._before = open_model, check, changed, before
         self._lock = threading.Condition()  # held for moments; never while a mission is asked for something
         self._editing = threading.Lock()  # held while a program is replaced or approved
-        self._view = SessionView(number, order=order, program=order.program, busy="waiting", is_over=False)
+        self._view = SessionView(
+            number, order=order, program=order.program, author=order.author, busy="waiting", is_over=False
+        )
         self._events: list[Line] = []
         self._mission: Mission | None = None
         self._edited: str | None = None
@@ -82,7 +84,7 @@ class MissionSession:
 
     @property
     def view(self) -> SessionView:
-        """It at this moment."""
+        """The current view."""
         return self._view
 
     def events(self, start: int = 0) -> list[Line]:
@@ -99,7 +101,7 @@ class MissionSession:
 
     def ask_again(self, *, repair: bool) -> None:
         """Have the model write another program; with `repair`, it is shown this one and its problems."""
-        with self._lock:
+        with self._editing, self._lock:
             view = self._view
             if not view.may_be_approved or not view.order.model:
                 raise MissionError("the model cannot be asked again now")
@@ -126,6 +128,8 @@ class MissionSession:
         self._stopped_by = self._stopped_by or by
         mission, asking = self._mission, self._asking
         try:
+            if mission is not None and mission.state in {State.DRAFTING, State.CHECKED}:
+                self._robot.cancel()  # it may be asked which rooms there are
             if mission is not None:
                 with suppress(MissionError):  # it ended by itself
                     mission.stop(by)
@@ -153,7 +157,14 @@ class MissionSession:
             LOG.exception("a mission failed unexpectedly")
             self._show(trouble=f"{type(error).__name__}: {visible(str(error))}")
         finally:
-            self._show(is_over=True, busy="", is_written=False)
+            self._show(**self._ending(), is_over=True, busy="", is_written=False)
+
+    def _ending(self) -> dict[str, object]:
+        """How the mission ended, also where that could not be logged."""
+        if self._mission is None:
+            return {}
+        ended = self._mission.summary
+        return {"state": ended.state, "reason": ended.reason, "line": ended.line}
 
     def _through(self) -> None:
         order = self._view.order
@@ -168,7 +179,12 @@ class MissionSession:
             if self._is_stopped():
                 mission.stop(self._stopped_by or "")
                 return
-            room_map, place = preflight(self._robot, self._remark)
+            try:
+                room_map, place = preflight(self._robot, self._remark)
+            except NotReadyError:
+                if self._is_stopped():
+                    return
+                raise
             self._show(room_map=room_map)
             if order.program:
                 self._take(mission, order.program)

@@ -88,7 +88,7 @@ def _interrupted(folder: Path) -> list[Summary]:
 
 def _how(summary: Summary, events: list[Line]) -> str:
     if summary.state not in {State.RUNNING, State.STOPPING}:
-        return f"CodeBotler ended unexpectedly while the mission was {summary.state}; nothing had moved"
+        return f"CodeBotler ended unexpectedly while the mission was {summary.state}; the robot had not moved"
     skill = doing(events)
     if skill is None:
         return "CodeBotler ended unexpectedly while the robot was idle"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
 from codebotler.checking.problems import Check
 from codebotler.missions.log import State
@@ -11,6 +12,8 @@ from codebotler.missions.progress import Progress
 from codebotler.simulator.sampled_robot import RoomMap
 
 CHECKING = "checking"  # what a session is busy with
+
+Phase: TypeAlias = State | Literal["", "starting", "writing", "checking"]
 
 
 @dataclass(frozen=True)
@@ -20,6 +23,7 @@ class Order:
     instruction: str = ""
     model: str = ""  # its name; empty where the program comes with the order
     program: str = ""
+    author: str = ""  # the model that wrote the program, if one did
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,17 @@ class SessionView:
     def digest(self) -> str:
         """Names this program and no other, for those who approve it."""
         return digest(self.program)
+
+    @property
+    def phase(self) -> Phase:
+        """What goes on, or how it ended."""
+        if self.is_over or self.is_running:
+            return "" if self.state is None else self.state
+        if self.is_written:
+            return "writing"
+        if self.busy == CHECKING:
+            return "checking"
+        return "starting" if self.busy or self.state is None else self.state
 
     @property
     def is_running(self) -> bool:

@@ -57,8 +57,8 @@ EVENTS: Mapping[str, Callable[[Line], str]] = {
     "error": lambda line: f"{visible(line['kind'])}: {shortened(line['message'])}",
     "sleep": lambda line: f"waits for {line['seconds']:g} s",
     "stop": lambda line: f"stop requested by {visible(line['by'])}",
-    "cancelled": lambda _: "stopped while it was under way",
-    "late": lambda _: "finished despite the stop; nothing else will start",
+    "cancelled": lambda _: "cancelled",
+    "late": lambda _: "finished after the stop; nothing more will run",
     "log": lambda line: shortened(line["text"]),
 }
 """The text of each kind of event."""

@@ -116,15 +116,10 @@ def _raw(
     return _plain(Image.frombytes(mode, size, data[: step * size[1]], "raw", order, step))
 
 
-def jpeg_of(image: Image.Image, longest: int = LONGEST_SIDE) -> bytes:
-    """The bytes of a JPEG file without metadata.
-
-    Args:
-        image: the picture.
-        longest: the limit for its longer side, in pixels; a larger picture is scaled down.
-    """
+def jpeg_of(image: Image.Image) -> bytes:
+    """The bytes of a JPEG file without metadata, scaled down if it is large."""
     smaller = _plain(image)
-    smaller.thumbnail((longest, longest))
+    smaller.thumbnail((LONGEST_SIDE, LONGEST_SIDE))
     file = io.BytesIO()
     smaller.save(file, "JPEG", quality=QUALITY)
     return file.getvalue()

@@ -74,7 +74,9 @@ class Reservation:
             NotReadyError: it was taken before.
         """
         if not self._is_used.acquire(blocking=False):
-            raise NotReadyError(f"the robot {self.robot.name} was used for another mission; connect it again")
+            raise NotReadyError(
+                f"the robot {self.robot.name} has already run another mission; connect it again"
+            )
 
     def _path(self) -> Path:
         if self.robot.address:

@@ -228,6 +228,7 @@ def view_data(view: SessionView) -> dict[str, Any]:
     return {
         "id": view.id,
         "state": view.state,
+        "phase": view.phase,
         "busy": view.busy,
         "trouble": view.trouble,
         "instruction": view.order.instruction,

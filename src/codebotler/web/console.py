@@ -95,7 +95,8 @@ class Console:
         One at hand that is not running makes room for it; another one raises MissionError.
         """
         instruction, model = order.instruction.strip(), order.model.strip()
-        order = Order(instruction, model or ("" if order.program else self.models[0]), order.program)
+        model = model or ("" if order.program else self.models[0])
+        order = Order(instruction, model, order.program, order.author)
         if not (order.program.strip() or instruction):
             raise MissionError("the instruction is empty; say what the robot should do")
         for text in (order.instruction, order.program):
@@ -125,12 +126,14 @@ class Console:
         _check_length(program)
         session = self._session
         if session is None or session.view.is_over:
-            return self.begin(Order(self.view.order.instruction, program=program))
+            before = self.view
+            author = before.author if program == before.program else ""
+            return self.begin(Order(before.order.instruction, before.order.model, program, author))
         session.edit(program)
         return session
 
     def dismiss(self) -> None:
-        """Mention the interrupted missions no more."""
+        """Dismiss the notice about interrupted missions."""
         self.interrupted = ()
         self.notifier.change()
 
@@ -207,4 +210,4 @@ class Notifier:
 
 def _check_length(text: str) -> None:
     if len(text) > MOST_PROGRAM:
-        raise MissionError(f"{len(text):,} characters are too many; {MOST_PROGRAM:,} is the limit")
+        raise MissionError(f"it is too long: {len(text):,} characters, and {MOST_PROGRAM:,} is the limit")

@@ -34,7 +34,7 @@ from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
 from codebotler.web.guard import MOST_BYTES, NO_PAGE, REFUSAL, Guard
 
 STATIC = Path(__file__).with_name("static")
-LEAVING = "the last operator, closing the page"
+LEAVING = "CodeBotler, since the last operator closed the page"
 RUNS = Path("runs")
 METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 SOCKETS = "/_nicegui_ws/"
@@ -91,9 +91,7 @@ def _links(place: Place, port: int, access: Access, console: Console | None) -> 
         f"    {address}{query(access.operator or '')}\n",
     ]
     if not place.is_loopback:
-        lines.append(
-            "Other machines can open it too, with this link only. The connection is not encrypted.\n"
-        )
+        lines.append("Other machines can open this link, too. The connection is not encrypted.\n")
     if console and console.face is not None:
         where = "here (--host lets other machines in)" if place.is_loopback else "on the robot's tablet"
         lines.append(f"The robot's face cannot run anything. Open it {where}:\n")
@@ -146,7 +144,7 @@ def _not_found(app: FastAPI, request: Request, _error: Exception) -> Response:
     status, sentence, headers = HTTPStatus.NOT_FOUND, NO_PAGE, {}
     allowed = [method for method in METHODS if _is_taken(app.routes, method, request.scope["path"])]
     if allowed:
-        status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address takes {listed(allowed)} only"
+        status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address accepts only {listed(allowed)}"
         headers = {"allow": ", ".join(allowed)}
     if "text/html" in request.headers.get("accept", ""):
         return HTMLResponse(REFUSAL.format(sentence=sentence), status, headers)

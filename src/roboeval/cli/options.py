@@ -268,7 +268,7 @@ def cores() -> int:
 
 
 def engine_named(name: str, workers: int | None, **isolation: bool) -> OpenEngine:
-    """The engine with this name, which isolates programs as `WorkerPool` does; a local one is being started."""
+    """The engine with this name, which isolates programs as `WorkerPool` does; a local one starts at once."""
     from roboeval.evaluation.engines import Local
 
     if name == "local":

@@ -246,7 +246,7 @@ def test_signal_stops_the_robot(folder: Path, signals: Sequence[int], status: in
             time.sleep(0.01)
         out, err = process.communicate(timeout=30)
     assert process.returncode == status
-    assert re.search("^ +stopped while", out, re.MULTILINE)
+    assert re.search("^ +cancelled$", out, re.MULTILINE)
     assert re.search("robot has stopped", out)
     assert "Traceback" not in err
     assert family

@@ -59,7 +59,7 @@ def test_right_programs_have_no_problems() -> None:
         (in_task("say(x)", "x = 'a'") + "\nx = 'b'", 2, ["local variable x "]),
         (in_task("say = say('a')"), 2, ["local variable say "]),
         (in_task("x = 1", "ask('a', 'b')"), 3, ["ask", "person, question and options", "2 arguments"]),
-        (in_task("go_to()"), 2, ["go_to", "location", "no argument"]),
+        (in_task("go_to()"), 2, ["go_to", "location", "got none"]),
         (in_task("get_all_rooms(1)"), 2, ["get_all_rooms", "no arguments", "1 argument"]),
         (in_task("pick(item='a')"), 2, ["pick", "obj", "item"]),
         (in_task("pick('a', obj='a')"), 2, ["pick", "obj", "twice"]),

@@ -44,8 +44,8 @@ THERE: dict[str, object] = {"event": "result", "number": 1, "skill": "go_to", "r
 @pytest.mark.parametrize(
     ("state", "events", "named"),
     [
-        (State.DRAFTING, [], ["drafting", "nothing"]),
-        (State.APPROVED, [], ["approved", "nothing"]),
+        (State.DRAFTING, [], ["drafting", "not moved"]),
+        (State.APPROVED, [], ["approved", "not moved"]),
         (State.RUNNING, [RUNNING, DRIVE, AT], ['go_to("kitchen")', "(at (1.0, 2.0))", IF_TOOL_DIES]),
         (State.STOPPING, [RUNNING, DRIVE], ['go_to("kitchen"); ', IF_TOOL_DIES]),
         (State.RUNNING, [RUNNING, DRIVE, AT, THERE], ["robot was idle"]),

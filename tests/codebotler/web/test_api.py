@@ -222,7 +222,7 @@ def test_another_method_is_told_which_are_taken(
 ) -> None:
     answer = server.call(method, path)
     assert (answer.status, answer.headers.get("allow")) == (405, allowed)
-    assert answer.data["detail"] == f"this address takes {allowed.replace(', ', ' and ')} only"
+    assert answer.data["detail"] == f"this address accepts only {allowed.replace(', ', ' and ')}"
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -11,14 +12,16 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.problems import Check
+from codebotler.core.files import Appender
 from codebotler.core.world import Room, World
-from codebotler.missions.log import State, Summary
+from codebotler.missions import log as mission_log
+from codebotler.missions.log import Line, State, Summary
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.store import missions
 from codebotler.missions.view import Order, SessionView, digest
 from codebotler.models.base import Heard, Model, ModelError, Reply, Usage, unheard
 from codebotler.prompts import Prompt
-from codebotler.robots.base import Result, Robot
+from codebotler.robots.base import CancelledError, Result, Robot
 from codebotler.robots.simulated import Simulated
 from codebotler.simulator.sampled_robot import RoomMap
 from codebotler.web.console import MOST_PROGRAM, Console
@@ -235,9 +238,60 @@ def test_a_program_is_there_again_when_the_asking_is_stopped(tmp_path: Path) -> 
         until(console, lambda view: view.may_be_approved)
         author.waits = True
         session.ask_again(repair=False)
-        until(console, lambda view: view.program == BAD[:10])
+        view = until(console, lambda view: view.program == BAD[:10])
+        assert (view.state, view.phase) == (State.CHECKED, "writing")
         console.stop("a test")
         assert until(console, lambda view: view.is_over).program == HELLO
+
+
+def test_no_other_program_is_asked_for_while_one_is_being_approved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with desk_of(tmp_path, author=Author(HELLO, BAD)) as console:
+        session = console.begin(Order("say hello", "author"))
+        view = until(console, lambda view: view.may_be_approved)
+        approve = Mission.approve
+
+        def slowly(mission: Mission, *, despite_problems: bool = False) -> None:
+            thread.start()
+            thread.join(0.2)
+            approve(mission, despite_problems=despite_problems)
+
+        refused: list[MissionError] = []
+
+        def ask() -> None:
+            try:
+                session.ask_again(repair=False)
+            except MissionError as error:
+                refused.append(error)
+
+        thread = threading.Thread(target=ask)
+        monkeypatch.setattr(Mission, "approve", slowly)
+        session.approve(view.digest)
+        view = until(console, lambda view: view.is_over)
+        thread.join()
+        assert (view.state, view.phase, view.program, len(refused)) == (State.DONE, "done", HELLO, 1)
+
+
+def test_a_stop_reaches_a_robot_that_is_asked_for_its_rooms(tmp_path: Path) -> None:
+    told = threading.Event()
+
+    class Slow(Answering):
+        def cancel(self) -> None:
+            super().cancel()
+            told.set()
+
+    def answer(_skill: str, _first: str) -> Result:
+        if not told.wait(10):
+            return ["hall"]
+        raise CancelledError
+
+    with desk_of(tmp_path, Slow(answer)) as console:
+        session = console.begin(Order(program=HELLO))
+        assert until(console, lambda view: bool(view.id)).phase == "starting"
+        console.stop("a test")
+        session.join(5)
+        assert (console.view.is_over, console.view.state, console.view.trouble) == (True, State.STOPPED, "")
 
 
 def test_a_running_mission_is_not_disturbed(tmp_path: Path) -> None:
@@ -302,6 +356,38 @@ def test_a_model_that_does_not_answer_is_told_of(tmp_path: Path) -> None:
         assert (view.trouble, view.state) == ("the model is not there", State.FAILED)
 
 
+def test_the_same_program_keeps_its_author_when_it_is_run_again(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author(HELLO)) as console:
+        session = console.begin(Order("say hello", "author"))
+        session.approve(until(console, lambda view: view.may_be_approved).digest)
+        until(console, lambda view: view.is_over)
+        for program, author in ((HELLO, "author"), (HELLO + "# mine\n", "")):
+            console.edit(program)
+            view = until(console, lambda view: view.may_be_approved)
+            assert (view.author, view.order.model, view.program) == (author, "author", program)
+            console.stop("a test")
+            until(console, lambda view: view.is_over)
+    assert [one.model for one in missions(tmp_path)] == ["author", "author", ""]
+
+
+def test_a_mission_whose_end_cannot_be_logged_has_ended_in_the_view(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add = mission_log.add_event
+
+    def full(log: Appender, event: str, clock: float, **data: object) -> Line:
+        if data.get("state") == State.DONE:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return add(log, event, clock, **data)
+
+    monkeypatch.setattr("codebotler.missions.mission.add_event", full)
+    with desk_of(tmp_path) as console:
+        approved(console)
+        view = until(console, lambda view: view.is_over)
+        assert (view.state, view.phase) == (State.DONE, "done")
+        assert "No space left" in view.trouble
+
+
 def test_the_first_model_writes_where_none_is_named(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(HELLO)) as console:
         console.begin(Order("say hello"))
@@ -312,7 +398,7 @@ def test_the_first_model_writes_where_none_is_named(tmp_path: Path) -> None:
     ("order", "told"),
     [
         (Order("   ", "author"), "instruction is empty"),
-        (Order(program="#" * (MOST_PROGRAM + 1)), "too many"),
+        (Order(program="#" * (MOST_PROGRAM + 1)), "too long"),
     ],
 )
 def test_what_cannot_be_begun_is_refused(console: Console, order: Order, told: str) -> None:

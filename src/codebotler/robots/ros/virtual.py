@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills import SKILLS
 from codebotler.core.world import World
 from codebotler.robots.base import ROS_PYTHON, Argument, CancelledError, RobotLostError
 from codebotler.robots.ros.robot import actions_of
@@ -33,7 +33,6 @@ class VirtualRobot:
         speed: seconds of its clock per real second; None if nothing takes real time.
         port: of the master; None for that of ROS_MASTER_URI.
         python: an interpreter that has rospy, and rosmaster if a master must be started.
-        skills: the skills it offers.
         show: called with a line for each goal and for its end.
 
     Raises:
@@ -47,10 +46,9 @@ class VirtualRobot:
         speed: float | None = 1.0,
         port: int | None = None,
         python: Path = ROS_PYTHON,
-        skills: SkillTable = SKILLS,
         show: Callable[[str], None] = lambda _: None,
     ) -> None:
-        self._speed, self._python, self._skills, self._show = speed, python, skills, show
+        self._speed, self._python, self._show = speed, python, show
         self.address = master_uri(f"http://localhost:{port}" if port else "")
         self._body = self._at_start(world)
         self._goals: queue.SimpleQueue[Message | None] = queue.SimpleQueue()
@@ -72,7 +70,7 @@ class VirtualRobot:
         environment = {"ROS_MASTER_URI": self.address}
         if port is not None and not {"ROS_IP", "ROS_HOSTNAME"} & os.environ.keys():
             environment["ROS_HOSTNAME"] = "localhost"
-        start = {"node": NODE, "actions": actions_of(self._skills), "port": port}
+        start = {"node": NODE, "actions": actions_of(SKILLS), "port": port}
         worker = self._worker = RosWorker(self._python, "servers.py", start, environment)
         self._threads = [
             threading.Thread(target=run, args=(worker,), daemon=True) for run in (self._listen, self._work)
@@ -100,7 +98,7 @@ class VirtualRobot:
             thread.join(HEARS)
 
     def _at_start(self, world: World) -> Simulated:
-        body = Simulated(world, speed=self._speed, skills=self._skills)
+        body = Simulated(world, speed=self._speed)
         body.connect()
         return body
 

@@ -99,7 +99,7 @@ class ProgramPane:
         if typed is None:
             self._restore(f"A program has at most {MOST_PROGRAM:,} characters.")
         elif event.args["base"] != current:
-            self._restore("Another person changed the program meanwhile; your last edit was discarded.")
+            self._restore("Someone else changed the program; your last edit was discarded.")
         elif typed != current:
             self._try(lambda: self._console.edit(typed))
         self.show(self._console.view)
@@ -121,7 +121,7 @@ class ProgramPane:
         self._verdict.classes(add="bad" if count else "good", remove="good" if count else "bad")
         told = f"{many}. The robot should not run this." if count else "Checked: no problems."
         if view.check.rooms_are_guessed:
-            told += " The robot does not list its rooms; they were taken from the program."
+            told += " The robot does not list its rooms; the check used the rooms named in the program."
         self._verdict.say(told)
 
     def _show_approval(self, view: SessionView) -> None:
@@ -164,7 +164,7 @@ class ProgramPane:
         if seen["text"] == _for_editor(view.program):
             return True
         if seen["number"] > self._heard or seen["text"] == _for_editor(self._console.view.program):
-            ui.notify("Your last edit is checked first.", position="top")
+            ui.notify("Checking your last edit first.", position="top")
         else:
             self._restore("The program has changed; look at it again.")
         return False

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from nicegui import ui
 
 from codebotler.core.skills import SKILLS
 from codebotler.core.world import Room, World, laid_out
 from codebotler.missions.log import State, Summary
 from codebotler.missions.progress import ANSWER, Moment
-from codebotler.missions.view import CHECKING, SessionView
+from codebotler.missions.view import Phase, SessionView
 from codebotler.web.console import Console
 from codebotler.web.floorplan import floorplan
 from codebotler.web.frame import Button, PlainText
 from codebotler.web.panes.question import QuestionPane
 
-HEADLINES = {
-    None: "No mission yet",
-    State.DRAFTING: "The program is being written",
+HEADLINES: Mapping[Phase, str] = {
+    "": "No mission yet",
+    "writing": "The program is being written",
+    "checking": "The program is being checked",
     State.CHECKED: "Ready: waiting for your approval",
     State.APPROVED: "Starting",
 }
@@ -50,14 +53,8 @@ class RobotPane:
         """Show a view."""
         self._tell_interrupted(self._console.interrupted)
         progress = view.progress
-        state = view.state
-        headline = HEADLINES.get(state) or str(state).capitalize()
-        if state is None and view.busy and not view.is_over:
-            headline = "Starting"
-        elif view.busy == CHECKING:
-            headline = "The program is being checked"
-        self._state.say(headline)
-        self._state.classes(replace=f"headline {state or 'none'}")
+        self._state.say(HEADLINES.get(view.phase) or view.phase.capitalize())
+        self._state.classes(replace=f"headline {view.phase or 'none'}")
         doing = progress.doing
         self._doing.say(doing[:1].upper() + doing[1:] if view.is_running else "")
         where = [f"line {progress.line}"] if progress.line is not None else []

@@ -78,7 +78,7 @@ function ask(question) {
   $("asked").hidden = question === null;
   put("person", question?.person ? `For ${question.person}` : "");
   put("question", question === null ? "" : question.text || "?");
-  put("more", question?.more_options ? `${question.more_options} more answers cannot be shown.` : "");
+  put("more", question?.more_options ? `${question.more_options} more answers are not shown.` : "");
   sized($("question"), $("question").textContent);
   const options = question?.options.map((text, position) => option(question, text, position)) ?? [];
   $("options").replaceChildren(...options);

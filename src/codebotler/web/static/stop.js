@@ -3,12 +3,12 @@
   const button = document.getElementById("stop");
   const told = document.getElementById("stop-told");
   const { stop: stopAt = "/api/stop", robot: robotAt = "/api/robot" } = document.currentScript.dataset;
-  const LOST = "The tool cannot be reached. Use the robot's emergency stop.";
+  const LOST = "CodeBotler is not responding. Use the robot's emergency stop.";
   const ENDS = {
     stopped: "The robot has stopped.",
     done: "The mission had already ended.",
     interrupted: "The mission was interrupted.",
-    null: "It was stopped before it began.",
+    null: "Stopped before the mission started.",
   };
   let pressed = 0;
 
@@ -37,7 +37,7 @@
       if (!answer.ok) throw new Error(answer.status);
       const { stopping } = await answer.json();
       if (stopping) {
-        say("Stopping: the robot has been told.", "busy");
+        say("Stop sent. Waiting for the robot to confirm …", "busy");
         await watch(which);
       } else if (!onlyMoving) {
         say("Nothing is running.");
