@@ -109,6 +109,25 @@ def test_no_pairs_give_no_outcomes() -> None:
     assert list(run([], workers=1)) == []
 
 
+def test_a_pool_starts_beside_its_caller_and_outlives_the_thread_that_made_it() -> None:
+    made: list[WorkerPool] = []
+    maker = threading.Thread(target=lambda: made.append(WorkerPool(1)))
+    maker.start()
+    maker.join()
+    with made[0] as pool:
+        started = fork_servers()
+        assert said(pool.here().run(saying("hi"), lambda: SimulatedRobot(WORLD))) == ["hi"]
+        assert len(pool._workers) == 1
+        assert fork_servers() == started
+
+
+def test_a_pool_that_nobody_enters_ends_with_the_process() -> None:
+    script = "from codebotler.simulator.pool import WorkerPool; WorkerPool(1)"
+    began = fork_servers()
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=60)
+    assert fork_servers() <= began
+
+
 def test_pairs_are_read_only_a_little_ahead() -> None:
     read = count()
     outcomes = run(((saying(str(next(read))), WORLD) for _ in count()), workers=1)

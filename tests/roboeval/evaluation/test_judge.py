@@ -9,8 +9,10 @@ import pytest
 from codebotler.core.errors import UserError
 from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trace
 from codebotler.core.world import Room, World
+from codebotler.rtl import holds
+from codebotler.rtl.formulas import Formula
 from roboeval.evaluation.failures import Verdict, failure
-from roboeval.evaluation.judge import evaluate, judge
+from roboeval.evaluation.judge import LONGEST_REMEMBERED, evaluate, judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
@@ -209,3 +211,41 @@ def test_evaluating_takes_an_ablation(paper: Suite) -> None:
     completion = replace(OURS, task=task)
     with pytest.raises(UserError, match=f'"{task}" .*ablation'):
         list(evaluate([completion], paper, ablated=True))
+
+
+HI = (Event("goto", "kitchen"), Event("say", "hi"))
+
+
+@pytest.fixture
+def tested(monkeypatch: pytest.MonkeyPatch) -> list[Trace]:
+    """The traces on which a formula was tested."""
+    traces: list[Trace] = []
+
+    def counted(formula: Formula, trace: Trace) -> bool:
+        traces.append(trace)
+        return holds(formula, trace)
+
+    monkeypatch.setattr("roboeval.evaluation.judge.holds", counted)
+    return traces
+
+
+def test_what_a_run_has_met_is_found_once_in_each_world(suite: Suite, tested: list[Trace]) -> None:
+    one, other = suite.tasks["T"].scenarios
+    run = Outcome(Status.FINISHED, HI)
+    for _ in range(3):
+        assert [judge(run, one).satisfied, judge(run, other).satisfied] == [True, True]
+    assert len(tested) == len(one.require) + len(other.require)
+    assert not judge(Outcome(Status.FINISHED, HI[:1]), one).satisfied
+
+
+def test_long_runs_are_not_remembered_and_others_forgotten(
+    suite: Suite, tested: list[Trace], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("roboeval.evaluation.judge.MOST_REMEMBERED", 2)
+    scenario = suite.tasks["T"].scenarios[1]
+    long = Outcome(Status.FINISHED, HI * LONGEST_REMEMBERED)
+    runs = [Outcome(Status.FINISHED, HI) for _ in range(3)]
+    for run, times in ((long, 2), (runs[0], 1), (runs[1], 1), (runs[2], 1), (runs[0], 1)):
+        tested.clear()
+        assert [judge(run, scenario).satisfied for _ in range(2)] == [True, True]
+        assert len(tested) == times
