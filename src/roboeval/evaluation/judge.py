@@ -34,7 +34,7 @@ LOG = logging.getLogger("roboeval.evaluation.judge")
 Value = TypeVar("Value")
 
 BUDGET = 60  # seconds of processor time that judging one program may take, in all its worlds
-MOST_REMEMBERED, LONGEST_REMEMBERED = 4_096, 64  # results, and events of a run
+MOST_REMEMBERED, LONGEST_REMEMBERED = 2_048, 128  # results, and events of all runs of one
 
 
 class Remembered(Generic[Value]):
@@ -58,7 +58,7 @@ class Remembered(Generic[Value]):
         value = found()
         if len(self._known) >= MOST_REMEMBERED:
             self._known.clear()
-        if all(len(outcome.trace) <= LONGEST_REMEMBERED for outcome in outcomes):
+        if sum(len(outcome.trace) for outcome in outcomes) <= LONGEST_REMEMBERED:
             self._known[key] = value, tuple(outcomes), tuple(scenarios)
         return value
 
