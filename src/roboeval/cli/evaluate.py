@@ -57,9 +57,6 @@ def evaluate(
     json: JsonOption = False,
 ) -> None:
     """Judge whether each completion does what was asked."""
-    running = engine_named(
-        engine, workers, require_isolation=require_isolation, one_process_per_run=one_process_per_run
-    )
     from roboeval.analysis.metrics import judged_count
     from roboeval.analysis.summary import summary
     from roboeval.evaluation.runs.completions import how_many
@@ -67,6 +64,9 @@ def evaluate(
     from roboeval.evaluation.runs.results import Scope
     from roboeval.evaluation.runs.table import TableBuilder
 
+    running = engine_named(
+        engine, workers, require_isolation=require_isolation, one_process_per_run=one_process_per_run
+    )
     judged_by = load(suite)
     if worlds is not None or seed is not None:
         judged_by = judged_by.with_worlds(worlds, seed)

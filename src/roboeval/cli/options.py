@@ -268,11 +268,11 @@ def cores() -> int:
 
 
 def engine_named(name: str, workers: int | None, **isolation: bool) -> OpenEngine:
-    """The engine with this name, which isolates programs as `WorkerPool` does; a local one starts at once."""
+    """The engine with this name, which isolates programs as `WorkerPool` does."""
     from roboeval.evaluation.engines import Local
 
     if name == "local":
-        return Local(workers or cores(), **isolation).begin()
+        return Local(workers or cores(), **isolation)
     if name != "ray":
         fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster

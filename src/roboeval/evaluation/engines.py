@@ -44,22 +44,14 @@ class Local:
 
     def __init__(self, pool: WorkerPool | int, **isolation: bool) -> None:  # as of `WorkerPool`
         self._given, self._isolation = pool, isolation
-        self._begun: WorkerPool | None = None
-
-    def begin(self) -> Self:
-        """Start the processes beside what the caller does before it needs them."""
-        if not isinstance(self._given, WorkerPool):
-            self._begun = WorkerPool(self._given, **self._isolation)
-        return self
 
     def __enter__(self) -> Self:
         self._threshold = gc.get_threshold()
         gc.set_threshold(BRIEF, *self._threshold[1:])
-        if isinstance(self._given, WorkerPool):
-            self._pool = self._given
-        else:
-            begun, self._begun = self._begun, None
-            self._pool = (begun or WorkerPool(self._given, **self._isolation)).__enter__()
+        given = self._given
+        self._pool = (
+            given if isinstance(given, WorkerPool) else WorkerPool(given, **self._isolation).__enter__()
+        )
         return self
 
     def __exit__(self, *_: object) -> None:
