@@ -68,6 +68,14 @@ def test_what_it_says_yes_or_no_to_is_in_the_trace_and_read_in_its_words() -> No
     assert str(step_text(steps_of(robot.trace)[1])) == 'open "gate"'
 
 
+def test_a_question_of_its_own_is_shown_with_its_options_and_its_answer() -> None:
+    vote = Event("vote", "tea?", (Option("yes"), Option("no")), answer="no")
+    (step,) = steps_of((vote,))
+    assert str(step_text(step)) == 'vote "tea?" [yes | no] → no'
+    (unanswered,) = steps_of((Event("ask", "tea?", (Option("yes"),)),))
+    assert str(step_text(unanswered)) == 'asked "tea?" [yes] → no answer'
+
+
 PROGRAMS = {
     "waves": "def task_program():\n    go_to('lab')\n    wave('alice')\n    wave(person='bob')\n",
     "nobody": "def task_program():\n    say('a')\n    wave('alice')\n",

@@ -261,7 +261,7 @@ def shared_pool() -> WorkerPool:
     """The pool of this process, with one worker for each core, started on first use; a fork has its own."""
     with SHARED.lock:
         if SHARED.pool is None:
-            SHARED.pool = WorkerPool(cores())
+            SHARED.pool = WorkerPool(cores()).__enter__()  # a pool that cannot start is not kept
         return SHARED.pool
 
 

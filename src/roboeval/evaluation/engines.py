@@ -48,10 +48,10 @@ class Local:
     def __enter__(self) -> Self:
         self._threshold = gc.get_threshold()
         gc.set_threshold(BRIEF, *self._threshold[1:])
-        given = self._given
-        self._pool = (
-            given if isinstance(given, WorkerPool) else WorkerPool(given, **self._isolation).__enter__()
-        )
+        if isinstance(self._given, WorkerPool):
+            self._pool = self._given
+        else:
+            self._pool = WorkerPool(self._given, **self._isolation).__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:

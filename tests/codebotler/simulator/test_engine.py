@@ -20,10 +20,10 @@ import pytest
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, RunError, Status
 from codebotler.core.world import Room, World
-from codebotler.simulator import isolated_process
+from codebotler.simulator import isolated_process, pool
 from codebotler.simulator.engine import digest, run
 from codebotler.simulator.fork_server import BatchServer
-from codebotler.simulator.isolated_process import SIMULATION, compiled_file
+from codebotler.simulator.isolated_process import SIMULATION, LostProcessError, compiled_file
 from codebotler.simulator.ledger import SkillAnswer
 from codebotler.simulator.pool import WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Behaviour, SimulatedRobot
@@ -119,6 +119,23 @@ def test_a_pool_starts_beside_its_caller_and_outlives_the_thread_that_made_it() 
         assert said(pool.here().run(saying("hi"), lambda: SimulatedRobot(WORLD))) == ["hi"]
         assert len(pool._workers) == 1
         assert fork_servers() == started
+
+
+def test_the_pool_of_the_process_is_tried_again_where_it_could_not_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(_: BatchServer) -> None:
+        raise LostProcessError("no memory")
+
+    monkeypatch.setattr(pool, "SHARED", shared := pool.SharedPool())
+    with monkeypatch.context() as broken:
+        broken.setattr(BatchServer, "_set_up", fails)
+        with pytest.raises(EngineError, match="cannot start"):
+            pool.shared_pool()
+    try:
+        assert said(pool.shared_pool().here().run(saying("hi"), lambda: SimulatedRobot(WORLD))) == ["hi"]
+    finally:
+        shared.end()
 
 
 def test_a_pool_that_nobody_enters_ends_with_the_process() -> None:
