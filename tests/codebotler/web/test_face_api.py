@@ -116,6 +116,8 @@ def test_a_stop_takes_the_question_back_on_every_face(server: PageServer) -> Non
         server.run(TEA)
         number = until(server, lambda now: now["question"])["question"]["number"]
         server.call("POST", "/api/stop")
+        over = server.face("GET", "/api/face?once_over=true").data
+        assert (over["is_over"], over["state"]) == (True, "stopped")
         for socket in (one, other):
             assert ending(socket, number)["how"] == "withdrawn"
         late = server.face("POST", "/api/face/answer", {"question": number, "option": 0})
