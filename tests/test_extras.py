@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.cli.ending import EXTRAS
+from codebotler.core.errors import EXTRAS
 
 ROOT = Path(__file__).parent.parent
 WITHOUT = f"""
 import sys
-for package in {sorted({*EXTRAS, "pyrobosim", "ray", "torch", "transformers"})}:
+for package in {sorted(EXTRAS)}:
     sys.modules[package] = None
 from {{package}}.cli.app import main
 sys.argv = [{{package!r}}, *sys.argv[1:]]

@@ -8,9 +8,9 @@ from typing import Any
 
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Outcome, outcome_data
-from codebotler.core.words import counted, listed
+from codebotler.core.words import brief, counted, listed
 from codebotler.simulator.fact_sampler import Draw, FactSampler
-from codebotler.simulator.sampled_robot import Fact, RoomMap, brief
+from codebotler.simulator.sampled_robot import Fact, RoomMap
 
 
 @dataclass(frozen=True)

@@ -65,13 +65,10 @@ def generate(
     The status is 1 if a check finds problems in it.
     """
     from codebotler.cli.generate import show, write
-    from codebotler.core.errors import UserError
     from codebotler.core.world import World
     from codebotler.models.base import SamplingSettings
     from codebotler.prompts import prompt_for
 
-    if not instruction.strip():
-        raise UserError("the instruction is empty; say what the robot should do")
     known = None if world is None else World.read(world)
     prompt = prompt_for(instruction, rooms=() if known is None else [room.name for room in known.rooms])
     if show_prompt:

@@ -11,20 +11,13 @@ from typing import Any, NoReturn
 import typer
 from typer.main import get_command
 
+from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import FULL, drop_output, flush_output, note, open_streams, system_sentence
 
 ON_WINDOWS = "this runs on Linux and macOS; on Windows, use it inside WSL"
 STOPPED = 130  # the status after Ctrl-C, as shells have it
 USAGE: Any = typer.BadParameter.__mro__[1]  # click's UsageError, wherever this version of typer keeps click
 ENVIRONMENT = (*FULL, errno.EIO)  # of all that can go wrong in writing, what no other path would mend
-
-EXTRAS = {
-    **dict.fromkeys(("anthropic", "google", "httpx", "openai", "pydantic_ai"), "models"),
-    **dict.fromkeys(("fastapi", "nicegui", "starlette", "uvicorn"), "page"),
-    **dict.fromkeys(("PIL", "mcap", "websockets"), "robots"),
-    "matplotlib": "report",
-}
-"""The extra of this distribution that brings each package."""
 
 _command = cache(get_command)
 
@@ -41,7 +34,8 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
     if not os.environ.get("COLUMNS", "1").strip("0"):  # no columns at all: what asked does not know how many
         del os.environ["COLUMNS"]
     try:
-        status = _command(app)(standalone_mode=False, prog_name=name)
+        with installed():
+            status = _command(app)(standalone_mode=False, prog_name=name)
         flush_output()
     except KeyboardInterrupt:
         status = STOPPED
@@ -63,7 +57,6 @@ def obey(app: typer.Typer, name: str) -> NoReturn:
 
 def _ending(error: Exception) -> tuple[int, str] | None:
     """The status and the sentence for an error; None for a fault of ours."""
-    from codebotler.core.errors import UserError
     from codebotler.models.base import BudgetSpentError, ModelError
     from codebotler.robots.base import NotReadyError, RobotLostError
     from codebotler.simulator.worker import EngineError
@@ -74,8 +67,6 @@ def _ending(error: Exception) -> tuple[int, str] | None:
         return 1, str(error)
     if isinstance(error, ModelError):
         return (1 if error.may_pass else 2), error.sentence
-    if isinstance(error, ModuleNotFoundError) and (package := (error.name or "").split(".")[0]) in EXTRAS:
-        return 2, f"{package} is not installed; `pip install 'codebotler[{EXTRAS[package]}]'` installs it"
     if isinstance(error, OSError) and (error.filename is not None or error.errno in ENVIRONMENT):
         return (1 if error.errno in ENVIRONMENT else 2), system_sentence(error)
     return None

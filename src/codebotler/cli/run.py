@@ -118,7 +118,7 @@ def _is_approved(session: MissionSession, view: SessionView, robot: Robot, reque
         note("not run because of problems; --despite-problems runs it anyway")
         return False
     if not request.yes and not says_yes(f"run the program on the robot {robot.name}?"):
-        session.stop("the person who was asked")
+        session.stop("the person at the terminal")
         note("not run; the robot has not moved")
         return False
     return True

@@ -1,13 +1,25 @@
-"""`UserError`: a mistake that the user can fix, with its file and line."""
+"""What users can mend: a mistake of theirs, with its file and line, and a package that is not installed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from pathlib import Path
+
+EXTRAS = {
+    **dict.fromkeys(("anthropic", "google", "httpx", "openai", "pydantic_ai"), "models"),
+    **dict.fromkeys(("fastapi", "nicegui", "starlette", "uvicorn"), "page"),
+    **dict.fromkeys(("PIL", "mcap", "websockets"), "robots"),
+    **dict.fromkeys(("torch", "transformers"), "transformers"),
+    "matplotlib": "report",
+    "pyrobosim": "pyrobosim",
+    "ray": "ray",
+}
+"""The extra of this distribution that brings each package."""
 
 LONGEST = 600  # characters of a sentence; of a longer one, the ends are shown
 
@@ -43,3 +55,26 @@ def expect_list(given: Sequence[str] | None, what: str) -> None:
     """Refuse a single text in place of a list, since Python would take its letters."""
     if isinstance(given, str):
         raise UserError(f"{what} must be a list, not the single string {given[:40]!r}")
+
+
+def install_command(package: str) -> str:
+    """What to type to install the extra that brings a package."""
+    return f"pip install 'codebotler[{EXTRAS[package]}]'"
+
+
+def missing_package(error: ModuleNotFoundError) -> str:
+    """The package of an extra that an import did not find; empty if it was another."""
+    package = (error.name or "").split(".")[0]
+    return package if package in EXTRAS else ""
+
+
+@contextmanager
+def installed() -> Iterator[None]:
+    """Import packages of an extra; UserError with the command that installs one that is missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = missing_package(error)
+        if not package:
+            raise
+        raise UserError(f"{package} is not installed; `{install_command(package)}` installs it") from None

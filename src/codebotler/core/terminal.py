@@ -11,7 +11,7 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Timer
 from typing import TYPE_CHECKING, Any
@@ -180,7 +180,7 @@ def visible_lines(text: str) -> str:
     return "\n".join(visible(line.expandtabs(4)) for line in re.split("\r\n?|\n", text))
 
 
-def shortened(text: str, most: int = 500) -> str:
+def shortened(text: str, most: int = 500, shown: Callable[[str], str] = visible) -> str:
     """A text made visible, and cut where it is too long to read."""
     left = len(text) - most
-    return visible(text) if left <= 0 else f"{visible(text[:most])}... {left:,} more characters"
+    return shown(text) if left <= 0 else f"{shown(text[:most])}... {left:,} more characters"

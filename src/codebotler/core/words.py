@@ -1,4 +1,4 @@
-"""English for messages: enumerations, numbers and plurals."""
+"""English for messages: enumerations, numbers, plurals, and texts cut for a sentence."""
 
 from __future__ import annotations
 
@@ -20,3 +20,9 @@ def counted(number: int, noun: str) -> str:
 def times(number: int) -> str:
     """A frequency: `once`, `twice`, `3 times`."""
     return {0: "not at all", 1: "once", 2: "twice"}.get(number, f"{number:,} times")
+
+
+def brief(text: str, most: int = 70) -> str:
+    """A text on one line, and cut where it is too long for a sentence."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else f"{line[: most - 1].rstrip()}…"

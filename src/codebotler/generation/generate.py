@@ -181,8 +181,6 @@ def generate(
     tries = int(repair) if retries is None else retries
     if tries < 0:
         raise UserError(f"the number of retries is {tries}, but must be at least 0")
-    if not instruction.strip():
-        raise UserError("the instruction is empty; say what the robot should do")
     settings = SamplingSettings(temperature, top_p, max_tokens, seed, timeout, base_url)
     prompt = prompt_for(instruction, rooms=rooms or ())
     return write_checked_program(

@@ -132,12 +132,16 @@ def _is_event(line: Line) -> bool:
     return is_moment and isinstance(kind, str) and HAS.get(kind, frozenset()) <= line.keys()
 
 
+SKILL_ENDS = frozenset({"result", "error", "cancelled", "late"})
+"""The events with which a skill ends."""
+
+
 def doing(events: Iterable[Line]) -> Line | None:
     """The skill that went on when the events broke off, if one did."""
     going: Line | None = None
     for line in events:
         if line["event"] == "skill":
             going = line
-        elif line["event"] in {"result", "error", "cancelled", "late"}:
+        elif line["event"] in SKILL_ENDS:
             going = None
     return going

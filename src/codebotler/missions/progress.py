@@ -13,12 +13,11 @@ from codebotler.core.program import parsed
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
 from codebotler.core.world import Point
-from codebotler.missions.log import Line
+from codebotler.missions.log import SKILL_ENDS, Line
 from codebotler.missions.wording import event_text
 
 AT = re.compile(r"at \((-?\d+(?:\.\d+)?), (-?\d+(?:\.\d+)?)\)")
 MOST = 200
-ENDS = frozenset({"result", "error", "cancelled", "late"})
 ANSWER = "answer"  # the kind of moment at which the robot hears something
 
 
@@ -53,7 +52,7 @@ class Progress:
             return replace(now, at=(float(place[1]), float(place[2]))) if place else now
         if event == "skill":
             now = now.with_skill(line, program)
-        elif event in ENDS:
+        elif event in SKILL_ENDS:
             now = replace(now, doing="", skill="", line=None, is_driving=False)
         text = "" if event == "state" else event_text(line)
         if not text or (event == "sleep" and not line["seconds"]):

@@ -51,12 +51,18 @@ class MissionSession:
         number: int = 1,
         before: MissionSession | None = None,
     ) -> None:
-        self._robot, self._home = robot, home
+        self._robot, self._home, self._order = robot, home, order
         self._open_model, self._check, self._changed, self._before = open_model, check, changed, before
         self._lock = threading.Condition()  # held for moments; never while a mission is asked for something
         self._editing = threading.Lock()  # held while a program is replaced or approved
         self._view = SessionView(
-            number, order=order, program=order.program, author=order.author, busy="waiting", is_over=False
+            number,
+            instruction=order.instruction,
+            model=order.model,
+            program=order.program,
+            author=order.author,
+            busy="waiting",
+            is_over=False,
         )
         self._events: list[Line] = []
         self._mission: Mission | None = None
@@ -103,10 +109,10 @@ class MissionSession:
         """Have the model write another program; with `repair`, it is shown this one and its problems."""
         with self._editing, self._lock:
             view = self._view
-            if not view.may_be_approved or not view.order.model:
+            if not view.may_be_approved or not view.model:
                 raise MissionError("the model cannot be asked again now")
             self._ask_again = (view.problems if repair else (),)
-            self._change(busy=f"asking {view.order.model}", is_written=True)
+            self._change(busy=f"asking {view.model}", is_written=True)
 
     def approve(self, seen: str, *, despite_problems: bool = False) -> None:
         """Let the robot run the program that the person saw, which is named by its digest."""
@@ -167,7 +173,7 @@ class MissionSession:
         return {"state": ended.state, "reason": ended.reason, "line": ended.line}
 
     def _through(self) -> None:
-        order = self._view.order
+        order = self._order
         if self._is_stopped():
             return
         with (
@@ -215,7 +221,7 @@ class MissionSession:
 
     def _ask(self, mission: Mission, problems: Sequence[str]) -> None:
         """Have the model write a program, and take it."""
-        name, before = self._view.order.model, self._view
+        name, before = self._view.model, self._view
         self._show(busy=f"asking {name}", is_written=True, program="", trouble="", **UNCHECKED)
         try:
             model = self._open_model(name)
@@ -240,7 +246,7 @@ class MissionSession:
 
     async def _written(self, model: Model, before: str, problems: Sequence[str]) -> str:
         rooms = () if self._view.room_map is None else self._view.room_map.rooms
-        prompt = prompt_for(self._view.order.instruction, rooms=rooms)
+        prompt = prompt_for(self._order.instruction, rooms=rooms)
         if problems:
             prompt = prompt.after(before, problems)
 

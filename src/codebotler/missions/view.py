@@ -9,6 +9,7 @@ from typing import Literal, TypeAlias
 from codebotler.checking.problems import Check
 from codebotler.missions.log import State
 from codebotler.missions.progress import Progress
+from codebotler.prompts import stated
 from codebotler.simulator.sampled_robot import RoomMap
 
 CHECKING = "checking"  # what a session is busy with
@@ -18,12 +19,20 @@ Phase: TypeAlias = State | Literal["", "starting", "writing", "checking"]
 
 @dataclass(frozen=True)
 class Order:
-    """What a person asks for: an instruction and the model that writes the program, or a program."""
+    """What a person asks for: an instruction and the model that writes the program, or a program.
+
+    Raises:
+        UserError: it says nothing.
+    """
 
     instruction: str = ""
     model: str = ""  # its name; empty where the program comes with the order
     program: str = ""
     author: str = ""  # the model that wrote the program, if one did
+
+    def __post_init__(self) -> None:
+        if not self.program.strip():
+            stated(self.instruction)
 
 
 @dataclass(frozen=True)
@@ -37,7 +46,8 @@ class SessionView:
     line: int | None = None  # of the program, where it failed
     busy: str = ""  # what goes on before the robot moves, such as `checking`
     trouble: str = ""  # why it could not go on, in a sentence
-    order: Order = field(default_factory=Order)
+    instruction: str = ""
+    model: str = ""  # that can be asked again; empty where the program came with the order
     program: str = ""  # while a model writes, as much as has arrived
     author: str = ""  # the model that wrote it; empty if a person did
     is_written: bool = False  # whether a model is writing now
@@ -86,7 +96,7 @@ class SessionView:
         """Whether another program can replace this one."""
         if self.is_over or self.is_written:
             return self.is_over
-        waits = self.state is None and bool(self.order.program)  # for the robot; nothing typed is lost
+        waits = self.state is None and bool(self.program)  # for the robot; nothing typed is lost
         return waits or self.state in {State.DRAFTING, State.CHECKED}
 
 

@@ -20,12 +20,12 @@ from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, U
 from codebotler.models.keys import blank_is_unset, guard_logs, key_in, without_keys
 from codebotler.models.reply_limit import bound, limit_of
 from codebotler.models.server_errors import (
-    brief,
     broken_off,
     failure,
     model_error_in,
     refused,
     timed_out,
+    told,
     unreachable,
 )
 from codebotler.prompts import Message, PictureMessage, Prompt
@@ -123,7 +123,7 @@ class ChatModel:
             case exceptions.UnexpectedModelBehavior():
                 return broken_off(self.name, begun=False)
         is_transport = isinstance(error, OSError) or type(error).__module__.split(".")[0] in TRANSPORTS
-        return failure(self.name, f"{type(error).__name__}: {brief(error)}", may_pass=is_transport)
+        return failure(self.name, f"{type(error).__name__}: {told(error)}", may_pass=is_transport)
 
 
 def messages_of(conversation: tuple[Message, ...]) -> list[messages.ModelMessage]:
@@ -173,12 +173,12 @@ def _model(name: str, settings: SamplingSettings) -> Model:
         raise
     except ImportError as error:
         command = INSTALL.search(str(error))
-        mend = f"install it with: {command[0]}" if command else brief(error)
+        mend = f"install it with: {command[0]}" if command else told(error)
         raise UserError(f"{name} needs a library that is not installed; {mend}") from None
     except Exception as error:  # noqa: BLE001 - each provider's library has errors of its own
         missing = VARIABLE.search(str(error))
         if missing is None:
-            raise UserError(f"{name} cannot be used: {brief(error)}") from None
+            raise UserError(f"{name} cannot be used: {told(error)}") from None
         raise UserError(f"{name} needs the key in {missing[1]}; set it in the environment") from None
 
 

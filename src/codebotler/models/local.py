@@ -17,7 +17,7 @@ import transformers
 from codebotler.core.errors import UserError
 from codebotler.models.base import Heard, ModelError, Reply, SamplingSettings, Usage, unheard
 from codebotler.models.keys import guard_logs
-from codebotler.models.server_errors import brief, failure
+from codebotler.models.server_errors import failure, told
 from codebotler.prompts import Message, Prompt
 from codebotler.prompts.extract import program_of
 from codebotler.prompts.rendering import task_end
@@ -80,7 +80,7 @@ class LocalModel:
             self.tokenizer = transformers.AutoTokenizer.from_pretrained(source, padding_side="left")
             model = transformers.AutoModelForCausalLM.from_pretrained(source, dtype=dtype)
         except Exception as error:  # noqa: BLE001 - a model's own code and files, wrong in many ways
-            raise UserError(f"{self.name} cannot be loaded: {brief(error)}") from None
+            raise UserError(f"{self.name} cannot be loaded: {told(error)}") from None
         self.model = model.to(self.device).eval()
         if self.tokenizer.pad_token_id is None:
             self.tokenizer.pad_token = self.tokenizer.eos_token or self.tokenizer.convert_ids_to_tokens(0)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, installed
 from codebotler.models.base import Model, SamplingSettings
 from codebotler.models.recorded import recorded_model
 
@@ -34,29 +31,18 @@ def open_model(name: str, settings: SamplingSettings) -> Model:
                 expect_server(name)
             return recorded_model(name)
         case "completions":
-            with from_extra("models", name):
+            with installed():
                 from codebotler.models.completions import CompletionsModel  # noqa: PLC0415 - see above
 
             return CompletionsModel(rest, settings)
         case "hf":
-            with from_extra("transformers", name):
+            with installed():
                 from codebotler.models.local import LocalModel  # noqa: PLC0415 - see above
             return LocalModel(rest, settings)
         case _:
-            with from_extra("models", name):
+            with installed():
                 from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
             return ChatModel(name, settings)
-
-
-@contextmanager
-def from_extra(extra: str, name: str) -> Iterator[None]:
-    """Refuse a model whose library is not installed, and name the extra that brings it."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        missing = (error.name or "").split(".")[0]
-        mend = f"`pip install 'codebotler[{extra}]'` brings it"
-        raise UserError(f"{name} needs {missing}, which is not installed; {mend}") from None
 
 
 def expect_server(*names: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from codebotler.core.words import brief
 from codebotler.models.base import ModelError
 from codebotler.models.keys import redacted
 
@@ -23,8 +24,8 @@ def failure(name: str, what: str | Exception, *, may_pass: bool) -> ModelError:
     first: BaseException | None = what if isinstance(what, Exception) else None
     while first and first.__cause__:
         first = first.__cause__
-    cause = "" if first is None or str(first) in str(what) else f" ({brief(first)})"
-    return ModelError(f"{name}: {brief(what)}{cause}", may_pass=may_pass)
+    cause = "" if first is None or str(first) in str(what) else f" ({told(first)})"
+    return ModelError(f"{name}: {told(what)}{cause}", may_pass=may_pass)
 
 
 def unreachable(name: str, error: Exception, url: str | None) -> ModelError | None:
@@ -33,7 +34,7 @@ def unreachable(name: str, error: Exception, url: str | None) -> ModelError | No
     if failed is None:
         return None
     mend = "check the network" if url is None else "check that the server runs, and the base URL"
-    sentence = f"{name}: no connection to {url or 'its server'} ({brief(failed)}); {mend}"
+    sentence = f"{name}: no connection to {url or 'its server'} ({told(failed)}); {mend}"
     return ModelError(sentence, may_pass=True)
 
 
@@ -63,17 +64,16 @@ def refused(
     name: str, status: int, body: object, *, retry_after: float | None = None, hopeless: bool = False
 ) -> ModelError:
     """The error for a status of 400 or more; `hopeless` says that it will not pass, whatever the status."""
-    said = f" ({text})" if (text := brief(body)) else ""
+    said = f" ({text})" if (text := told(body)) else ""
     sentence = f"{name}: the server answered with status {status}{said}{MENDS.get(status, '')}"
     may_pass = not hopeless and (status >= SERVER_ERROR or status in LATER)
     return ModelError(sentence, may_pass=may_pass, retry_after=retry_after)
 
 
-def brief(said: object) -> str:
+def told(said: object) -> str:
     """What a server or a library says, in one short line without keys."""
     text = next(_messages(said), None) or ("" if said is None else str(said))
-    line = " ".join(redacted(text).split()).rstrip(".")
-    return line if len(line) <= MOST else f"{line[:MOST]} ..."
+    return brief(redacted(text), MOST).rstrip(".")
 
 
 def _messages(said: object) -> Iterator[str]:

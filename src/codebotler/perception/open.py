@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, installed
 from codebotler.models.base import SamplingSettings
-from codebotler.models.open import from_extra, kind_of
+from codebotler.models.open import kind_of
 from codebotler.perception.base import Detector
 
 LOOKING = SamplingSettings(temperature=0.0, top_p=None, max_tokens=2000, timeout=30.0)
@@ -33,11 +33,11 @@ def open_detector(
         raise UserError(f"{name} does not accept pictures; use a chat model that does, or hf:PATH")
     # Each of the modules imports a large library, and is imported only where it is used.
     if kind != "hf":
-        with from_extra("models", name):
+        with installed():
             from codebotler.models.chat import ChatModel  # noqa: PLC0415 - see above
         from codebotler.perception.chat import ChatDetector  # noqa: PLC0415 - see above
 
         return ChatDetector(ChatModel(name, settings))
-    with from_extra("transformers", name):
+    with installed():
         from codebotler.perception.zeroshot import ZeroShotDetector  # noqa: PLC0415 - see above
     return ZeroShotDetector(name.partition(":")[2], least_score=least_score)

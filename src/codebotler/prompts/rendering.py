@@ -13,7 +13,7 @@ from pathlib import Path
 from string import Template
 from typing import Literal
 
-from codebotler.core.errors import expect_list
+from codebotler.core.errors import UserError, expect_list
 from codebotler.core.program import TASK, Flaw, parsed
 from codebotler.core.skills import SKILLS, SkillTable
 
@@ -90,6 +90,13 @@ def task_end(opening: str, reply: str, stop: Sequence[str] = STOP) -> int:
     return end
 
 
+def stated(instruction: str) -> str:
+    """An instruction without space around it; UserError if it says nothing."""
+    if not (said := instruction.strip()):
+        raise UserError("the instruction is empty; say what the robot should do")
+    return said
+
+
 def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTable = SKILLS) -> Prompt:
     """The request for a program that carries out an instruction.
 
@@ -99,11 +106,12 @@ def prompt_for(instruction: str, *, rooms: Sequence[str] = (), skills: SkillTabl
         skills: the skills that a program may call.
 
     Raises:
-        UserError: the rooms are a single text.
+        UserError: the instruction is empty, or the rooms are a single text.
     """
     expect_list(rooms, "the rooms")
+    instruction = stated(instruction)
     about_rooms = _filled("rooms", rooms=", ".join(rooms)) if rooms else ""
-    wish = "\n\n".join(filter(None, (instruction.strip(), about_rooms)))
+    wish = "\n\n".join(filter(None, (instruction, about_rooms)))
     stubs = [f'def {skill.signature}:\n    """{skill.doc}"""' for skill in skills.values()]
     shown = examples()
     messages = [Message("system", _filled("system", skills="\n\n".join(stubs)))]

@@ -223,6 +223,4 @@ class RobotWithFace:
             raise CancelledError
 
     def _ask(self, person: Argument, question: Argument, options: Argument) -> str:
-        if not options:
-            raise RobotError("AskEmptyOptions", f'the question "{question}" offers no options')
         return options[self._face.ask(str(person), str(question), tuple(options))]

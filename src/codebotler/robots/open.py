@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, install_command, missing_package
 from codebotler.robots.base import ROS_PYTHON, Options, Readiness, Robot
 from codebotler.robots.face import Face, RobotWithFace, without_speech
 
@@ -52,8 +52,11 @@ def _readiness(name: str, ros_python: Path) -> Readiness:
     try:
         readiness: Readiness = _kind(name).readiness(ros_python)
     except ModuleNotFoundError as error:
-        missing = f"{(error.name or '').split('.')[0]} is not installed"
-        return Readiness(name, works=False, missing=missing, mend="pip install 'codebotler[robots]'")
+        package = missing_package(error)
+        if not package:
+            raise
+        missing, mend = f"{package} is not installed", install_command(package)
+        return Readiness(name, works=False, missing=missing, mend=mend)
     return readiness
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 from codebotler.core.trace import Trace
-from codebotler.core.words import listed, times
+from codebotler.core.words import brief, listed, times
 from codebotler.rtl import formulas
 from codebotler.rtl.semantics import (
     Inconclusive,
@@ -19,7 +19,7 @@ from codebotler.rtl.semantics import (
     narrowed,
     scoped,
 )
-from codebotler.rtl.wording import deed, few, happening, is_any, room, shortened, verb
+from codebotler.rtl.wording import deed, few, happening, is_any, room, verb
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def explain(formula: formulas.Formula, trace: Trace) -> Explanation | None:
             return None
     except Inconclusive as error:
         option = f"option {error.number + 1} of the question at step {error.event + 1}"
-        problem = f"is not a string but {shortened(error.option.text)}, so the requirement cannot be judged"
+        problem = f"is not a string but {brief(error.option.text)}, so the requirement cannot be judged"
         return Explanation(formula, error.event, f"{option} {problem}")
     clause = _failing_part(formula, trace)
     deciding = _deciding(clause, trace, is_true=False)

@@ -9,14 +9,13 @@ from typing import Literal, TypeAlias
 
 from codebotler.core.skills import SKILLS, Verb
 from codebotler.core.trace import Event
-from codebotler.core.words import listed
+from codebotler.core.words import brief, listed
 from codebotler.rtl.formulas import EventPattern, Regex, Text, Without, Words
 from codebotler.rtl.text.claims import Claim, Number, Time
 
 Form: TypeAlias = Literal["base", "past", "ing"]
 
 _MOST_LISTED = 5
-_LONGEST_TEXT = 70
 _TEXT = r"[\w ',;:!%@&/-]+"
 _ALTERNATIVES = re.compile(rf"{_TEXT}(?:\|{_TEXT})*")
 _WHOLE_WORDS = re.compile(rf"\\b\(?(?:\?:)?({_TEXT}(?:\|{_TEXT})*)\)?\\b")
@@ -78,7 +77,7 @@ def room(text: Text, article: str = "a") -> str:
 
 def room_name(name: str) -> str:
     """The name of a room, with an article if it is a common noun."""
-    short = shortened(name)
+    short = brief(name)
     return f"the {short}" if re.fullmatch(r"(?!the |an? )[a-z]+( [a-z]+)*", name) else short or '""'
 
 
@@ -116,10 +115,10 @@ def is_any(text: Text | None) -> bool:
 def named(pattern: str) -> str:
     """A regex as the plain texts it chooses between, or as it is."""
     if _ALTERNATIVES.fullmatch(pattern):
-        return f'"{_cut(listed(pattern.split("|"), "or"))}"'
+        return f'"{brief(listed(pattern.split("|"), "or"))}"'
     if whole := _WHOLE_WORDS.fullmatch(pattern):
         return f"the word {named(whole[1])}"
-    return f"/{_cut(pattern)}/"
+    return f"/{brief(pattern)}/"
 
 
 def few(parts: Sequence[str]) -> list[str]:
@@ -130,13 +129,4 @@ def few(parts: Sequence[str]) -> list[str]:
 
 def quoted(text: str) -> str:
     """A text in quotes, on one line and short enough for a sentence."""
-    return f'"{shortened(text)}"'
-
-
-def shortened(text: str) -> str:
-    """A text on one line and short enough for a sentence."""
-    return _cut(" ".join(text.split()))
-
-
-def _cut(text: str) -> str:
-    return text if len(text) <= _LONGEST_TEXT else text[: _LONGEST_TEXT - 1].rstrip() + "…"
+    return f'"{brief(text)}"'

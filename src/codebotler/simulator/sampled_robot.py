@@ -11,6 +11,7 @@ from typing import TypeAlias
 
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.trace import Option
+from codebotler.core.words import brief
 from codebotler.core.world import Room, World
 from codebotler.simulator import robot as real
 from codebotler.simulator.fact_sampler import Draw, FactSampler
@@ -35,7 +36,6 @@ PEOPLE = frozenset(  # words that mean whoever is there
     }
 )
 AGREES = re.compile(r"\s*(?:yes|yeah|sure|ok)\b", re.IGNORECASE)
-BRIEF = 80  # characters of a text in a sentence
 _ARTICLE = re.compile(r"(?:the|an?|any|some)\s+")
 
 
@@ -102,12 +102,6 @@ class GivenAnswer:
 
 
 Fact: TypeAlias = Whereabouts | GivenAnswer
-
-
-def brief(text: str) -> str:
-    """A text of a program, on one line and shortened for a sentence."""
-    line = " ".join(text.split())
-    return line if len(line) <= BRIEF else f"{line[:BRIEF]}..."
 
 
 # --- what a program has found out; names are those that `meant` gives

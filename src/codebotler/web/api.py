@@ -15,14 +15,13 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, installed
 from codebotler.core.terminal import shortened
 from codebotler.missions.log import EVENTS, Line, Summary, events_of
 from codebotler.missions.mission import MissionError
 from codebotler.missions.session import MissionSession
 from codebotler.missions.store import find, missions
 from codebotler.missions.view import Order, SessionView
-from codebotler.models.open import from_extra
 from codebotler.web.console import MOST_PROGRAM, QUIET, Console
 
 HERE = "current"
@@ -125,7 +124,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
     @api.get("/missions/{mission}/events.mcap")
     def mcap(mission: str, clock: Literal["wall", "robot"] = "wall") -> Response:
         """The events as MCAP, which Foxglove opens."""
-        with _refusing(), from_extra("robots", "MCAP"):
+        with _refusing(), installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
 
         summary, events = _past(console, mission)
@@ -231,8 +230,8 @@ def view_data(view: SessionView) -> dict[str, Any]:
         "phase": view.phase,
         "busy": view.busy,
         "trouble": view.trouble,
-        "instruction": view.order.instruction,
-        "model": view.order.model,
+        "instruction": view.instruction,
+        "model": view.model,
         "author": view.author,
         "program": view.program,
         "digest": view.digest,

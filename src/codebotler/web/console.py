@@ -6,11 +6,13 @@ import asyncio
 import threading
 from collections.abc import AsyncGenerator, Callable, Iterator, Sequence
 from contextlib import ExitStack, aclosing, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
 from codebotler.checking.check import check
 from codebotler.checking.problems import Check
+from codebotler.core.errors import UserError
 from codebotler.core.files import make_folder
 from codebotler.core.world import World
 from codebotler.missions.log import Summary
@@ -94,11 +96,8 @@ class Console:
 
         One at hand that is not running makes room for it; another one raises MissionError.
         """
-        instruction, model = order.instruction.strip(), order.model.strip()
-        model = model or ("" if order.program else self.models[0])
-        order = Order(instruction, model, order.program, order.author)
-        if not (order.program.strip() or instruction):
-            raise MissionError("the instruction is empty; say what the robot should do")
+        model = order.model.strip() or ("" if order.program else self.models[0])
+        order = replace(order, instruction=order.instruction.strip(), model=model)
         for text in (order.instruction, order.program):
             _check_length(text)
         with self._lock:
@@ -128,7 +127,7 @@ class Console:
         if session is None or session.view.is_over:
             before = self.view
             author = before.author if program == before.program else ""
-            return self.begin(Order(before.order.instruction, before.order.model, program, author))
+            return self.begin(Order(before.instruction, before.model, program, author))
         session.edit(program)
         return session
 
@@ -210,4 +209,4 @@ class Notifier:
 
 def _check_length(text: str) -> None:
     if len(text) > MOST_PROGRAM:
-        raise MissionError(f"it is too long: {len(text):,} characters, and {MOST_PROGRAM:,} is the limit")
+        raise UserError(f"it is too long: {len(text):,} characters, and {MOST_PROGRAM:,} is the limit")

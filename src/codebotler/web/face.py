@@ -13,7 +13,7 @@ from fastapi import APIRouter, HTTPException, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from codebotler.core.terminal import visible_lines
+from codebotler.core.terminal import shortened, visible_lines
 from codebotler.missions.mission import UNCONFIRMED
 from codebotler.robots.face import AnswerError, Face, Question
 from codebotler.web.console import Console
@@ -136,9 +136,7 @@ def question_data(question: Question) -> dict[str, Any]:
 
 def words(text: str, most: int = MOST_TEXT) -> str:
     """A text with its lines, cut after so many characters, and with hidden characters written out."""
-    left = len(text) - most
-    shown = visible_lines(text[:most])
-    return shown if left <= 0 else f"{shown}... {left:,} more characters"
+    return shortened(text, most, visible_lines)
 
 
 def _ended_data(ended: Question) -> dict[str, Any]:

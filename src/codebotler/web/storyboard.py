@@ -13,8 +13,8 @@ from codebotler.checking.problems import Check, Sample
 from codebotler.checking.storyboard import cut, steps_of
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened
-from codebotler.core.words import listed
-from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Whereabouts, brief
+from codebotler.core.words import brief, listed
+from codebotler.simulator.sampled_robot import SOMEBODY, Fact, GivenAnswer, Whereabouts
 from codebotler.web.frame import PlainText
 
 MOST_TEXT, MOST_WORLD, MOST_STRIPS = 300, 800, 6

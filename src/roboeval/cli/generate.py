@@ -20,6 +20,7 @@ from codebotler.cli.options import (
     TimeoutOption,
     TopPOption,
 )
+from codebotler.core.errors import install_command
 from codebotler.core.words import counted
 from roboeval.cli.evaluate import evaluate
 from roboeval.cli.options import (
@@ -29,6 +30,7 @@ from roboeval.cli.options import (
     JsonOption,
     NumOption,
     OutOption,
+    ProcessOption,
     RateOption,
     SuiteOption,
     TasksOption,
@@ -103,6 +105,7 @@ def run(
     tasks: TasksOption = None,
     workers: WorkersOption = None,
     require_isolation: IsolationOption = False,
+    one_process_per_run: ProcessOption = False,
     with_report: Annotated[
         bool, typer.Option("--report/--no-report", help="Write the report, to the folder report of the run.")
     ] = True,
@@ -114,10 +117,16 @@ def run(
     It prints the tables. After an interruption, the same command continues.
     """
     if with_report and find_spec("matplotlib") is None:  # before anything is paid for
-        fail("the report needs matplotlib; `pip install 'codebotler[report]'` brings it, or add --no-report")
+        fail(f"the report needs matplotlib; {install_command('matplotlib')}, or add --no-report")
     path = completed(suite=suite, tasks=tasks, **options)
     evaluate(
-        str(path), suite=suite, tasks=tasks, workers=workers, require_isolation=require_isolation, json=json
+        str(path),
+        suite=suite,
+        tasks=tasks,
+        workers=workers,
+        require_isolation=require_isolation,
+        one_process_per_run=one_process_per_run,
+        json=json,
     )
     if not with_report:
         return

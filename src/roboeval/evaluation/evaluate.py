@@ -11,6 +11,7 @@ from typing import Any
 
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, to_text, write_whole
+from codebotler.core.words import brief
 from roboeval.evaluation.engines import Local, OpenEngine
 from roboeval.evaluation.judge import head, judgements, row_line
 from roboeval.evaluation.runs.completions import Completion, Key, name_of
@@ -146,11 +147,10 @@ CALLED = {
     "python": "version of Python",
     "tasks": "selection of tasks",
 }
-LONGEST = 60  # characters of a value that a sentence can bear
 
 
 def _brief(name: str, value: object) -> str:
     text = json.dumps(value)
     if name == "tasks":
         text = ", ".join(map(str, value)) if isinstance(value, list) else "all"
-    return text if len(text) <= LONGEST else text[:LONGEST] + "..."
+    return brief(text)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from codebotler import __version__
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, installed
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import NO_SECCOMP, DistinctKeys, ResultFile
 from codebotler.simulator.worker import EngineError, Worker
@@ -161,8 +161,6 @@ def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = F
 def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types here
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # else it calls home
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # its warning about accelerators
-    try:
+    with installed():
         import ray  # noqa: PLC0415 - an extra, which starts slowly
-    except ImportError:
-        raise UserError("the engine ray needs Ray; pip install 'codebotler[ray]'") from None
     return ray

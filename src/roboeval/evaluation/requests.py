@@ -14,6 +14,7 @@ from typing import Any, Self
 from codebotler import __version__
 from codebotler.core.errors import UserError
 from codebotler.core.files import Appender, read_rows, to_line, write_whole
+from codebotler.core.words import brief
 from codebotler.models.base import SamplingSettings
 from codebotler.prompts import template_hash
 from roboeval.evaluation.runs.completions import Completion, Key, name_of, read_completions
@@ -21,7 +22,6 @@ from roboeval.evaluation.runs.folder import Run, load_head
 from roboeval.suites.load import Suite
 
 WITHOUT_EFFECT = ("timeout", "base_url")  # settings that do not change what a model replies
-LONGEST_VALUE = 24  # characters of a setting that an error quotes
 
 
 @dataclass(frozen=True)
@@ -110,8 +110,7 @@ def _expect_same(earlier: dict[str, Any], fixed: dict[str, Any], file: Path) -> 
 
 
 def _brief(value: object) -> str:
-    text = "none" if value is None else str(value)
-    return text if len(text) <= LONGEST_VALUE else text[: LONGEST_VALUE // 2] + "..."
+    return brief("none" if value is None else str(value), 24)
 
 
 def timestamp() -> str:

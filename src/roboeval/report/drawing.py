@@ -199,7 +199,7 @@ def darkened(svg: bytes) -> bytes:
     return re.sub(rb"#[0-9a-f]{6}\b", lambda colour: colours.get(colour[0], colour[0]), svg)
 
 
-def brief(name: str, most: int = LONGEST_NAME) -> str:
+def short_name(name: str, most: int = LONGEST_NAME) -> str:
     """A name shortened for a figure: its beginning and its end, by which names are told apart."""
     name, end = visible(name), (most - 1) // 2
     return name if len(name) <= most else f"{name[: most - 1 - end]}…{name[-end:]}"

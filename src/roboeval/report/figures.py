@@ -28,10 +28,10 @@ from roboeval.report.drawing import (
     QUIET,
     WHITE,
     WIDE,
-    brief,
     new_figure,
     shades,
     share_axis,
+    short_name,
 )
 from roboeval.report.runs import JudgedRun, tasks_of
 
@@ -73,7 +73,7 @@ def bars(runs: Sequence[JudgedRun]) -> Figure:
             _bars_on(axes, scores, those, room)
             axes.set_ylabel("" if column else "pass@1")
             axes.set_title(title if ablated and not row else "", loc="left")
-    names = [brief(run.name) for run in runs]
+    names = [short_name(run.name) for run in runs]
     handles = [Patch(color=colour, label=name) for colour, name in zip(COLOURS, names, strict=False)]
     columns = min(len(runs), 5 if max(map(len, names)) <= SHORT_NAME else 3)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, handlelength=1.0)
@@ -110,7 +110,7 @@ def _bars_on(axes: Axes, scores: Sequence[Sequence[TaskScore]], tasks: Sequence[
 def _two_lines(task: str) -> str:
     """The name of a task, broken before the last capital letter."""
     last = max((at for at, letter in enumerate(task) if letter.isupper()), default=0)
-    return "\n".join(brief(part, 14) for part in (task[:last], task[last:]) if part)
+    return "\n".join(short_name(part, 14) for part in (task[:last], task[last:]) if part)
 
 
 def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Sequence[str]) -> Figure:
@@ -118,7 +118,7 @@ def _heat_of_tasks(runs: Sequence[JudgedRun], tasks: Sequence[str], ablated: Seq
     figure = new_figure(WIDE, 1.3 + 0.16 * len(runs))
     widths = [len(tasks), *([len(ablated)] if ablated else [])]
     grid = figure.add_gridspec(1, len(widths), width_ratios=widths)
-    names = [brief(run.name) for run in runs]
+    names = [short_name(run.name) for run in runs]
     heat(figure.add_subplot(grid[0, 0]), [_means(run.scores, tasks) for run in runs], names, tasks)
     if ablated:
         axes = figure.add_subplot(grid[0, 1])
@@ -169,7 +169,7 @@ def _line_a_model(
 ) -> Figure:
     """A line for each model; where there are more than colours, the best have one."""
     is_narrow = len(lines) <= MOST_COLOURS
-    columns = 1 if is_narrow and max(len(brief(name)) for name in lines) > SHORT_NAME else 2
+    columns = 1 if is_narrow and max(len(short_name(name)) for name in lines) > SHORT_NAME else 2
     figure = new_figure(NARROW if is_narrow else WIDE, height + 0.13 * math.ceil(len(lines) / columns))
     axes = figure.add_subplot()
     best = sorted(range(len(lines)), key=lambda number: -quality[number])[:MOST_COLOURS]
@@ -179,7 +179,13 @@ def _line_a_model(
             continue
         at = number if is_narrow else best.index(number)
         dashes = {"linestyle": DASHES[at % len(DASHES)], "marker": MARKERS[at % len(MARKERS)], **style}
-        shown = {"color": COLOURS[at], "label": brief(name), "markersize": 3.2, "clip_on": False, **dashes}
+        shown = {
+            "color": COLOURS[at],
+            "label": short_name(name),
+            "markersize": 3.2,
+            "clip_on": False,
+            **dashes,
+        }
         axes.plot(*zip(*points, strict=True), **shown)
     if not is_narrow:
         axes.plot([], [], color=FAINT, linewidth=0.7, label=f"{len(lines) - MOST_COLOURS} others")
@@ -232,7 +238,7 @@ def limits(curves: Mapping[str, Mapping[int, Points]]) -> Figure:
                 clip_on=False,
             )
         _threshold_labels(axes)
-        axes.set_title(brief(name), loc="left")
+        axes.set_title(short_name(name), loc="left")
         axes.label_outer()
     handles, labels = all_axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5 if columns > 1 else 2, handlelength=3)
@@ -272,7 +278,7 @@ def causes(found: Sequence[tuple[str, Causes]]) -> Figure:
     kinds = {name: kinds_in_order([one for _, one in found], name) for name in CLASSES}
     tallest = max(3, *map(len, kinds.values()))
     many = len(found) > MOST_NUMBERS
-    longest = 0 if many else max(len(brief(name, 18)) for name, _ in found)
+    longest = 0 if many else max(len(short_name(name, 18)) for name, _ in found)
     # Names of models stand aslant below the panels.
     below = 0.95 + (0.13 * len(found) if many else 0.155 * tallest) + 0.04 * max(0, longest - 8)
     heights = [1.05 + 0.2 * len(found), below]
@@ -299,7 +305,7 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
         style: dict[str, Any] = {"color": colour, "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.4}
         axes.barh(places, shares, 0.72, left=left, label=label_of(name), **style)
         left = left + shares
-    axes.set_yticks(places, [brief(name, 34) for name, _ in found])
+    axes.set_yticks(places, [short_name(name, 34) for name, _ in found])
     axes.set_ylim(len(found) - 0.5, -0.5)
     axes.tick_params(axis="y", left=False, length=0)
     share_axis(axes, along="x")
@@ -308,14 +314,16 @@ def _classes(axes: Axes, found: Sequence[tuple[str, Causes]]) -> None:
 def _kinds(
     axes: Axes, found: Sequence[tuple[str, Causes]], of: str, kinds: Sequence[str], *, many: bool
 ) -> None:
-    there = [(brief(name, 18), one.kinds.get(of, {})) for name, one in found if many or one.kinds.get(of)]
+    there = [
+        (short_name(name, 18), one.kinds.get(of, {})) for name, one in found if many or one.kinds.get(of)
+    ]
     if not kinds:
         axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)
         axes.set_xticks([])
         axes.set_yticks([])
         return
     cells = [[shares.get(kind, 0.0) if shares else None for kind in kinds] for _, shares in there]
-    names, labels = [name for name, _ in there], [brief(kind, 24) for kind in kinds]
+    names, labels = [name for name, _ in there], [short_name(kind, 24) for kind in kinds]
     if many:
         heat(axes, cells, names, labels)
     else:

@@ -12,7 +12,7 @@ from codebotler.core.cachedproperty import cached_property
 from roboeval.analysis.metrics import TaskScore, completions_of, overall, pass_at_1, task_scores
 from roboeval.analysis.resample import CheckedPrompt, trials_by_prompt
 from roboeval.evaluation.runs.results import Results
-from roboeval.report.drawing import brief
+from roboeval.report.drawing import short_name
 from roboeval.suites.load import Suite
 
 LONGEST_NAME = 100
@@ -93,7 +93,7 @@ def tasks_of(runs: Sequence[JudgedRun]) -> list[str]:
 
 def named_apart(runs: Sequence[JudgedRun]) -> list[JudgedRun]:
     """The same runs, each named by its model and, where that is not unique, by its folder, too."""
-    plain = [brief(run.model or run.folder, LONGEST_NAME) for run in runs]
+    plain = [short_name(run.model or run.folder, LONGEST_NAME) for run in runs]
     names = _apart(plain, [f"{name} ({run.folder})" for name, run in zip(plain, runs, strict=True)])
     while len({*names}) < len(names):
         names = _apart(names, [f"{name} #{number}" for number, name in enumerate(names, 1)])

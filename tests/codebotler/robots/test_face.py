@@ -155,14 +155,6 @@ def test_nobody_answers() -> None:
         face.answer(ended.number, 0)
 
 
-def test_a_question_without_options_is_an_error_and_not_shown() -> None:
-    robot, face = faced()
-    robot.connect()
-    with pytest.raises(RobotError) as error:
-        robot.perform("ask", ["ann", "Tea?", ()])
-    assert (error.value.kind, face.shown.ended) == ("AskEmptyOptions", None)
-
-
 def test_the_first_answer_counts_and_the_others_are_told_so() -> None:
     robot, face = faced()
     robot.connect()

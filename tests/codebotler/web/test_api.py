@@ -192,7 +192,7 @@ def test_texts_that_no_encoding_takes_are_told(server: PageServer) -> None:
         ("POST", "/api/missions/20200101-000000/stop", None, 404),
         ("GET", "/api/missions/nosuch/events", None, 404),
         ("GET", "/api/missions/nosuch/events.jsonl", None, 404),
-        ("POST", "/api/missions", {}, 409),
+        ("POST", "/api/missions", {}, 422),
         ("POST", "/api/missions", {"program": HELLO, "more": 1}, 422),
         ("POST", "/api/missions", b"{", 422),
         ("POST", "/api/missions", {"instruction": "fly", "model": "recorded:nobody"}, 201),

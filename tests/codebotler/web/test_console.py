@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from codebotler.checking.problems import Check
+from codebotler.core.errors import UserError
 from codebotler.core.files import Appender
 from codebotler.core.world import Room, World
 from codebotler.missions import log as mission_log
@@ -364,7 +365,7 @@ def test_the_same_program_keeps_its_author_when_it_is_run_again(tmp_path: Path) 
         for program, author in ((HELLO, "author"), (HELLO + "# mine\n", "")):
             console.edit(program)
             view = until(console, lambda view: view.may_be_approved)
-            assert (view.author, view.order.model, view.program) == (author, "author", program)
+            assert (view.author, view.model, view.program) == (author, "author", program)
             console.stop("a test")
             until(console, lambda view: view.is_over)
     assert [one.model for one in missions(tmp_path)] == ["author", "author", ""]
@@ -391,19 +392,17 @@ def test_a_mission_whose_end_cannot_be_logged_has_ended_in_the_view(
 def test_the_first_model_writes_where_none_is_named(tmp_path: Path) -> None:
     with desk_of(tmp_path, author=Author(HELLO)) as console:
         console.begin(Order("say hello"))
-        assert until(console, lambda view: view.may_be_approved).order.model == console.models[0]
+        assert until(console, lambda view: view.may_be_approved).model == console.models[0]
 
 
-@pytest.mark.parametrize(
-    ("order", "told"),
-    [
-        (Order("   ", "author"), "instruction is empty"),
-        (Order(program="#" * (MOST_PROGRAM + 1)), "too long"),
-    ],
-)
-def test_what_cannot_be_begun_is_refused(console: Console, order: Order, told: str) -> None:
-    with pytest.raises(MissionError, match=told):
-        console.begin(order)
+def test_an_order_that_says_nothing_is_refused() -> None:
+    with pytest.raises(UserError, match="instruction is empty"):
+        Order(" ", "author", program="\n")
+
+
+def test_a_program_that_is_too_long_is_refused(console: Console) -> None:
+    with pytest.raises(UserError, match="too long"):
+        console.begin(Order(program="#" * (MOST_PROGRAM + 1)))
     assert missions(console.home) == []
 
 

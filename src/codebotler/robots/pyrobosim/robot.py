@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from codebotler.core.errors import UserError
+from codebotler.core.errors import UserError, install_command
 from codebotler.robots.base import (
     ROS_PYTHON,
     Argument,
@@ -24,7 +24,7 @@ from codebotler.simulator.robot import Thing
 if TYPE_CHECKING:
     from codebotler.robots.pyrobosim.world import DrivableWorld
 
-MISSING, MEND = "pyrobosim is not installed", "pip install 'codebotler[pyrobosim]'"
+MISSING, MEND = "pyrobosim is not installed", install_command("pyrobosim")
 
 
 class Pyrobosim(Simulated):
@@ -92,5 +92,5 @@ def robot(options: Options) -> Pyrobosim:
     if options.world is None:
         raise UserError("the robot in pyrobosim needs a world; name one with --world FILE")
     if importlib.util.find_spec("pyrobosim") is None:
-        raise UserError(f"{MISSING}; install it with: {MEND}")
+        raise UserError(f"{MISSING}; `{MEND}` installs it")
     return Pyrobosim(options.world, speed=options.speed, skills=options.skills)

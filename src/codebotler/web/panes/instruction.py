@@ -72,8 +72,8 @@ class InstructionPane:
         if view.number != self._number:
             self._number = view.number
             if (self._text.value or "").strip() in {"", self._asked}:  # nobody is typing another one here
-                self._text.value = visible_lines(view.order.instruction)
-            self._asked = visible_lines(view.order.instruction)
+                self._text.value = visible_lines(view.instruction)
+            self._asked = visible_lines(view.instruction)
         self._write.allow(not view.is_written and not view.is_running)
         self._write.say("Writing …" if view.is_written else "Write the program")
         self._trouble.say(view.trouble)
@@ -81,7 +81,7 @@ class InstructionPane:
     def _ask(self) -> None:
         try:
             self._console.begin(Order(self._text.value or "", self._model.value or ""))
-        except MissionError as error:
+        except (MissionError, UserError) as error:
             warn(error.sentence)
         else:
             scroll_up()

@@ -13,6 +13,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from codebotler.checking.problems import Check
+from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
 from codebotler.missions.log import State
@@ -126,7 +127,7 @@ class ProgramPane:
 
     def _show_approval(self, view: SessionView) -> None:
         open_ = view.state in {State.DRAFTING, State.CHECKED} and not view.is_over and bool(view.program)
-        may_again = view.may_be_approved and bool(view.order.model)
+        may_again = view.may_be_approved and bool(view.model)
         self._approval.set_visibility(open_ or self._may_rerun(view))
         self._despite.set_visibility(open_ and bool(view.problems))
         if not view.problems:
@@ -177,7 +178,7 @@ class ProgramPane:
     def _try(self, do: Callable[[], object]) -> None:
         try:
             do()
-        except MissionError as error:
+        except (MissionError, UserError) as error:
             warn(error.sentence)
 
     # --- what was found
