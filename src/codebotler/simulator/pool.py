@@ -38,10 +38,10 @@ Arguments = ParamSpec("Arguments")
 
 
 class WorkerPool:
-    """Threads that each own one worker; use as a context manager.
+    """Threads that each own one worker; use as a context manager, which waits for the first worker.
 
-    The first worker is started beside whatever the caller does before it enters the context. Where the kernel
-    has no seccomp, this warns, or refuses if isolation is required.
+    That is started beside whatever the caller does before; with `contextlib.closing`, nothing waits for it
+    but the first call. Where the kernel has no seccomp, this warns, or refuses if isolation is required.
     """
 
     def __init__(
@@ -75,11 +75,15 @@ class WorkerPool:
         try:
             self._first.result()
         except BaseException:
-            self.__exit__()
+            self.close()
             raise
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End all workers and threads."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         self._stopping = True
         for worker in self._workers:
@@ -281,7 +285,7 @@ class SharedPool:
         """End it."""
         with self.lock:
             if self.pool is not None:
-                self.pool.__exit__()
+                self.pool.close()
                 self.pool = None
 
     def begin_anew(self) -> None:

@@ -13,6 +13,7 @@ from roboeval.cli.options import (
     AblationOption,
     EngineOption,
     JsonOption,
+    ProcessOption,
     RunArgument,
     SuiteOption,
     WorkersOption,
@@ -122,6 +123,7 @@ def resample(
     suite: SuiteOption = "paper",
     workers: WorkersOption = None,
     engine: EngineOption = "local",
+    one_process_per_run: ProcessOption = False,
     json: JsonOption = False,
 ) -> None:
     """Compute what checking programs before a run would have gained.
@@ -131,9 +133,9 @@ def resample(
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view
 
-    checker = engine_named(engine, workers)
-    results = open_current(run, suite, ablated=False).results
-    prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
+    with engine_named(engine, workers, one_process_per_run=one_process_per_run) as checker:
+        results = open_current(run, suite, ablated=False).results
+        prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
     limits = sorted(set(retries)) if retries else LIMITS
     if json:
         name = results.head["suite"]

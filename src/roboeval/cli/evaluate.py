@@ -57,46 +57,45 @@ def evaluate(
     json: JsonOption = False,
 ) -> None:
     """Judge whether each completion does what was asked."""
-    from roboeval.analysis.metrics import judged_count
-    from roboeval.analysis.summary import summary
-    from roboeval.evaluation.runs.completions import how_many
-    from roboeval.evaluation.runs.folder import Run, tasks_to_judge
-    from roboeval.evaluation.runs.results import Scope
-    from roboeval.evaluation.runs.table import TableBuilder
+    isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
+    with engine_named(engine, workers, **isolation) as running:
+        from roboeval.analysis.metrics import judged_count
+        from roboeval.analysis.summary import summary
+        from roboeval.evaluation.runs.completions import how_many
+        from roboeval.evaluation.runs.folder import Run, tasks_to_judge
+        from roboeval.evaluation.runs.results import Scope
+        from roboeval.evaluation.runs.table import TableBuilder
 
-    running = engine_named(
-        engine, workers, require_isolation=require_isolation, one_process_per_run=one_process_per_run
-    )
-    judged_by = load(suite)
-    if worlds is not None or seed is not None:
-        judged_by = judged_by.with_worlds(worlds, seed)
-    wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
-    if left:
-        note(f"not judged, since they have no ablation: {', '.join(left)}")
-    builder = TableBuilder()
-    run = None if out is None else Run(out)
-    try:
-        opened = opened_source(source, judged_by)
-        run = run or opened.run
-        scope = Scope.of(opened.completions, wanted)
-        if scope.total == 0:
-            fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
-        if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
-            run.keep(opened.completions)
-        rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
-        for row in watched(rows, "judging", scope.total):
-            builder.add(row)
-        table = builder.table()
-        counted = summary(table, judged_by, scope, ablated=ablation)
-        print_summary(counted, title=source, as_json=json)
-    except KeyboardInterrupt:
-        is_started = not builder.table().is_empty()
-        note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
-        raise SystemExit(STOPPED) from None
-    if run is not None:
-        _name_next_command(run, table, suite=suite, ablated=ablation)
-    if (left_out := scope.total - judged_count(counted.prompts)) > 0:
-        _fail_with_some_left(how_many(left_out), scope.total, is_kept=run is not None)
+        judged_by = load(suite)
+        if worlds is not None or seed is not None:
+            judged_by = judged_by.with_worlds(worlds, seed)
+        wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
+        if left:
+            note(f"not judged, since they have no ablation: {', '.join(left)}")
+        builder = TableBuilder()
+        run = None if out is None else Run(out)
+        try:
+            opened = opened_source(source, judged_by)
+            run = run or opened.run
+            scope = Scope.of(opened.completions, wanted)
+            if scope.total == 0:
+                fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
+            if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
+                run.keep(opened.completions)
+            rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
+            for row in watched(rows, "judging", scope.total):
+                builder.add(row)
+            table = builder.table()
+            counted = summary(table, judged_by, scope, ablated=ablation)
+            print_summary(counted, title=source, as_json=json)
+        except KeyboardInterrupt:
+            is_started = not builder.table().is_empty()
+            note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
+            raise SystemExit(STOPPED) from None
+        if run is not None:
+            _name_next_command(run, table, suite=suite, ablated=ablation)
+        if (left_out := scope.total - judged_count(counted.prompts)) > 0:
+            _fail_with_some_left(how_many(left_out), scope.total, is_kept=run is not None)
 
 
 def _fail_with_some_left(left_out: str, total: int, *, is_kept: bool) -> NoReturn:

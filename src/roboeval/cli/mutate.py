@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.options import SuiteOption, WorkersOption, cores, load, named, task_names
+from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, cores, load, named, task_names
 from roboeval.cli.output import note, print_rich, watched
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def mutate(
         float | None, typer.Option(min=0, max=1, help="Status 1 if a task scores less than this.")
     ] = None,
     workers: WorkersOption = None,
+    one_process_per_run: ProcessOption = False,
 ) -> None:
     """Measure which wrong programs survive a suite's checks.
 
@@ -71,7 +72,7 @@ def mutate(
     wanted = wanted_tasks(known, tasks)
     further = named_programs(also or [], known)
     score = partial(mutation_score, worlds=worlds, most=most, seed=seed, watched=watched)
-    with WorkerPool(workers or cores()) as pool:
+    with WorkerPool(workers or cores(), one_process_per_run=one_process_per_run) as pool:
         scores = [score(task, known, pool, further=further.get(task.name, ())) for task in wanted]
     show_scores(scores, known.name, brief=brief)
     if out is not None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from inspect import Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple, TypeVar
@@ -267,14 +268,18 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def engine_named(name: str, workers: int | None, **isolation: bool) -> OpenEngine:
-    """The engine with this name, which isolates programs as `WorkerPool` does."""
-    from roboeval.evaluation.engines import Local
-
+@contextmanager
+def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[OpenEngine]:
+    """The engine with this name, isolated as `WorkerPool` says; it starts beside what follows."""
     if name == "local":
-        return Local(workers or cores(), **isolation)
+        from codebotler.simulator.pool import WorkerPool
+        from roboeval.evaluation.engines import Local
+
+        with closing(WorkerPool(workers or cores(), **isolation)) as pool:
+            yield Local(pool)
+        return
     if name != "ray":
         fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
-    return RayCluster(workers, **isolation)
+    yield RayCluster(workers, **isolation)
