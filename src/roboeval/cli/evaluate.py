@@ -72,7 +72,7 @@ def evaluate(
         wanted, left = tasks_to_judge(judged_by, tasks, ablated=ablation)
         if left:
             note(f"not judged, since they have no ablation: {', '.join(left)}")
-        builder = TableBuilder()
+        builder, is_started = TableBuilder(), False
         run = None if out is None else Run(out)
         try:
             opened = opened_source(source, judged_by)
@@ -84,12 +84,12 @@ def evaluate(
                 run.keep(opened.completions)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
             for row in watched(rows, "judging", scope.total):
+                is_started = True  # an interrupted builder is in no state to be asked
                 builder.add(row)
             table = builder.table()
             counted = summary(table, judged_by, scope, ablated=ablation)
             print_summary(counted, title=source, as_json=json)
         except KeyboardInterrupt:
-            is_started = not builder.table().is_empty()
             note(f"roboeval: {after_a_stop(is_kept=run is not None, is_started=is_started, redo=redo)}")
             raise SystemExit(STOPPED) from None
         if run is not None:

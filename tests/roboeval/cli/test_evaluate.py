@@ -17,6 +17,8 @@ from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
 from roboeval import load_results
 from roboeval.cli.output import watched
+from roboeval.evaluation.runs.rows import JudgedRow
+from roboeval.evaluation.runs.table import TableBuilder
 from seals import unseal
 
 GREETS = 'def task_program():\n    say("good day")\n'
@@ -441,7 +443,7 @@ def test_ctrl_c_ends_in_one_true_sentence(
     assert said.startswith("judging: ")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate()
-    assert (process.returncode, out) == (130, "")
+    assert (process.returncode, out) == (130, ""), err
     assert err.splitlines()[-1].startswith("roboeval: stopped; ")
     assert re.findall("--[a-z]+", err.splitlines()[-1]) == options
     assert "Traceback" not in err
@@ -730,3 +732,16 @@ def test_help_costs_little() -> None:
     assert subprocess.run(
         [sys.executable, "-c", bare], capture_output=True, text=True, check=True
     ).stdout == ("False\n")
+
+
+def test_ctrl_c_in_the_middle_of_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "a.jsonl").write_text(row())
+
+    def half_added(self: TableBuilder, row: JudgedRow) -> None:
+        self._counts.append(len(row.verdicts))  # as it is left behind there
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(TableBuilder, "add", half_added)
+    ended = roboeval("evaluate", "a.jsonl", cwd=tmp_path)
+    assert (ended.status, ended.out) == (130, "")
+    assert ended.err.splitlines()[-1].startswith("roboeval: stopped; ")

@@ -83,7 +83,8 @@ def transcripts(
 ) -> None:
     """Run programs, each in all of its worlds, and send the transcripts of each program."""
     skills, elsewhere, pickled, programs = batch
-    run.provide(skills)
+    if skills != run.skills:
+        run.provide(skills)
     run.elsewhere = frozenset(elsewhere)
     robots = unpickled(pickled)  # noqa: S301 - from the engine
     for code, numbers in programs:
