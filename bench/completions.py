@@ -4,7 +4,8 @@ The first part judges the two models whose published completions the corpus hold
 names it; else the recorded models): rows, runs and executed pairs of program and world in a second, of the
 whole command and of the evaluation alone. The paper's own code needs 0.354 s for a run, one after the other.
 The second part judges made-up completions of which nine in ten repeat another: time, and the largest memory
-that any of its processes held.
+that any of its processes held. The third judges completions of which none repeats another with 1, 2, 4 and 8
+workers; those beyond the cores of this machine only show what they cost.
 """
 
 import json
@@ -16,19 +17,21 @@ import time
 from pathlib import Path
 
 from codebotler.core.files import to_line
+from codebotler.simulator.pool import cores
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.runs.completions import read_completions, recorded_completions
 from roboeval.suites.load import Suite, load_suite
 
 ORIGINAL = 0.354  # seconds a run
 ROWS = tuple(int(n) for n in os.environ.get("ROWS", "1000,10000,100000").split(","))
+DIFFERENT = int(os.environ.get("DIFFERENT", "20000"))
 DISTINCT = 10  # one row in so many is a program of its own
 WORKERS = os.environ.get("WORKERS", "2")
 TASK = "SayGoodDay"
 PROGRAM = "def task_program():\n    say('this is {number}')\n    go_to('lobby')\n"
 
 
-def evaluated(file: Path) -> tuple[float, float]:
+def evaluated(file: Path, workers: str = WORKERS) -> tuple[float, float]:
     """Judge a file of completions: seconds, and megabytes of the largest process."""
     command = [
         sys.executable,
@@ -37,7 +40,7 @@ def evaluated(file: Path) -> tuple[float, float]:
         "evaluate",
         str(file),
         "--workers",
-        WORKERS,
+        workers,
         "--json",
     ]
     measure = (
@@ -106,11 +109,31 @@ def growth(folder: Path) -> None:
         )
 
 
+def scaling(folder: Path) -> None:
+    """Print how long more and more workers take."""
+    file = folder / "different.jsonl"
+    with file.open("w") as rows:
+        for number in range(DIFFERENT):
+            row = {
+                "task": TASK,
+                "prompt": number % 5,
+                "index": number,
+                "program": PROGRAM.format(number=number),
+            }
+            rows.write(json.dumps(row) + "\n")
+    print(f"{DIFFERENT:,} different completions on {cores()} cores:")
+    alone = evaluated(file, "1")[0]
+    for workers in (1, 2, 4, 8):
+        spent = alone if workers == 1 else evaluated(file, str(workers))[0]
+        print(f"    {workers} workers: {spent:.1f} s, {alone / spent:.2f} times as fast as one")
+
+
 def main() -> None:
-    """Print both parts."""
+    """Print all parts."""
     with tempfile.TemporaryDirectory() as name:
         real(Path(name))
         growth(Path(name))
+        scaling(Path(name))
 
 
 if __name__ == "__main__":

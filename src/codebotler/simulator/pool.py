@@ -142,48 +142,65 @@ class WorkerPool:
         name: Callable[[Key], bytes],
         then: Callable[[Called], Any] = lambda result: result,
     ) -> Iterator[Any]:
-        """The results for keys, in their order, calling the function in threads, with several keys at once.
+        """The results for keys, in their order, calling the function in threads; see `map_batches`."""
 
-        Equal keys are called once. While the next result is long in coming, more keys are read, so that the
-        other threads have work. What the keys or a call raise comes in its place among the results.
+        def submit(keys: Sequence[Key]) -> Future[Sequence[Called]]:
+            return self._threads.submit(function, keys)
 
-        Args:
-            function: gives a result for each of a few keys.
-            keys: read a little ahead.
-            name: gives each key a short name of its own.
-            then: called with each result in the thread that asks for them; its own result is pickled.
-        """
-        distinct = DistinctKeys(keys, name)
-        waiting, failed = distinct.waiting, distinct.failed
-        running: dict[Future[Sequence[Called]], list[bytes]] = {}
-        ended: SimpleQueue[Future[Sequence[Called]]] = SimpleQueue()
-        calls = AHEAD * self.workers
-        with ResultFile() as done:
-            while True:
-                while len(running) < calls and (batch := distinct.batch(self.workers)):
-                    future = self._threads.submit(function, list(batch.values()))
-                    running[future] = list(batch)
-                    future.add_done_callback(ended.put)
-                if not waiting:
-                    return
-                if ended.empty() and (waiting[0] in done or waiting[0] in failed):
-                    named = waiting.popleft()
-                    if named in failed:
-                        raise failed[named]
-                    yield done[named]
-                    continue
-                future = ended.get()
-                names = running.pop(future)
+        return map_batches(submit, keys, workers=self.workers, name=name, then=then)
+
+
+def map_batches(
+    submit: Callable[[Sequence[Key]], Future[Sequence[Called]]],
+    keys: Iterable[Key],
+    *,
+    workers: int,
+    name: Callable[[Key], bytes],
+    then: Callable[[Called], Any] = lambda result: result,
+) -> Iterator[Any]:
+    """The results for keys, in their order, with several calls under way at the same time.
+
+    Equal keys are called once. While the next result is long in coming, more keys are read, so that the
+    other workers have work. What the keys or a call raise comes in its place among the results.
+
+    Args:
+        submit: begins a call for a few keys, which gives a result for each.
+        keys: read a little ahead.
+        workers: how many calls are carried out at the same time.
+        name: gives each key a short name of its own.
+        then: called with each result in the thread that asks for them; its own result is pickled.
+    """
+    distinct = DistinctKeys(keys, name)
+    waiting, failed = distinct.waiting, distinct.failed
+    running: dict[Future[Sequence[Called]], list[bytes]] = {}
+    ended: SimpleQueue[Future[Sequence[Called]]] = SimpleQueue()
+    calls = AHEAD * workers
+    with ResultFile() as done:
+        while True:
+            while len(running) < calls and (batch := distinct.batch(workers)):
+                future = submit(list(batch.values()))
+                running[future] = list(batch)
+                future.add_done_callback(ended.put)
+            if not waiting:
+                return
+            if ended.empty() and (waiting[0] in done or waiting[0] in failed):
+                named = waiting.popleft()
+                if named in failed:
+                    raise failed[named]
+                yield done[named]
+                continue
+            future = ended.get()
+            names = running.pop(future)
+            try:
+                results = future.result()
+            except Exception as error:  # noqa: BLE001 - raised where the result is waited for
+                failed.update(dict.fromkeys(names, error))
+                continue
+            for named, result in zip(names, results, strict=True):
                 try:
-                    results = future.result()
-                except Exception as error:  # noqa: BLE001 - raised where the result is waited for
-                    failed.update(dict.fromkeys(names, error))
-                    continue
-                for named, result in zip(names, results, strict=True):
-                    try:
-                        done[named] = then(result)
-                    except Exception as error:  # noqa: BLE001 - the same, for this one alone
-                        failed[named] = error
+                    done[named] = then(result)
+                except Exception as error:  # noqa: BLE001 - the same, for this one alone
+                    failed[named] = error
 
 
 class DistinctKeys(Generic[Key]):

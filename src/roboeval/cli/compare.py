@@ -133,8 +133,9 @@ def resample(
     from roboeval.analysis.resample import LIMITS, curve_data, trials_by_prompt
     from roboeval.cli.views.groups import resample_view
 
-    with engine_named(engine, workers, one_process_per_run=one_process_per_run) as checker:
+    with engine_named(engine, workers, one_process_per_run=one_process_per_run) as engine_for:
         results = open_current(run, suite, ablated=False).results
+        checker = engine_for(len(results.places))
         prompts = trials_by_prompt(checked(results, samples=samples, seed=seed, engine=checker))
     limits = sorted(set(retries)) if retries else LIMITS
     if json:

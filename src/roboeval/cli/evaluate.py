@@ -58,7 +58,7 @@ def evaluate(
 ) -> None:
     """Judge whether each completion does what was asked."""
     isolation = {"require_isolation": require_isolation, "one_process_per_run": one_process_per_run}
-    with engine_named(engine, workers, **isolation) as running:
+    with engine_named(engine, workers, **isolation) as engine_for:
         from roboeval.analysis.metrics import judged_count
         from roboeval.analysis.summary import summary
         from roboeval.evaluation.runs.completions import how_many
@@ -82,6 +82,7 @@ def evaluate(
                 fail(f"{source}: there is no completion of {tasks or 'a task with an ablation'} in it")
             if run is not None and (opened.run is None or run.path.resolve() != opened.run.path.resolve()):
                 run.keep(opened.completions)
+            running = engine_for(scope.total)
             rows = _judged(opened, run, judged_by, wanted, ablated=ablation, redo=redo, engine=running)
             for row in watched(rows, "judging", scope.total):
                 is_started = True  # an interrupted builder is in no state to be asked

@@ -12,7 +12,6 @@ from roboeval.cli.options import (
     JsonOption,
     RunArgument,
     SuiteOption,
-    cores,
     load,
     open_current,
     task_names,
@@ -51,6 +50,7 @@ def find(
 
     It takes the completions that did something in some world, and groups those that fail by reason.
     """
+    from codebotler.simulator.pool import cores
     from roboeval.analysis.cluster import cluster_data, clusters, groups
     from roboeval.analysis.search import Question, Search, found_by_task, looked_at
     from roboeval.cli.views.groups import found_view

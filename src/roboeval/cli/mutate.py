@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, cores, load, named, task_names
+from roboeval.cli.options import ProcessOption, SuiteOption, WorkersOption, load, named, task_names
 from roboeval.cli.output import note, print_rich, watched
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def mutate(
 
     It runs and judges mutants: right programs with mistakes that models make.
     """
-    from codebotler.simulator.pool import WorkerPool
+    from codebotler.simulator.pool import WorkerPool, cores
     from roboeval.mutation.report import keep
     from roboeval.mutation.trials import mutation_score
 

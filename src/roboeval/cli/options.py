@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -263,23 +262,34 @@ def _to_go_on(results: Results, suite: Suite) -> list[str]:
     return words
 
 
-def cores() -> int:
-    """The default number of workers."""
-    return os.cpu_count() or 1
+IN_THREADS = 2  # workers that one process keeps busy
+MANY = 5_000  # programs for which it is worth while to start processes
 
 
 @contextmanager
-def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[OpenEngine]:
-    """The engine with this name, isolated as `WorkerPool` says; it starts beside what follows."""
+def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[Callable[[int], OpenEngine]]:
+    """The engine with this name for so many programs, isolated as `WorkerPool` says.
+
+    A worker starts beside what follows.
+    """
     if name == "local":
-        from codebotler.simulator.pool import WorkerPool
+        from codebotler.simulator.pool import WorkerPool, cores
         from roboeval.evaluation.engines import Local
 
-        with closing(WorkerPool(workers or cores(), **isolation)) as pool:
-            yield Local(pool)
+        workers = workers or cores()
+        with closing(WorkerPool(workers, **isolation)) as pool:
+
+            def local(programs: int) -> OpenEngine:
+                if programs < MANY or min(workers, cores()) <= IN_THREADS:
+                    return Local(pool)
+                from roboeval.evaluation.processes import Processes
+
+                return Processes(workers, **isolation)
+
+            yield local
         return
     if name != "ray":
         fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
-    yield RayCluster(workers, **isolation)
+    yield lambda _: RayCluster(workers, **isolation)

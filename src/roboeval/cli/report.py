@@ -12,7 +12,6 @@ from roboeval.cli.options import (
     SuiteOption,
     WorkersOption,
     command,
-    cores,
     expect_same_suite,
     named,
     open_current,
@@ -54,6 +53,7 @@ def report(
     gc.disable()  # a fifth of the time would go into looking for cycles among all that a report holds,
     atexit.register(gc.freeze)  # for the last time when Python ends
     from codebotler.core.terminal import busy
+    from codebotler.simulator.pool import cores
     from roboeval.evaluation.engines import Local
     from roboeval.report.cost import expect_known, read_prices
     from roboeval.report.runs import named_apart

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from roboeval.cli.options import JsonOption, SuiteOption, command, cores, load, task_names
+from roboeval.cli.options import JsonOption, SuiteOption, command, load, task_names
 from roboeval.cli.output import fail, note, print_json, print_rich, print_text, watched
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def start(task: str, suite: str) -> None:
 
 def lint_tasks(suite: Suite, task: str | None, *, accepted: bool) -> None:
     """Print what the linter finds in all tasks or one; status 1 if anything is open."""
+    from codebotler.simulator.pool import cores
     from roboeval.linting.findings import render
     from roboeval.linting.lint import lint
     from roboeval.linting.trials import tried

@@ -6,11 +6,12 @@ import gc
 import platform
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
+from functools import cache
 from typing import Protocol, Self, TypeAlias, TypeVar
 
 from codebotler.simulator.engine import digest
-from codebotler.simulator.pool import WorkerPool
-from codebotler.simulator.worker import Worker
+from codebotler.simulator.pool import NO_SECCOMP, WorkerPool
+from codebotler.simulator.worker import EngineError, Worker
 
 PYTHON = ".".join(platform.python_version_tuple()[:2])  # what verdicts depend on
 Work: TypeAlias = tuple[str, str]  # the name of a task, and a program
@@ -67,3 +68,16 @@ class Local:
         return self._pool.map_distinct(
             lambda some: function(here(), some), works, name=lambda work: digest(*work), then=then
         )
+
+
+# --- in other processes
+
+
+@cache
+def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
+    """The worker of this process, kept for the next programs."""
+    worker = Worker(one_process_per_run=one_process_per_run)
+    if require_isolation and not worker.has_seccomp:
+        worker.close()
+        raise EngineError(NO_SECCOMP)
+    return worker

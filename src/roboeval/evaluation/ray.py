@@ -7,7 +7,6 @@ import os
 import platform
 import socket
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,8 +14,8 @@ from codebotler import __version__
 from codebotler.core.errors import UserError, installed
 from codebotler.simulator.engine import digest
 from codebotler.simulator.pool import NO_SECCOMP, DistinctKeys, ResultFile
-from codebotler.simulator.worker import EngineError, Worker
-from roboeval.evaluation.engines import PYTHON, Ran, RunPrograms, Value, Work
+from codebotler.simulator.worker import EngineError
+from roboeval.evaluation.engines import PYTHON, Ran, RunPrograms, Value, Work, own_worker
 
 LOG = logging.getLogger("roboeval.ray")
 VERSIONS = f"codebotler {__version__} with Python {PYTHON}"
@@ -146,16 +145,6 @@ def run_shard(
     except EngineError as error:
         raise EngineError(f"{machine}: {error}") from None
     return values, None if worker.has_seccomp else f"{machine}: {NO_SECCOMP}"
-
-
-@cache
-def own_worker(*, require_isolation: bool = False, one_process_per_run: bool = False) -> Worker:
-    """The worker of this process, kept for the next shard."""
-    worker = Worker(one_process_per_run=one_process_per_run)
-    if require_isolation and not worker.has_seccomp:
-        worker.close()
-        raise EngineError(NO_SECCOMP)
-    return worker
 
 
 def _import_ray() -> Any:  # noqa: ANN401 - the extra has no types here

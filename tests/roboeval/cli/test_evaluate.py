@@ -13,6 +13,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from codebotler.simulator.worker import Worker
 from command_line import ENVIRONMENT, Ended, refused, roboeval
 from forked import Forked
 from roboeval import load_results
@@ -745,3 +746,30 @@ def test_ctrl_c_in_the_middle_of_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path
     ended = roboeval("evaluate", "a.jsonl", cwd=tmp_path)
     assert (ended.status, ended.out) == (130, "")
     assert ended.err.splitlines()[-1].startswith("roboeval: stopped; ")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "evaluate recorded:careful --tasks SayGoodDay",
+        "run --model recorded:careful --tasks SayGoodDay --num-completions 1 --no-report --out judged",
+        "resample judged",
+        "mutate SayGoodDay --mutants 3",
+    ],
+)
+def test_a_user_can_give_each_run_a_process_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, command: str
+) -> None:
+    alone: list[bool] = []
+    start = Worker.__init__
+
+    def started(self: Worker, *, one_process_per_run: bool = False) -> None:
+        alone.append(one_process_per_run)
+        start(self, one_process_per_run=one_process_per_run)
+
+    if command.startswith("resample"):
+        (tmp_path / "a.jsonl").write_text(row())
+        assert roboeval("evaluate", "a.jsonl", "--out", "judged", cwd=tmp_path).status == 0
+    monkeypatch.setattr(Worker, "__init__", started)
+    ended = roboeval(*command.split(), "--one-process-per-run", cwd=tmp_path)
+    assert (ended.status, alone[0], all(alone)) == (0, True, True), ended.err

@@ -21,6 +21,7 @@ import pytest
 from codebotler.simulator.pool import MOST_AHEAD, NO_SECCOMP
 from codebotler.simulator.worker import EngineError
 from command_line import ENVIRONMENT, roboeval
+from roboeval.evaluation import engines
 from roboeval.evaluation import ray as rayengine
 from roboeval.evaluation.engines import Local, RunPrograms, Work
 from roboeval.evaluation.judge import evaluate
@@ -72,10 +73,8 @@ def test_another_version_does_not_judge() -> None:
 def test_missing_isolation_is_warned_of_once_or_refused(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(
-        rayengine, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None)
-    )
-    monkeypatch.setattr(rayengine, "own_worker", rayengine.own_worker.__wrapped__)
+    monkeypatch.setattr(engines, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None))
+    monkeypatch.setattr(rayengine, "own_worker", engines.own_worker.__wrapped__)
     functions, works = (NUMBERS, abs), list(numbered(range(2)))
     with pytest.raises(EngineError, match=re.escape(NO_SECCOMP)):
         run_shard(functions, works, VERSIONS, {"require_isolation": True})
