@@ -68,7 +68,7 @@ def check(
 
     Raises:
         UserError: the name of a room is no regular expression, the robot starts in none of the rooms, or the
-            number of samples or workers is out of range.
+            number of samples is out of range.
         EngineError: no isolated process could be started.
     """
     expect_list(rooms, "the rooms")

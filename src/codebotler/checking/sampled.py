@@ -37,7 +37,7 @@ class CheckSettings:
 
     def __post_init__(self) -> None:
         if not 1 <= self.samples <= MOST_SAMPLES:
-            raise UserError(f"the number of samples is {self.samples}; write one from 1 to {MOST_SAMPLES:,}")
+            raise UserError(f"the number of samples must be from 1 to {MOST_SAMPLES:,}, not {self.samples:,}")
 
 
 class SampledRuns:

@@ -45,7 +45,10 @@ def generate(
     ] = None,
     repair: Annotated[
         bool,
-        typer.Option("--repair", help="Ask with the rejected program and its problems; once by default."),
+        typer.Option(
+            "--repair",
+            help="When asking again, show the rejected program and its problems; once by default.",
+        ),
     ] = False,
     record: Annotated[
         Path | None, typer.Option(help="Add a line of JSON for every attempt to this file.")
@@ -62,7 +65,7 @@ def generate(
 ) -> None:
     """Have a model write a program, and print it.
 
-    The status is 1 if a check finds problems in it.
+    The exit status is 1 if the check finds problems.
     """
     from codebotler.cli.generate import show, write
     from codebotler.core.world import World
@@ -141,9 +144,9 @@ def run(
     address: options.AddressOption = "",
     ros_python: options.RosPythonOption = options.ROS_PYTHON,
 ) -> None:
-    """Check a program, ask, and run it on a robot.
+    """Check a program, ask for approval, and run it on a robot.
 
-    Ctrl-C stops the robot, with status 130.
+    Ctrl-C stops the robot; the exit status is then 130.
     """
     from codebotler.cli import run
     from codebotler.cli.run import Request
@@ -183,6 +186,8 @@ def missions(
 
     if mcap is not None and mission is None:
         raise UserError("--mcap writes one mission; name it, or `last`")
+    if mcap is not None and json:
+        raise UserError("--mcap and --json exclude each other; give one of them")
     if clock not in {"wall", "robot"}:
         raise UserError(f'unknown clock "{clock}"; use wall or robot')
     if mission is None:
@@ -246,7 +251,7 @@ def serve(
     ] = None,
     runs: Annotated[Path, typer.Option(help="The folder of runs of the benchmark.")] = Path("runs"),
 ) -> None:
-    """Serve the page from which a robot is operated.
+    """Serve the web page for operating a robot.
 
     Ctrl-C ends it, which also stops the robot.
     """
@@ -269,9 +274,9 @@ def serve(
     console = Console(body, home(), opened, models=models, world=known, face=shown)
 
     from codebotler.web import server
-    from codebotler.web.frame import installed
+    from codebotler.web.frame import installed_pages
 
-    server.serve(console, place, access, installed(), runs, alone_for=stop_when_alone)
+    server.serve(console, place, access, installed_pages(), runs, alone_for=stop_when_alone)
 
 
 def _opener(models: Sequence[str], base_url: str | None) -> Callable[[str], Model]:

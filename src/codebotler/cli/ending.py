@@ -78,4 +78,4 @@ def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' 
     if error.ctx is None:
         return message
     after = " " if message.endswith("?") else "; "
-    return f"{message}{after}`{error.ctx.command_path} --help` shows what there is"
+    return f"{message}{after}see `{error.ctx.command_path} --help`"

@@ -45,7 +45,7 @@ NameOption = Annotated[
 ]
 TokenOption = Annotated[str | None, typer.Option(help="The token that opens the page; a new one by default.")]
 NoTokenOption = Annotated[
-    bool, typer.Option("--no-token", help="Let everybody on this machine in; not with --host.")
+    bool, typer.Option("--no-token", help="Let anyone on this machine in without a token; not with --host.")
 ]
 
 

@@ -33,6 +33,11 @@ class Recording:
         """Whether the text is said aloud."""
         return not self.names
 
+    @property
+    def is_drive(self) -> bool:
+        """Whether the robot goes to the place that the text names."""
+        return self.names == "room"
+
 
 @dataclass(frozen=True)
 class Verb:

@@ -106,7 +106,7 @@ class LiveRobot:
         self._note("skill", **which, arguments=named)
         started = self.now
         try:
-            result = self._done(skill, given)
+            result = self._done(skill, given, event)
             if event is not None and event.options:
                 _position(result, event)
         except RobotError as error:
@@ -121,7 +121,7 @@ class LiveRobot:
         self._check_end()
         return result
 
-    def _done(self, skill: Skill, given: list[base.Argument]) -> base.Result:
+    def _done(self, skill: Skill, given: list[base.Argument], event: Event | None) -> base.Result:
         which = {"number": self._number, "skill": skill.name}
 
         def told(what: str | Picture) -> None:
@@ -134,8 +134,8 @@ class LiveRobot:
                 self._fault = error
                 self.stop()
 
-        if skill.recording and skill.recording.options and () in given:
-            raise RobotError("AskEmptyOptions", f'the question "{given[-2]}" offers no options')
+        if event is not None and skill.recording and skill.recording.options and not event.options:
+            raise RobotError("AskEmptyOptions", f'the question "{event.text}" offers no options')
         return answered(skill, self.robot.perform(skill.name, given, told))
 
     def _check_end(self) -> None:

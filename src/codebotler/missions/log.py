@@ -48,8 +48,23 @@ class State(StrEnum):
     STOPPED = "stopped"
     INTERRUPTED = "interrupted"
 
+    @property
+    def is_open(self) -> bool:
+        """Whether the program can still be replaced."""
+        return self in {State.DRAFTING, State.CHECKED}
 
-STEPS: dict[State, frozenset[State]] = {
+    @property
+    def is_moving(self) -> bool:
+        """Whether the robot works, or ends what it did."""
+        return self in {State.RUNNING, State.STOPPING}
+
+    @property
+    def is_final(self) -> bool:
+        """Whether no other state follows."""
+        return self not in TRANSITIONS
+
+
+TRANSITIONS: dict[State, frozenset[State]] = {
     State.DRAFTING: frozenset({State.DRAFTING, State.CHECKED, State.FAILED, State.STOPPED}),
     State.CHECKED: frozenset(
         {State.DRAFTING, State.CHECKED, State.APPROVED, State.FAILED, State.STOPPED},
@@ -81,7 +96,7 @@ class Summary:
     @property
     def has_ended(self) -> bool:
         """Whether its state is final."""
-        return self.state not in STEPS
+        return self.state.is_final
 
     @classmethod
     def read(cls, folder: Path) -> Summary:

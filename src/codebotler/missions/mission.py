@@ -16,7 +16,7 @@ from codebotler.core.files import Appender, make_folder
 from codebotler.core.terminal import visible
 from codebotler.core.trace import Outcome, RunError, Status, Trace
 from codebotler.missions.live import LiveRobot, StoppedError
-from codebotler.missions.log import STEPS, Line, State, Summary, add_event, log_of
+from codebotler.missions.log import TRANSITIONS, Line, State, Summary, add_event, log_of
 from codebotler.missions.pictures import Pictures
 from codebotler.robots.base import RobotLostError
 from codebotler.robots.reservation import Reservation
@@ -63,6 +63,7 @@ class Mission:
         self.told = told
         self._writing = threading.RLock()  # held while an event is written; a stop waits for it last
         self._gate = threading.Lock()  # held for moments only
+        self._has_program = False  # which may be empty
         self._stopped_by: str | None = None
         self._asked, self._passed_on = 0.0, math.inf  # when a stop was first asked for; when the robot knew
         self._live: LiveRobot | None = None
@@ -112,15 +113,16 @@ class Mission:
         """
         with self._writing:
             self._step(State.DRAFTING, "take another program", program=program, model=model, problems=())
+            self._has_program = True
 
     def check(self, problems: Sequence[str]) -> None:
         """Take the problems that a check found, in sentences.
 
         Raises:
-            MissionError: there is no program, or it is too late for that.
+            MissionError: it took no program, or it is too late for that.
         """
         with self._writing:
-            if not self.summary.program:
+            if not self._has_program:
                 raise MissionError(f"mission {self.id} has no program to check")
             self._step(State.CHECKED, "be checked", problems=tuple(problems))
 
@@ -147,7 +149,7 @@ class Mission:
             MissionError: it runs, or has ended.
         """
         with self._writing:
-            if self.state in {State.RUNNING, State.STOPPING}:
+            if self.state.is_moving:
                 raise MissionError(f"mission {self.id} is {self.state}; stop it instead")
             self._step(State.FAILED, "fail", reason=reason)
 
@@ -279,7 +281,7 @@ class Mission:
         self._step(State.STOPPING, "be stopped", reason=f"stopped by {self._stopped_by}")
 
     def _leave(self, error: BaseException | None) -> None:
-        if self.state in {State.RUNNING, State.STOPPING}:
+        if self.state.is_moving:
             self.stop("CodeBotler, shutting down")
         elif error is None or isinstance(error, KeyboardInterrupt | GeneratorExit):
             self.stop("CodeBotler")
@@ -288,7 +290,7 @@ class Mission:
 
     def _step(self, to: State, what: str, **changes: object) -> None:
         """Go to a state and log it; the caller has the lock."""
-        if to not in STEPS.get(self.state, ()):
+        if to not in TRANSITIONS.get(self.state, ()):
             raise MissionError(f"mission {self.id} cannot {what}: its state is {self.state}")
         self.summary.state = to
         for name, value in changes.items():

@@ -62,7 +62,8 @@ class Progress:
     def with_skill(self, line: Line, program: str) -> Progress:
         """The progress when a skill begins."""
         name = line["skill"]
-        drives = name in SKILLS and getattr(SKILLS[name].recording, "kind", "") == "goto"
+        recording = SKILLS[name].recording if name in SKILLS else None
+        drives = recording is not None and recording.is_drive
         now = replace(
             self,
             doing=event_text(line),

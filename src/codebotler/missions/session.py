@@ -17,7 +17,7 @@ from codebotler.checking.problems import Check
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import system_sentence, visible
 from codebotler.generation.generate import write_program
-from codebotler.missions.log import STEPS, Line, State
+from codebotler.missions.log import Line, State
 from codebotler.missions.mission import Mission, MissionError
 from codebotler.missions.preflight import missing_skills, preflight, unknown_rooms
 from codebotler.missions.view import CHECKING, Order, SessionView, digest
@@ -109,7 +109,7 @@ class MissionSession:
         """Have the model write another program; with `repair`, it is shown this one and its problems."""
         with self._editing, self._lock:
             view = self._view
-            if not view.may_be_approved or not view.model:
+            if not view.may_be_asked_again:
                 raise MissionError("the model cannot be asked again now")
             self._ask_again = (view.problems if repair else (),)
             self._change(busy=f"asking {view.model}", is_written=True)
@@ -134,7 +134,7 @@ class MissionSession:
         self._stopped_by = self._stopped_by or by
         mission, asking = self._mission, self._asking
         try:
-            if mission is not None and mission.state in {State.DRAFTING, State.CHECKED}:
+            if mission is not None and mission.state.is_open:
                 self._robot.cancel()  # it may be asked which rooms there are
             if mission is not None:
                 with suppress(MissionError):  # it ended by itself
@@ -192,11 +192,11 @@ class MissionSession:
                     return
                 raise
             self._show(room_map=room_map)
-            if order.program:
+            if order.has_program:
                 self._take(mission, order.program)
             else:
                 self._ask(mission, ())
-            while mission.state in {State.DRAFTING, State.CHECKED}:
+            while mission.state.is_open:
                 self._wait_for_a_person(mission)
             if mission.state is State.APPROVED:
                 with suppress(MissionError):  # it was stopped before it could run
@@ -212,7 +212,7 @@ class MissionSession:
             )
             edited, again = self._edited, self._ask_again
             self._ask_again = ()
-        if mission.state not in {State.DRAFTING, State.CHECKED}:
+        if not mission.state.is_open:
             return
         if again:
             self._ask(mission, again[0])
@@ -310,7 +310,7 @@ class MissionSession:
             if line["event"] == "state":
                 changes |= {"state": State(line["state"]), "reason": line.get("reason", "")}
                 changes["line"] = line.get("line")
-                if line["state"] not in STEPS:
+                if State(line["state"]).is_final:
                     changes["busy"] = ""
             self._change(**changes)
         self.on_event(line)

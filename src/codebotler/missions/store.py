@@ -10,7 +10,7 @@ from pathlib import Path
 
 from codebotler.core.errors import UserError
 from codebotler.core.terminal import note, system_sentence, visible
-from codebotler.missions.log import STEPS, SUMMARY, Line, State, Summary, add_event, doing, events_of, log_of
+from codebotler.missions.log import SUMMARY, Line, State, Summary, add_event, doing, events_of, log_of
 from codebotler.missions.wording import call_text
 
 ID = re.compile(r"\d{8}-\d{6}(-\d+)?")
@@ -74,7 +74,7 @@ def _interrupted(folder: Path) -> list[Summary]:
         if summary.has_ended:
             return []
         last = next((line for line in reversed(events) if line["event"] == "state"), None)
-        if last is not None and last["state"] not in STEPS:
+        if last is not None and State(last["state"]).is_final:
             summary.state, summary.reason = State(last["state"]), last.get("reason", "")
             summary.ended = last["time"]
             summary.write(folder)
@@ -87,7 +87,7 @@ def _interrupted(folder: Path) -> list[Summary]:
 
 
 def _how(summary: Summary, events: list[Line]) -> str:
-    if summary.state not in {State.RUNNING, State.STOPPING}:
+    if not summary.state.is_moving:
         return f"CodeBotler ended unexpectedly while the mission was {summary.state}; the robot had not moved"
     skill = doing(events)
     if skill is None:

@@ -26,13 +26,18 @@ class Order:
     """
 
     instruction: str = ""
-    model: str = ""  # its name; empty where the program comes with the order
+    model: str = ""  # its name; empty where none may be asked
     program: str = ""
     author: str = ""  # the model that wrote the program, if one did
 
     def __post_init__(self) -> None:
-        if not self.program.strip():
+        if not self.has_program:
             stated(self.instruction)
+
+    @property
+    def has_program(self) -> bool:
+        """Whether the program comes with the order, so that no model writes it."""
+        return bool(self.program.strip())
 
 
 @dataclass(frozen=True)
@@ -47,7 +52,7 @@ class SessionView:
     busy: str = ""  # what goes on before the robot moves, such as `checking`
     trouble: str = ""  # why it could not go on, in a sentence
     instruction: str = ""
-    model: str = ""  # that can be asked again; empty where the program came with the order
+    model: str = ""  # its name; empty where none may be asked
     program: str = ""  # while a model writes, as much as has arrived
     author: str = ""  # the model that wrote it; empty if a person did
     is_written: bool = False  # whether a model is writing now
@@ -84,7 +89,7 @@ class SessionView:
     @property
     def is_running(self) -> bool:
         """Whether the robot works, or ends what it did."""
-        return self.state in {State.RUNNING, State.STOPPING} and not self.is_over
+        return self.state is not None and self.state.is_moving and not self.is_over
 
     @property
     def may_be_approved(self) -> bool:
@@ -92,12 +97,17 @@ class SessionView:
         return self.state is State.CHECKED and not self.is_over and not self.busy
 
     @property
+    def may_be_asked_again(self) -> bool:
+        """Whether the model can write another program."""
+        return self.may_be_approved and bool(self.instruction and self.model)
+
+    @property
     def may_be_edited(self) -> bool:
         """Whether another program can replace this one."""
         if self.is_over or self.is_written:
             return self.is_over
         waits = self.state is None and bool(self.program)  # for the robot; nothing typed is lost
-        return waits or self.state in {State.DRAFTING, State.CHECKED}
+        return waits or (self.state is not None and self.state.is_open)
 
 
 def digest(program: str) -> str:

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-from codebotler.core.skills import SKILLS, SkillTable
+from codebotler.core.skills import SKILLS, Recording, Skill, SkillTable
+from codebotler.core.words import counted
 from codebotler.robots.base import Argument, CancelledError, Feedback, Result, Robot, no_feedback
 from codebotler.robots.clock import Clock
 from codebotler.simulator.robot import RobotError
@@ -17,7 +18,6 @@ from codebotler.simulator.robot import RobotError
 PATIENCE = 60.0  # real seconds that people have for an answer by default
 TIMED_OUT = "AskTimeout"  # kind of the error
 MOST_SAID = 3
-SPOKEN = frozenset({"say", "ask"})
 AT_LEAST, AT_MOST, LETTERS_PER_SECOND = 1.0, 10.0, 20.0  # robot seconds that saying something takes
 
 
@@ -165,7 +165,12 @@ class Face:
 
 def without_speech(skills: SkillTable = SKILLS) -> SkillTable:
     """The skills that the robot behind a face must offer."""
-    return SkillTable(tuple(skill for skill in skills.rows if skill.name not in SPOKEN))
+    return SkillTable(tuple(skill for skill in skills.rows if _spoken(skill) is None))
+
+
+def _spoken(skill: Skill) -> Recording | None:
+    """What a skill leaves in the trace, if it is spoken."""
+    return skill.recording if skill.recording and skill.recording.is_spoken else None
 
 
 class RobotWithFace:
@@ -179,7 +184,9 @@ class RobotWithFace:
     @property
     def missing(self) -> Mapping[str, str]:
         """What the other robot cannot do, apart from speaking."""
-        return {skill: why for skill, why in self._robot.missing.items() if skill not in SPOKEN}
+        return {
+            skill: why for skill, why in self._robot.missing.items() if _spoken(self.skills[skill]) is None
+        }
 
     @property
     def clock(self) -> Clock:
@@ -193,16 +200,20 @@ class RobotWithFace:
 
     def perform(self, skill: str, arguments: Sequence[Argument], feedback: Feedback = no_feedback) -> Result:
         """Speak, or have the other robot perform the skill."""
-        if skill not in SPOKEN:
+        spoken = _spoken(self.skills[skill])
+        if spoken is None:
             return self._robot.perform(skill, arguments, feedback)
         screens = self._face.screens
-        feedback(
-            f"shown on {screens} {'face' if screens == 1 else 'faces'}" if screens else "no face is open"
+        feedback(f"shown on {counted(screens, 'face')}" if screens else "no face is open")
+        given = dict(
+            zip((parameter.name for parameter in self.skills[skill].parameters), arguments, strict=True)
         )
-        if skill == "say":
-            self._say(str(arguments[0]))
+        text = str(given.pop(spoken.text))
+        if spoken.options is None:
+            self._say(text)
             return None
-        return self._ask(*arguments)
+        options = tuple(given.pop(spoken.options))
+        return options[self._face.ask(", ".join(map(str, given.values())), text, options)]
 
     def cancel(self) -> None:
         """Withdraw the question, and stop the other robot."""
@@ -221,6 +232,3 @@ class RobotWithFace:
         seconds = min(max(AT_LEAST, len(text) / LETTERS_PER_SECOND), AT_MOST)
         if not self.clock.wait(seconds):
             raise CancelledError
-
-    def _ask(self, person: Argument, question: Argument, options: Argument) -> str:
-        return options[self._face.ask(str(person), str(question), tuple(options))]

@@ -122,7 +122,7 @@ def performed(robot: SimulatedRobot, skill: str, arguments: Sequence[Argument]) 
 
 def readiness(_ros_python: Path = ROS_PYTHON) -> Readiness:
     """It works everywhere."""
-    return Readiness("sim", works=True, note="drives through --world FILE, with the people of that file")
+    return Readiness("sim", works=True, note="simulates the rooms and people of --world FILE")
 
 
 def robot(options: Options) -> Simulated:

@@ -10,7 +10,7 @@ import secrets
 import socket
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -138,7 +138,7 @@ class Place:
                 if error.errno == errno.EADDRINUSE and port != ports[-1]:
                     continue
                 raise UserError(
-                    f"port {port} is already in use; choose another --port"
+                    f"{_taken(ports)} already in use; choose another --port"
                     if error.errno == errno.EADDRINUSE
                     else f"cannot listen on {self.host}, port {port}: {error.strerror}"
                 ) from None
@@ -163,3 +163,7 @@ class Place:
         named = {name.lower() for name in (self.host, *self.names)}
         hosts = LOOPBACK | named | (set() if self.is_loopback else {socket.gethostname().lower()})
         return GuardRules(access, frozenset(hosts), not self.is_loopback, f"codebotler-{port}")
+
+
+def _taken(ports: Sequence[int]) -> str:
+    return f"port {ports[0]} is" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]} are"

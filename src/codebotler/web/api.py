@@ -10,7 +10,7 @@ from dataclasses import asdict
 from http import HTTPStatus
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Header, HTTPException, Request
+from fastapi import APIRouter, Header, HTTPException, Query, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
@@ -25,7 +25,7 @@ from codebotler.missions.view import Order, SessionView
 from codebotler.web.console import MOST_PROGRAM, QUIET, Console
 
 HERE = "current"
-"""The mission at hand, in an address."""
+"""The current mission, in an address."""
 
 STOPS = "the page"
 """Who stops a mission over the API."""
@@ -38,7 +38,7 @@ class _Form(BaseModel):
 
 
 class NewMission(_Form):
-    """A new mission: an instruction, a program, or both."""
+    """A new mission: an instruction, a program, or both; without a program, the model writes one."""
 
     instruction: Text = ""
     model: Annotated[str, Field(max_length=200)] = Field("", description="By default, the first one.")
@@ -46,7 +46,7 @@ class NewMission(_Form):
 
 
 class NewProgram(_Form):
-    """A program to check, alone or in the place of the one at hand."""
+    """A program to check, alone or in the place of the current one."""
 
     program: Text
 
@@ -98,7 +98,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions", status_code=201)
     async def create(new: NewMission) -> dict[str, Any]:
-        """Begin a mission; its program is written and checked meanwhile. Refused while a mission runs."""
+        """Begin a mission; writing and checking go on in the background. Refused while a mission runs."""
         with _refusing():
             session = console.begin(Order(new.instruction, new.model, new.program))
         await console.notifier.until(lambda: bool(session.view.id) or session.view.is_over)
@@ -122,7 +122,13 @@ def _add_missions(api: APIRouter, console: Console) -> None:
         return _file(data[: data.rfind(b"\n") + 1], f"{summary.id}.jsonl", "application/jsonl")
 
     @api.get("/missions/{mission}/events.mcap")
-    def mcap(mission: str, clock: Literal["wall", "robot"] = "wall") -> Response:
+    def mcap(
+        mission: str,
+        clock: Annotated[
+            Literal["wall", "robot"],
+            Query(description="`robot` for simulated time, else `wall`."),
+        ] = "wall",
+    ) -> Response:
         """The events as MCAP, which Foxglove opens."""
         with _refusing(), installed():
             from codebotler.missions.mcap import write_mcap  # noqa: PLC0415 - of an extra of its own
@@ -136,7 +142,7 @@ def _add_missions(api: APIRouter, console: Console) -> None:
 def _add_changes(api: APIRouter, console: Console) -> None:
     @api.put("/missions/{mission}/program")
     def edit(mission: str, new: NewProgram) -> dict[str, Any]:
-        """Replace the program; it is checked meanwhile."""
+        """Replace the program; it is checked in the background."""
         _at_hand(console, mission)
         with _refusing():
             return view_data(console.edit(new.program).view)
@@ -159,13 +165,15 @@ def _add_changes(api: APIRouter, console: Console) -> None:
 
     @api.post("/missions/{mission}/stop", status_code=202)
     async def stop_mission(mission: str) -> dict[str, Any]:
-        """Stop the mission at hand; `state` says when it has stopped."""
+        """Stop the current mission; `state` says when it has stopped."""
         _at_hand(console, mission)
         console.stop_soon(STOPS)
         return view_data(console.view)
 
     @api.post("/stop", status_code=202)
-    async def stop(*, only_moving: bool = False) -> dict[str, Any]:
+    async def stop(
+        *, only_moving: Annotated[bool, Query(description="Stop only a robot that runs a program.")] = False
+    ) -> dict[str, Any]:
         """Stop the current mission, or only one whose robot moves; says whether there is any."""
         return {"stopping": console.stop_soon(STOPS, only_moving=only_moving)}
 
@@ -184,13 +192,18 @@ def _add_events(api: APIRouter, console: Console) -> None:
 def _add_rest(api: APIRouter, console: Console) -> None:
     @api.post("/check", tags=["checks"])
     def check(new: NewProgram) -> dict[str, Any]:
-        """Check a program, in the rooms of the mission at hand if there is one."""
+        """Check a program, in the rooms of the current mission if there is one."""
         with _refusing():
             return console.check(new.program, console.view.room_map).data()
 
     @api.get("/robot", tags=["robot"])
-    async def robot(*, once_over: bool = False) -> dict[str, Any]:
-        """The robot, its skills and its mission; with `once_over` when that is over, or after 15 s."""
+    async def robot(
+        *,
+        once_over: Annotated[
+            bool, Query(description="Wait for the end of the mission, at most 15 s.")
+        ] = False,
+    ) -> dict[str, Any]:
+        """The robot, its skills and its mission."""
         view = await console.view_over() if once_over else console.view
         return {
             "robot": console.robot.name,

@@ -96,7 +96,7 @@ class Console:
 
         One at hand that is not running makes room for it; another one raises MissionError.
         """
-        model = order.model.strip() or ("" if order.program else self.models[0])
+        model = order.model.strip() or ("" if order.has_program else self.models[0])
         order = replace(order, instruction=order.instruction.strip(), model=model)
         for text in (order.instruction, order.program):
             _check_length(text)

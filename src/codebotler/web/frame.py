@@ -149,7 +149,7 @@ class Pages:
     add: Callable[[Site], None]
 
 
-def installed() -> tuple[Pages, ...]:
+def installed_pages() -> tuple[Pages, ...]:
     """The pages that installed packages add; those that cannot be loaded are noted and left out."""
     return tuple(_loaded())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ipaddress
 import re
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from posixpath import normpath
 from urllib.parse import quote, urlencode
@@ -262,6 +262,13 @@ def _refusal(request: HTTPConnection, error: RefusedError) -> Response:
         headers["www-authenticate"] = "Bearer"
     if error.status is HTTPStatus.TOO_MANY_REQUESTS:
         headers["retry-after"] = "60"
+    return refusal(request, error.status, error.sentence, headers)
+
+
+def refusal(
+    request: HTTPConnection, status: HTTPStatus, sentence: str, headers: Mapping[str, str]
+) -> Response:
+    """An answer with one sentence: a page for browsers, else JSON."""
     if "text/html" in request.headers.get("accept", ""):
-        return HTMLResponse(REFUSAL.format(sentence=error.sentence), error.status, headers)
-    return JSONResponse({"detail": error.sentence}, error.status, headers)
+        return HTMLResponse(REFUSAL.format(sentence=sentence), status, headers)
+    return JSONResponse({"detail": sentence}, status, headers)

@@ -18,7 +18,7 @@ import nicegui
 import uvicorn
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import HTMLResponse, JSONResponse, Response
+from fastapi.responses import Response
 from fastapi.staticfiles import StaticFiles
 from nicegui import core, ui
 from starlette.routing import BaseRoute, Match, Mount
@@ -31,7 +31,7 @@ from codebotler.web import api, api_page, face, page
 from codebotler.web.access import Access, Place, Role
 from codebotler.web.console import Console
 from codebotler.web.frame import FACE, ROBOT, Frame, Pages, Site
-from codebotler.web.guard import MOST_BYTES, NO_PAGE, REFUSAL, Guard
+from codebotler.web.guard import MOST_BYTES, NO_PAGE, Guard, refusal
 
 STATIC = Path(__file__).with_name("static")
 LEAVING = "CodeBotler, since the last operator closed the page"
@@ -146,9 +146,7 @@ def _not_found(app: FastAPI, request: Request, _error: Exception) -> Response:
     if allowed:
         status, sentence = HTTPStatus.METHOD_NOT_ALLOWED, f"this address accepts only {listed(allowed)}"
         headers = {"allow": ", ".join(allowed)}
-    if "text/html" in request.headers.get("accept", ""):
-        return HTMLResponse(REFUSAL.format(sentence=sentence), status, headers)
-    return JSONResponse({"detail": sentence}, status, headers)
+    return refusal(request, status, sentence, headers)
 
 
 def _has_page(app: FastAPI, path: str) -> bool:

@@ -94,7 +94,8 @@ IsolationOption = Annotated[
     bool, typer.Option("--require-isolation", help="Refuse to run programs without full isolation.")
 ]
 ProcessOption = Annotated[
-    bool, typer.Option("--one-process-per-run", help="Let no two runs share a process, which takes longer.")
+    bool,
+    typer.Option("--one-process-per-run", help="Give every run its own process, which takes longer."),
 ]
 WorldsOption = Annotated[
     int | None,

@@ -69,6 +69,16 @@ def test_reference_programs_leave_the_simulators_traces(paper: Suite, worker: Wo
         assert found.trace == outcome.trace
 
 
+def test_a_question_without_options_is_named_wherever_its_text_stands() -> None:
+    given = (Parameter("choices", list, "list[str]"), Parameter("title"))
+    row = Skill("choose", given, "str", "Let somebody choose.", Recording("choose", "title", "choices"))
+    answering = Answering()
+    answering.skills = SKILLS.with_skill(row)
+    robot = LiveRobot(answering, Notes())
+    with pytest.raises(RobotError, match='the question "A drink\\?" offers no options'):
+        robot.perform("choose", [(), "A drink?"])
+
+
 @pytest.mark.parametrize(
     ("call", "kind"),
     [

@@ -18,7 +18,7 @@ from codebotler.core.errors import UserError
 from codebotler.core.trace import Outcome
 from codebotler.core.world import Room, World
 from codebotler.missions import mission as module
-from codebotler.missions.log import EVENTS, STEPS, SUMMARY, Line, State, Summary, events_of
+from codebotler.missions.log import EVENTS, SUMMARY, TRANSITIONS, Line, State, Summary, events_of
 from codebotler.missions.mission import UNCONFIRMED, Mission, MissionError
 from codebotler.missions.store import find, missions, recover
 from codebotler.robots.base import NotReadyError, Result, Robot, RobotLostError
@@ -183,9 +183,9 @@ def test_mission_that_is_left_has_ended(
 
 
 def test_every_state_but_the_ends_has_a_way_out() -> None:
-    ends = set(State) - set(STEPS)
+    ends = set(State) - set(TRANSITIONS)
     assert ends == {State.DONE, State.FAILED, State.STOPPED, State.INTERRUPTED}
-    assert all(STEPS.values())
+    assert all(TRANSITIONS.values())
 
 
 # --- ends

@@ -11,14 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from codebotler.core.skills import SKILLS
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
 from codebotler.core.world import Room, World
 from codebotler.missions.log import State, events_of
 from codebotler.missions.mission import Mission
 from codebotler.missions.preflight import missing_skills
 from codebotler.robots.base import Argument, CancelledError, Options
 from codebotler.robots.face import (
-    SPOKEN,
     TIMED_OUT,
     AnswerError,
     Face,
@@ -131,7 +130,25 @@ def test_the_robot_behind_a_face_is_asked_for_nothing_that_is_spoken(kind: str) 
     robot = open_with_face(kind, Options(world=WORLD), Face())
     assert isinstance(robot, RobotWithFace)
     assert robot.skills == SKILLS
-    assert set(robot._robot.skills) == set(SKILLS) - SPOKEN
+    assert set(robot._robot.skills) == set(SKILLS) - {"say", "ask"}
+
+
+def test_whatever_is_spoken_is_shown_by_the_parameters_of_its_row() -> None:
+    text = (Parameter("text"),)
+    choose = (Parameter("choices", list, "list[str]"), Parameter("title"), Parameter("guest"))
+    table = SKILLS.with_skill(Skill("whisper", text, "None", "Whisper.", Recording("whisper", "text")))
+    row = Skill("choose", choose, "str", "Let a guest choose.", Recording("choose", "title", "choices"))
+    table = table.with_skill(row)
+    face = Face(LONG)
+    robot = RobotWithFace(Simulated(WORLD, speed=None, skills=without_speech(table)), face, table)
+    robot.connect()
+    robot.perform("whisper", ["psst"])
+    assert [said.text for said in face.shown.said] == ["psst"]
+    with going(lambda: robot.perform("choose", [("Tea", "Milk"), "A drink?", "ann"])) as ended:
+        asked = question_of(face)
+        assert (asked.person, asked.text, asked.options) == ("ann", "A drink?", ("Tea", "Milk"))
+        face.answer(asked.number, 1)
+    assert ended == ["Milk"]
 
 
 def test_saying_takes_time_by_the_robots_clock() -> None:

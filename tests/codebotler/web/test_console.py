@@ -127,6 +127,29 @@ def test_a_program_is_seen_while_it_is_written_and_a_stop_ends_that(tmp_path: Pa
         assert (console.view.state, author.is_closed) == (State.STOPPED, True)
 
 
+def test_a_blank_program_is_none_where_there_is_an_instruction(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author(HELLO)) as console:
+        console.begin(Order("say hello", program=" \n"))
+        assert until(console, lambda view: view.may_be_approved).program == HELLO
+
+
+def test_an_emptied_program_has_a_problem_and_can_be_filled_again(console: Console) -> None:
+    checked(console)
+    console.edit("")
+    view = until(console, lambda view: view.check is not None and not view.program)
+    assert (view.state, len(view.problems)) == (State.CHECKED, 1)
+    console.edit(HELLO)
+    assert until(console, lambda view: view.may_be_approved and bool(view.program)).problems == ()
+
+
+def test_without_an_instruction_no_model_is_asked_again(tmp_path: Path) -> None:
+    with desk_of(tmp_path, author=Author(HELLO)) as console:
+        session = console.begin(Order(model="author", program=HELLO))
+        assert not until(console, lambda view: view.may_be_approved).may_be_asked_again
+        with pytest.raises(MissionError, match="cannot be asked again"):
+            session.ask_again(repair=False)
+
+
 def test_problems_need_a_word_about_them(console: Console) -> None:
     view = checked(console, BAD)
     session = console.session

@@ -18,7 +18,7 @@ from codebotler.web.console import Console
 from codebotler.web.frame import Frame, PlainText
 
 MOST, MOST_EVENTS = 200, 1_000
-STEPS: Mapping[str, str] = {State.DRAFTING: "Program written", State.RUNNING: "Started"}
+HEADLINES: Mapping[str, str] = {State.DRAFTING: "Program written", State.RUNNING: "Started"}
 """How the timeline names states of a mission, but for those that speak for themselves."""
 
 
@@ -58,7 +58,7 @@ def in_words(line: Line, *, is_first: bool) -> str:
     event = line["event"]
     if event == "state":
         state, reason = line["state"], shortened(line.get("reason", ""))
-        step = "Mission created" if is_first else STEPS.get(state, visible(state).capitalize())
+        step = "Mission created" if is_first else HEADLINES.get(state, visible(state).capitalize())
         if state == State.CHECKED:
             problems = len(line.get("problems", ()))
             step = f"Checked: {counted(problems, 'problem') if problems else 'no problems'}"

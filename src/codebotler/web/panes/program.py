@@ -16,7 +16,6 @@ from codebotler.checking.problems import Check
 from codebotler.core.errors import UserError
 from codebotler.core.skills import SKILLS
 from codebotler.core.terminal import shortened, visible
-from codebotler.missions.log import State
 from codebotler.missions.mission import MissionError
 from codebotler.missions.view import SessionView
 from codebotler.web.console import MOST_PROGRAM, Console
@@ -126,8 +125,8 @@ class ProgramPane:
         self._verdict.say(told)
 
     def _show_approval(self, view: SessionView) -> None:
-        open_ = view.state in {State.DRAFTING, State.CHECKED} and not view.is_over and bool(view.program)
-        may_again = view.may_be_approved and bool(view.model)
+        open_ = view.state is not None and view.state.is_open and not view.is_over and bool(view.program)
+        may_again = view.may_be_asked_again
         self._approval.set_visibility(open_ or self._may_rerun(view))
         self._despite.set_visibility(open_ and bool(view.problems))
         if not view.problems:

@@ -23,7 +23,7 @@ HEADLINES: Mapping[Phase, str] = {
     State.CHECKED: "Ready: waiting for your approval",
     State.APPROVED: "Starting",
 }
-SPOKEN = {**{kind: verb.past for kind, verb in SKILLS.verbs.items()}, ANSWER: "heard"}
+PAST_VERBS = {**{kind: verb.past for kind, verb in SKILLS.verbs.items()}, ANSWER: "heard"}
 MOST_MOMENTS = 60
 
 
@@ -97,8 +97,8 @@ class RobotPane:
             for moment in moments[known:]:
                 with ui.element("li").classes(f"moment moment-{moment.kind}") as row:
                     PlainText("time", f"{moment.clock:.1f} s")
-                    if moment.kind in SPOKEN:
-                        PlainText("small", SPOKEN[moment.kind])
+                    if moment.kind in PAST_VERBS:
+                        PlainText("small", PAST_VERBS[moment.kind])
                     PlainText("span", moment.text, "text")
                 row.move(target_index=0)
 
