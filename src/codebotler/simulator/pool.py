@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from itertools import islice
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from typing import Any, Generic, ParamSpec, Self, TypeVar
 
 from codebotler.simulator.worker import EngineError, Worker
@@ -23,11 +23,13 @@ from codebotler.simulator.worker import EngineError, Worker
 LOG = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses filters of system calls (seccomp)"
 NOT_LINUX = "programs are less isolated here: only Linux has filters of system calls (seccomp)"
+NO_FILTER = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
 
 IN_MEMORY = 8_000_000  # bytes of results
 UNREADABLE = b""  # in the place of a key that could not be read
 FEW, LARGEST = 16, 64  # keys of the first calls and of the last, and of those between
+HEARD_S = 0.5  # seconds after which a signal is heard at the latest
 AHEAD = 2  # calls for each thread that are under way, so that none waits
 MOST_AHEAD = 4_000  # keys read whose results are not yet asked for; a thread may be held up for seconds
 
@@ -62,11 +64,10 @@ class WorkerPool:
     def _start_first(self, *, require_isolation: bool) -> None:
         first = self._new_worker()
         if not first.has_seccomp:
-            missing = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
             if require_isolation:
                 first.close()
-                raise EngineError(missing)
-            LOG.warning(missing)
+                raise EngineError(NO_FILTER)
+            LOG.warning(NO_FILTER)
         self._workers.append(first)
         self._idle.append(first)
 
@@ -178,7 +179,11 @@ def map_batches(
     with ResultFile() as done:
         while True:
             while len(running) < calls and (batch := distinct.batch(workers)):
-                future = submit(list(batch.values()))
+                try:
+                    future = submit(list(batch.values()))
+                except Exception as error:  # noqa: BLE001 - raised after the results of those before
+                    failed.update(dict.fromkeys(batch, error))
+                    continue
                 running[future] = list(batch)
                 future.add_done_callback(ended.put)
             if not waiting:
@@ -189,7 +194,7 @@ def map_batches(
                     raise failed[named]
                 yield done[named]
                 continue
-            future = ended.get()
+            future = _next(ended)
             names = running.pop(future)
             try:
                 results = future.result()
@@ -201,6 +206,13 @@ def map_batches(
                     done[named] = then(result)
                 except Exception as error:  # noqa: BLE001 - the same, for this one alone
                     failed[named] = error
+
+
+def _next(queue: SimpleQueue[Value]) -> Value:
+    """What comes next in a queue; signals are heard meanwhile, which polars keeps from ending a wait."""
+    while True:
+        with contextlib.suppress(Empty):
+            return queue.get(timeout=HEARD_S)
 
 
 class DistinctKeys(Generic[Key]):

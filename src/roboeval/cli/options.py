@@ -285,6 +285,7 @@ def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[
                     return Local(pool)
                 from roboeval.evaluation.processes import Processes
 
+                pool.close()  # it has warned if need be
                 return Processes(workers, **isolation)
 
             yield local

@@ -48,7 +48,8 @@ def metered(doing: str, total: int, before: int = 0) -> Iterator[Callable[[int, 
 
 def _left(done: int, to_do: int, seconds: float) -> str:
     """How long the rest takes, at the rate so far."""
-    return f"{timedelta(seconds=round(seconds * to_do / done))} left" if done and to_do else ""
+    is_telling = to_do and done * 50 >= done + to_do  # at first, what starts takes most of the time
+    return f"{timedelta(seconds=round(seconds * to_do / done))} left" if is_telling else ""
 
 
 def fail(sentence: str) -> NoReturn:

@@ -169,6 +169,29 @@ def test_work_goes_on_while_the_first_result_is_long_in_coming() -> None:
         assert list(results) == [500, *range(1, 600)]
 
 
+WAITS = """
+import os, signal, threading, time
+from concurrent.futures import Future
+import polars  # after which a signal ends no wait
+from codebotler.simulator.pool import map_batches
+
+late = Future()
+threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+threading.Timer(30, late.set_result, ([0],)).start()
+began = time.monotonic()
+try:
+    next(map_batches(lambda _: late, [0], workers=1, name=bytes))
+except KeyboardInterrupt:
+    print(time.monotonic() - began < 10, flush=True)
+    os._exit(0)
+"""
+
+
+def test_a_signal_is_heard_while_a_result_is_waited_for() -> None:
+    told = subprocess.run([sys.executable, "-c", WAITS], check=True, capture_output=True, text=True)
+    assert told.stdout == "True\n"
+
+
 def test_what_was_read_before_the_keys_failed_has_results() -> None:
     def keys() -> Iterator[int]:
         yield from range(20)

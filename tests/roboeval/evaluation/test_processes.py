@@ -10,15 +10,17 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import dedent
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from codebotler.simulator.pool import NO_SECCOMP
+from codebotler.simulator.pool import NO_FILTER
 from codebotler.simulator.worker import EngineError, Worker
 from command_line import ENVIRONMENT, roboeval
 from roboeval.cli import options
-from roboeval.evaluation.engines import Local, Work
+from roboeval.evaluation import engines
+from roboeval.evaluation.engines import Local, Work, own_worker
 from roboeval.evaluation.judge import evaluate
 from roboeval.evaluation.processes import Processes
 from roboeval.evaluation.runs.completions import recorded_completions
@@ -50,9 +52,8 @@ def dies(_: Worker, works: Sequence[Work]) -> list[int]:
     return [0] * len(works)
 
 
-def unfiltered(worker: Worker, works: Sequence[Work]) -> list[str]:
-    worker.has_seccomp = False
-    return [program for _, program in works]
+def are_alone(worker: Worker, works: Sequence[Work]) -> list[bool]:
+    return [worker._one_process_per_run for _ in works]
 
 
 def numbered(count: int) -> list[Work]:
@@ -91,10 +92,45 @@ def test_a_lost_process_is_one_sentence() -> None:
         list(Processes(2).map_distinct(dies, numbered(3), abs))
 
 
-def test_missing_isolation_is_warned_of_once(caplog: pytest.LogCaptureFixture) -> None:
-    with Processes(2) as engine:
-        assert list(engine.map_distinct(unfiltered, numbered(40), str)) == [str(n) for n in range(40)]
-    assert caplog.messages == [NO_SECCOMP]
+def ends_at_the_last(worker: Worker, works: Sequence[Work]) -> list[int]:
+    if works[-1][1] == "99":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return pids(worker, works)
+
+
+def test_what_was_done_before_a_process_was_lost_has_results() -> None:
+    results = Processes(1).map_distinct(ends_at_the_last, numbered(100), abs)
+    assert next(results)
+    with pytest.raises(EngineError, match="was lost"):
+        list(results)
+
+
+def test_each_run_can_have_a_process_of_its_own() -> None:
+    for alone in (False, True):
+        engine = Processes(1, one_process_per_run=alone)
+        assert list(engine.map_distinct(are_alone, numbered(3), bool)) == [alone] * 3
+
+
+def refuses(worker: Worker, works: Sequence[Work]) -> list[int]:
+    own_worker.cache_clear()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(engines, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None))
+        with pytest.raises(EngineError) as refused:
+            own_worker(require_isolation=True)
+    return [str(refused.value) == NO_FILTER] * len(works) if worker.has_seccomp else []
+
+
+def test_missing_isolation_is_refused() -> None:
+    assert list(Processes(1, require_isolation=True).map_distinct(refuses, numbered(1), int)) == [1]
+
+
+def handled(_: Worker, works: Sequence[Work]) -> list[bool]:
+    return [signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ())] * len(works)
+
+
+def test_ctrl_c_is_left_to_the_command() -> None:
+    assert list(Processes(1).map_distinct(handled, numbered(1), bool)) == [True]
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
@@ -139,7 +175,10 @@ def test_many_programs_are_judged_in_processes(monkeypatch: pytest.MonkeyPatch, 
 
     noted(Local)
     noted(Processes)
+    with monkeypatch.context() as patch:
+        patch.setattr("codebotler.simulator.pool.cores", lambda: 2)
+        assert roboeval("evaluate", "recorded:hasty", "--workers", "3").status == 0
     for words in (["--tasks", "SayGoodDay", "--workers", "3"], ["--workers", "2"], ["--workers", "3"]):
         told = roboeval("evaluate", "recorded:hasty", *words, cwd=tmp_path)
         assert told.status == 0, told.err
-    assert chosen == ["Local", "Local", "Processes"]
+    assert chosen == ["Local", "Local", "Local", "Processes"]
