@@ -245,8 +245,8 @@ def test_a_single_text_is_no_list_of_rooms() -> None:
 @pytest.mark.parametrize(
     ("wrong", "named"),
     [
-        ({"samples": 0}, "samples is 0; .* 1 to"),
-        ({"samples": 10**9}, "samples is 1000000000; .* 10,000$"),
+        ({"samples": 0}, "samples must be from 1 to .*, not 0$"),
+        ({"samples": 10**9}, "samples must be .* 10,000, not 1,000,000,000$"),
         ({"behaviours": {"fly": print}}, '"get_current_location" has no behaviour'),
     ],
 )

@@ -77,5 +77,5 @@ def _usage_sentence(error: Any) -> str:  # noqa: ANN401 - one of two libraries' 
     message = message[:1].lower() + message[1:]
     if error.ctx is None:
         return message
-    after = " " if message.endswith("?") else "; "
-    return f"{message}{after}see `{error.ctx.command_path} --help`"
+    see = " See" if message.endswith("?") else "; see"
+    return f"{message}{see} `{error.ctx.command_path} --help`"

@@ -294,7 +294,7 @@ def test_a_command_that_is_none(arguments: tuple[str, ...]) -> None:
 def test_a_question_ends_as_one() -> None:
     refusal = refused("generat")
     assert "generate" in refusal.sentence
-    assert "? `" in refusal.sentence
+    assert "? See `" in refusal.sentence
     assert refusal.commands == ["roboeval --help"]
 
 
