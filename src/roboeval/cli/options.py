@@ -294,4 +294,5 @@ def engine_named(name: str, workers: int | None, **isolation: bool) -> Iterator[
         fail(f'there is no engine "{name}"; use local or ray')
     from roboeval.evaluation.ray import RayCluster
 
-    yield lambda _: RayCluster(workers, **isolation)
+    cluster = RayCluster(workers, **isolation)  # refused before anything is written
+    yield lambda _: cluster
