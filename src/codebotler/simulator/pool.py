@@ -23,7 +23,6 @@ from codebotler.simulator.worker import EngineError, Worker
 LOG = logging.getLogger("codebotler.engine")
 NO_SECCOMP = "programs are less isolated here: the kernel refuses filters of system calls (seccomp)"
 NOT_LINUX = "programs are less isolated here: only Linux has filters of system calls (seccomp)"
-NO_FILTER = NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 ON_WINDOWS = "programs run on Linux and macOS only; on Windows, use WSL"
 
 IN_MEMORY = 8_000_000  # bytes of results
@@ -66,8 +65,8 @@ class WorkerPool:
         if not first.has_seccomp:
             if require_isolation:
                 first.close()
-                raise EngineError(NO_FILTER)
-            LOG.warning(NO_FILTER)
+                raise EngineError(without_filter())
+            LOG.warning(without_filter())
         self._workers.append(first)
         self._idle.append(first)
 
@@ -213,6 +212,11 @@ def _next(queue: SimpleQueue[Value]) -> Value:
     while True:
         with contextlib.suppress(Empty):
             return queue.get(timeout=HEARD_S)
+
+
+def without_filter() -> str:
+    """Why programs are less isolated here."""
+    return NO_SECCOMP if sys.platform == "linux" else NOT_LINUX
 
 
 class DistinctKeys(Generic[Key]):

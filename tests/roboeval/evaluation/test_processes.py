@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from codebotler.simulator.pool import NO_FILTER
+from codebotler.simulator.pool import NO_SECCOMP
 from codebotler.simulator.worker import EngineError, Worker
 from command_line import ENVIRONMENT, roboeval
 from roboeval.cli import options
@@ -117,7 +117,7 @@ def refuses(worker: Worker, works: Sequence[Work]) -> list[int]:
         patch.setattr(engines, "Worker", lambda **_: SimpleNamespace(has_seccomp=False, close=lambda: None))
         with pytest.raises(EngineError) as refused:
             own_worker(require_isolation=True)
-    return [str(refused.value) == NO_FILTER] * len(works) if worker.has_seccomp else []
+    return [str(refused.value) == NO_SECCOMP] * len(works) if worker.has_seccomp else []
 
 
 def test_missing_isolation_is_refused() -> None:
