@@ -14,7 +14,7 @@ EXTRAS = {
     **dict.fromkeys(("anthropic", "google", "httpx", "openai", "pydantic_ai"), "models"),
     **dict.fromkeys(("fastapi", "nicegui", "starlette", "uvicorn"), "page"),
     **dict.fromkeys(("PIL", "mcap", "websockets"), "robots"),
-    **dict.fromkeys(("torch", "transformers"), "transformers"),
+    **dict.fromkeys(("jinja2", "torch", "transformers"), "transformers"),
     "matplotlib": "report",
     "pyrobosim": "pyrobosim",
     "ray": "ray",
