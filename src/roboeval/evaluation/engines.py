@@ -47,12 +47,12 @@ class Local:
         self._given, self._isolation = pool, isolation
 
     def __enter__(self) -> Self:
-        self._threshold = gc.get_threshold()
-        gc.set_threshold(BRIEF, *self._threshold[1:])
         if isinstance(self._given, WorkerPool):
             self._pool = self._given
         else:
             self._pool = WorkerPool(self._given, **self._isolation).__enter__()
+        self._threshold = gc.get_threshold()
+        gc.set_threshold(BRIEF, *self._threshold[1:])
         return self
 
     def __exit__(self, *_: object) -> None:

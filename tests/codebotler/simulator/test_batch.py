@@ -3,9 +3,11 @@
 import json
 import os
 import signal
+import threading
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -13,19 +15,19 @@ from unittest.mock import Mock
 
 import pytest
 
-from codebotler.core.skills import SKILLS, Parameter, Recording, Skill
+from codebotler.core.skills import SKILLS, Parameter, Recording, Skill, SkillTable
 from codebotler.core.trace import Event, Option, RunError, Status, Trace
 from codebotler.core.world import Person, Room, World
-from codebotler.simulator.batches.replay import Replay, Transcript, decoded
+from codebotler.simulator.batches.replay import Replay, Transcript, decoded, key_of
 from codebotler.simulator.isolated_process import IsolatedProcess, LostProcessError, ProtocolError
 from codebotler.simulator.ledger import Ledger, RememberingLedger, SkillAnswer
 from codebotler.simulator.pool import FEW, LARGEST, MOST_AHEAD, DistinctKeys, WorkerPool
 from codebotler.simulator.robot import BEHAVIOURS, Argument, Behaviour, Result, RobotError, SimulatedRobot
 from codebotler.simulator.rules import Limits, Rules
 from codebotler.simulator.sandbox import BATCH_SERVER, FORK_SERVER, MAX_FRAME
-from codebotler.simulator.worker import Job, Worker
+from codebotler.simulator.worker import EngineError, Job, Worker
 from in_process import all_of
-from processes import children_of
+from processes import are_gone, children_of
 
 WORLDS = (
     World((Room("hall", ("mug",)), Room("lab", ("apple",), (Person("amy", ("yes", "no")),))), "hall"),
@@ -284,6 +286,12 @@ def test_runs_that_say_the_same_elsewhere_or_by_other_rules_are_replayed(
     assert list(map(all_of, told)) == [all_of(other_worker.run(says, new)) for new in new_robots]
 
 
+def test_what_one_robot_can_do_is_not_taken_for_granted_of_another() -> None:
+    cannot_say = SkillTable(tuple(skill for skill in SKILLS.rows if skill.name != "say"))
+    robots = robot(), SimulatedRobot(WORLD, RULES, cannot_say)
+    assert len({key_of(b"[]", each) for each in robots}) == 2
+
+
 def test_few_outcomes_are_remembered_and_no_long_ones(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -515,6 +523,25 @@ def test_a_child_that_says_no_more_costs_only_the_program_that_it_ran(
     assert worker.run_tame([job(saying(text), [WORLD]) for text in "abc"]).keys() == {(0, 0), (2, 0)}
 
 
+def test_a_child_that_is_not_believed_ends_at_once(worker: Worker, monkeypatch: pytest.MonkeyPatch) -> None:
+    honest = IsolatedProcess.receive_bytes
+
+    def receive(child: IsolatedProcess, most: int) -> bytes | None:
+        if most != MAX_FRAME:  # from the preparer
+            return honest(child, most)
+        begun.extend(children_of(fork_server))
+        for pid in begun:
+            os.kill(pid, signal.SIGSTOP)  # so that it does not come to an end by itself
+        raise ProtocolError("nonsense")
+
+    begun: list[int] = []
+    fork_server = worker._fork_server(BATCH_SERVER).pid
+    monkeypatch.setattr(IsolatedProcess, "receive_bytes", receive)
+    assert not worker.run_tame([(WAVING["once"], [Waves(lambda *_: "done").robot])])
+    assert len(begun) == 1
+    assert are_gone(set(begun))
+
+
 # --- replay
 
 
@@ -572,6 +599,13 @@ REFUSED: dict[str, Callable[[], object]] = {
     "two moments for one call": lambda: follow([A], [0, 0], [[1, 1.0], [1, 2.0]]),
     "a moment after all calls": lambda: follow([A], [0, 0], [[2, 1.0]]),
     "a moment before all calls": lambda: follow([A], [0, 0], [[-1, 1.0], [1, 2.0]]),
+    "a question for a robot that can answer itself": lambda: follow([["say", ["a"], "ask", None]], [0]),
+    "a look remembered after the time": lambda: follow(
+        [["is_in_room", ["unicorn"], "ok", False]],
+        [0] * 60,
+        [[59, 11.0]],
+        rules=Rules(limits=Limits(seconds=10)),
+    ),
     "time that goes back": lambda: follow([A], [0, 0, 0], [[1, 2.0], [2, 1.0]]),
 }
 
@@ -784,6 +818,36 @@ def test_a_pool_hands_on_that_each_run_has_a_process() -> None:
     for alone, role in ((False, BATCH_SERVER), (True, FORK_SERVER)):
         with WorkerPool(1, one_process_per_run=alone) as pool:
             assert list(pool.here()._fork_servers) == [role]
+
+
+def test_a_pool_that_cannot_start_takes_no_calls(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("codebotler.simulator.pool.Worker", Mock(side_effect=EngineError("no processes")))
+    pool = WorkerPool(1)
+    with pytest.raises(EngineError, match="no processes"), pool:
+        pytest.fail("it has started")
+    with pytest.raises(RuntimeError, match="after shutdown"):
+        pool.submit(print)
+
+
+def test_a_worker_that_starts_while_its_pool_ends_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    first, starts, ends = Mock(), threading.Event(), threading.Event()
+
+    def late(**_: bool) -> Mock:
+        starts.set()
+        assert ends.wait(60)
+        return Mock()
+
+    monkeypatch.setattr("codebotler.simulator.pool.Worker", Mock(return_value=first))
+    pool = WorkerPool(2)
+    with pool:
+        first.stop.side_effect = ends.set
+        assert pool.submit(pool.here).result() is first
+        monkeypatch.setattr(pool, "_new_worker", late)
+        pool._idle.clear()
+        pool._local = threading.local()
+        second: Future[Any] = pool.submit(pool.here)
+        assert starts.wait(60)
+    assert second.result().stop.called
 
 
 def test_calls_are_given_more_and_more_keys_and_equal_ones_once() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import subprocess
@@ -32,6 +33,13 @@ def test_the_rows_are_those_of_threads() -> None:
     completions = list(recorded_completions("recorded:hasty", suite))
     in_threads = list(evaluate(completions, suite, engine=Local(2)))
     assert list(evaluate(completions, suite, engine=Processes(3))) == in_threads
+
+
+def test_python_collects_garbage_as_before_once_judging_has_ended() -> None:
+    before = gc.get_threshold()
+    with Local(1):
+        assert gc.get_threshold() != before
+    assert gc.get_threshold() == before
 
 
 # Called by name in other processes, which can import this module.

@@ -210,7 +210,6 @@ class TranscribedRun(ProgramRun):
         send_frames([data])
         self._forget_calls()
         kind, value, self.now = receive_at_once()
-        self._told = -1.0  # so that the next call tells it again
         if kind == "error":
             self.ledger.errors.append(RobotError(*value[1:]))  # so that later ones have the engine's numbers
             raise robot_error(*value)
