@@ -46,8 +46,10 @@ def verdicts(programs: list[str], task: Task, worlds: list[World] | None = None)
     return [[judge(next(outcomes), scenario) for scenario in scenarios] for _ in programs]
 
 
-def passes(several: Verdicts) -> bool:
-    return all(verdict.satisfied for verdict in several)
+def passes(several: Verdicts, prompt: int | None = None) -> bool:
+    """Whether a program does what a prompt asks for, or any prompt."""
+    prompts = range(5) if prompt is None else [prompt]
+    return any(all(verdict.on(number).satisfied for verdict in several) for number in prompts)
 
 
 @cache
@@ -68,42 +70,83 @@ def test_what_other_checks_misjudge_is_judged_right(name: str) -> None:
     of_task = [known for known in KNOWN if known["task"] == name]
     judged = verdicts([known["program"] for known in of_task], plus().tasks[name])
     wrong = [
-        (known["key"], [(v.world, [r.text for r in v.failed]) for v in several if not v.satisfied][:3])
+        (
+            known["key"],
+            known["about"],
+            [(v.world, [r.text for r in v.failed]) for v in several if not v.satisfied][:3],
+        )
         for known, several in zip(of_task, judged, strict=True)
-        if passes(several) != known["is_right"]
+        if passes(several, known.get("prompt")) != known["is_right"]
     ]
     assert wrong == []
 
 
 # Where solutions are judged otherwise than by the paper, and who is right.
 OTHERWISE = {
-    "puts it down under another name than it was picked up": True,
-    "puts down the bin under another name than it was picked up": True,
-    "puts down something it did not pick under that name": True,
-    "comes back to tell me the choice before bringing the drink": True,
-    "sees what there is in the kitchen before asking": True,
-    "says in an office that it is done": True,
-    "looks for Zarko in the lobby too": True,
-    "one question with the ingredients as options": False,
-    'reports "is not coming" for those who decline, naming them all the same': True,
-    "two lists side by side": False,
-    "goes through the names with an index": False,
-    "looks for her in the other office too": True,
-    "announces the errand before setting out": True,
-    "offers p.m. with full stops, which does not match what Mark answers": True,
-    "looks the offices up by name and returns early": False,
-    "returns to the start between Sally and Mark": True,
-    'says "nobody is here today" in an empty lab': True,
-    "her yes fits none of the friendly answers, so it counts as a no": True,
-    "makes sure that there are staplers in the supply room before it starts looking": True,
-    "one long sentence that names the rooms with and without a stapler together": True,
-    "says that staplers are missing, without any of the words asked for": True,
-    "greets everybody between seeing and asking them": True,
+    "FindBackpack": {
+        "puts it down under another name than it was picked up": True,
+        # Rooms by numbers that nobody told.
+        "numbers the rooms itself": False,
+    },
+    "GetDrink": {
+        "comes back to tell me the choice before bringing the drink": True,
+        "sees what there is in the kitchen before asking": True,
+        "says in an office that it is done": True,
+    },
+    "GrilledCheese": {
+        "looks for Zarko in the lobby too": True,
+        "one question with the ingredients as options": False,
+    },
+    "HalloweenList": {
+        # No word where nobody is in.
+        "plain loop over the rooms": False,
+    },
+    "LunchBreak": {
+        "two lists side by side": False,
+        "goes through the names with an index": False,
+    },
+    "LunchTime": {
+        "looks for her in the other office too": True,
+        "announces the errand before setting out": True,
+        "her yes fits none of the friendly answers, so it counts as a no": True,
+    },
+    "MailDelivery": {
+        "puts down the bin under another name than it was picked up": True,
+    },
+    "MovieMessenger": {
+        "offers p.m. with full stops, which does not match what Mark answers": True,
+        "looks the offices up by name and returns early": False,
+        "returns to the start between Sally and Mark": True,
+    },
+    "SayGoodDay": {
+        'says "nobody is here today" in an empty lab': True,
+    },
+    "StaplerDelivery": {
+        "puts down something it did not pick under that name": True,
+        "makes sure that there are staplers in the supply room before it starts looking": True,
+        # Rooms by numbers that nobody told.
+        "the rooms by their numbers, delivered at once": False,
+    },
+    "StaplerSupply": {
+        # One sentence for all rooms, where each phrasing asks for one a room.
+        "looks into every printer room and lists those without one": False,
+        "a comprehension with a function that looks": False,
+        "separate lists, of which only the one asked for is reported": False,
+        "plain and right": False,
+        "right, builds the sentence while it drives": False,
+        "right, with a generator": False,
+        # Rooms by numbers that nobody told.
+        "numbers the printer rooms and lists the numbers": False,
+    },
+    "WeatherPoll": {
+        # Waits in calls of itself, of which Python allows no thousand.
+        "right, calls itself for the next person": False,
+    },
 }
 
 
-def is_right(solution: Solution) -> bool:
-    return OTHERWISE.get(solution.about, solution.right or solution.fails is None)
+def is_right(solution: Solution, name: str) -> bool:
+    return OTHERWISE.get(name, {}).get(solution.about, solution.right or solution.fails is None)
 
 
 @each_task
@@ -112,10 +155,11 @@ def test_solutions_are_judged_as_they_are_meant(name: str) -> None:
     wrong = [
         (
             one.about,
-            [(v.world, v.outcome.error, v.failed) for v in several if not v.satisfied][:2],
+            [(v.world, v.outcome.error, [r.text for r in v.failed]) for v in several if not v.satisfied][:2],
         )
         for one, several in zip(solutions(task), verdicts_on_solutions(name), strict=True)
-        if passes(several) != is_right(one) or OTHERWISE.get(one.about) == (one.fails is None)
+        if passes(several) != is_right(one, name)
+        or OTHERWISE.get(name, {}).get(one.about) == (one.fails is None)
     ]
     assert wrong == []
 
@@ -154,10 +198,9 @@ def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: 
         for around, (solution, _) in zip(cycle(AROUND), several, strict=False)
     ]
     otherwise = [
-        (program, v.world, [r.text for r in v.failed])
+        (program, [(v.world, [r.text for r in v.failed]) for v in after if not v.satisfied])
         for program, (_, before), after in zip(changed, several, verdicts(changed, task), strict=True)
-        for v, w in zip(after, before, strict=True)
-        if v.satisfied != w.satisfied
+        if passes(before) != passes(after)
     ]
     assert otherwise == []
 
@@ -165,7 +208,7 @@ def test_an_unrelated_look_a_pause_or_a_harmless_sentence_changes_nothing(name: 
 @each_task
 def test_the_order_of_rooms_changes_no_verdict_on_a_right_program(name: str) -> None:
     task = plus().tasks[name]
-    right = [one.program for one in solutions(task) if is_right(one)][::5]
+    right = [one.program for one in solutions(task) if is_right(one, name)][::5]
     random = Random(name)
     worlds = [
         replace(s.world, rooms=tuple(random.sample(s.world.rooms, len(s.world.rooms))))
@@ -181,4 +224,4 @@ def test_worlds_of_another_seed_are_others_and_judge_alike(name: str) -> None:
     chosen = solutions(task)[::9]
     judged = verdicts([one.program for one in chosen], task)
     for one, several in zip(chosen, judged, strict=True):
-        assert passes(several) == is_right(one), one.about
+        assert passes(several) == is_right(one, name), one.about

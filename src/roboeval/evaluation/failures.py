@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 from codebotler.core.trace import Outcome, Status
@@ -81,6 +81,13 @@ class Verdict:
     outcome: Outcome
     failed: tuple[Requirement, ...]  # in the task's order
     satisfied: bool
+
+    def on(self, prompt: int) -> Verdict:
+        """The verdict on the program as one that was written for a prompt."""
+        asked = tuple(requirement for requirement in self.failed if requirement.is_asked_by(prompt))
+        if len(asked) == len(self.failed):
+            return self
+        return replace(self, failed=asked, satisfied=not asked)
 
 
 def failure(verdicts: Sequence[Verdict]) -> Failure | None:

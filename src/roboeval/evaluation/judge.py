@@ -64,11 +64,11 @@ class Remembered(Generic[Value]):
 
 
 MET: Remembered[tuple[bool, ...]] = Remembered()
-JUDGED: Remembered[bytes] = Remembered()
+JUDGED: Remembered[tuple[bytes, ...]] = Remembered()
 
 
 def judge(outcome: Outcome, scenario: Scenario) -> Verdict:
-    """Judge how a run ended in a world.
+    """Judge how a run ended in a world, by all that any prompt asks for.
 
     A run that ended in an error is unsatisfied whatever it did; one that reached a limit is judged by the
     requirements only in a world that may wait for ever.
@@ -158,7 +158,7 @@ def judgements(
                     name_of(completion.key),
                     BUDGET,
                 )
-            yield completion, told
+            yield completion, None if told is None else told[completion.prompt]
 
 
 def _expect_judgeable(completion: object, suite: Suite, *, ablated: bool) -> None:
@@ -184,14 +184,19 @@ def run_in_worlds(
     return [(task, outcomes) for (task, _), outcomes in zip(works, worker.run_all(jobs), strict=True)]
 
 
-def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> bytes | None:
-    """The judgement on a program that ran in all worlds of a task, as JSON; None if it takes too long."""
-    task, outcomes = ran
-    scenarios = suite.tasks[task].judged_in(ablated=ablated)
+def judged(suite: Suite, ran: tuple[str, Sequence[Outcome]], *, ablated: bool) -> tuple[bytes, ...] | None:
+    """The judgements on a program that ran in all worlds of a task, as JSON; None if judging takes too long.
 
-    def found() -> bytes:
+    There is one for each prompt: for which of them a program was written, does not matter before.
+    """
+    name, outcomes = ran
+    task = suite.tasks[name]
+    scenarios = task.judged_in(ablated=ablated)
+
+    def found() -> tuple[bytes, ...]:
         with time_limit(BUDGET):
-            return judgement([judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)])
+            verdicts = [judge(outcome, one) for outcome, one in zip(outcomes, scenarios, strict=True)]
+            return judgements_for(verdicts, len(task.prompts))
 
     try:
         return JUDGED.of(outcomes, scenarios, found)
@@ -208,6 +213,20 @@ def row_line(completion: Completion, told: bytes) -> bytes:
         "program_sha256": completion.program_sha256,
     }
     return b"%b, %b\n" % (to_line(of_whom).removesuffix(b"}\n"), told.removeprefix(b"{"))
+
+
+def judgements_for(verdicts: list[Verdict], prompts: int) -> tuple[bytes, ...]:
+    """The judgements on a program as one written for each prompt; where they are alike, the same object."""
+    told: list[tuple[list[Verdict], bytes]] = []
+    chosen = []
+    for prompt in range(prompts):
+        asked = [verdict.on(prompt) for verdict in verdicts]
+        known = next((data for others, data in told if others == asked), None)
+        if known is None:
+            known = judgement(asked)
+            told.append((asked, known))
+        chosen.append(known)
+    return tuple(chosen)
 
 
 def judgement(verdicts: list[Verdict]) -> bytes:

@@ -48,7 +48,8 @@ def reward(
 
     Args:
         task: its name.
-        prompt: for which phrasing the programs were written, counted from 0; all have the same worlds.
+        prompt: for which phrasing the programs were written, counted from 0; all have the same worlds, and
+            most requirements.
         programs: their sources, which need not even parse; equal ones are judged once.
         worlds: how many worlds to draw, 1 to 10,000, for a suite whose worlds are drawn.
         seed: from which to draw them.
@@ -65,7 +66,7 @@ def reward(
         chosen = chosen.with_worlds(worlds, seed)
     if (problem := unknown((task, prompt, 0), chosen)) is not None:
         raise UserError(problem)
-    return REWARDS.of(chosen, task, programs)
+    return REWARDS.of(chosen, task, first_alike(chosen, task, prompt), programs)
 
 
 @dataclass(frozen=True)
@@ -86,10 +87,19 @@ class Share:
         return cls(fmean(gained) if gained else None, whole * (fmean(kept) if kept else 1.0))
 
 
-@lru_cache(maxsize=32)  # tasks of a suite, twice
-def met_at_start(suite: Suite, task: str) -> list[list[bool]]:
-    """Whether each requirement of each world is met before the robot has done anything."""
-    return [[is_met(one, ()) for one in scenario.require] for scenario in suite.tasks[task].scenarios]
+@lru_cache(maxsize=160)  # prompts of a suite, twice
+def first_alike(suite: Suite, task: str, prompt: int) -> int:
+    """The first prompt that asks for the same as a prompt."""
+    scenarios = suite.tasks[task].scenarios
+    asked = [[scenario.asked_by(number) for scenario in scenarios] for number in range(prompt + 1)]
+    return asked.index(asked[prompt])
+
+
+@lru_cache(maxsize=160)
+def asked_in(suite: Suite, task: str, prompt: int) -> list[tuple[Scenario, list[bool]]]:
+    """What a prompt asks for in each world, and whether that is met before the robot has done anything."""
+    asked = [scenario.asked_by(prompt) for scenario in suite.tasks[task].scenarios]
+    return [(scenario, [is_met(one, ()) for one in scenario.require]) for scenario in asked]
 
 
 def total(shares: Sequence[Share]) -> float:
@@ -112,9 +122,9 @@ class Rewards:
         release = self._lock.release
         os.register_at_fork(before=self._lock.acquire, after_in_parent=release, after_in_child=release)
 
-    def of(self, suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
+    def of(self, suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
         """The rewards of programs, in their order."""
-        names = [digest(suite.digest, task, program) for program in programs]
+        names = [digest(suite.digest, task, str(prompt), program) for program in programs]
         with self._lock:
             rewards = {name: self._known[name] for name in names if name in self._known}
         new = {name: program for name, program in zip(names, programs, strict=True) if name not in rewards}
@@ -122,7 +132,8 @@ class Rewards:
         try:
             pool = shared_pool()
             futures.extend(
-                pool.submit(judged, suite, task, batch) for batch in batches([*new.values()], pool.workers)
+                pool.submit(judged, suite, task, prompt, batch)
+                for batch in batches([*new.values()], pool.workers)
             )
             found = chain.from_iterable(future.result() for future in futures)
             rewards.update(zip(new, found, strict=True))
@@ -144,13 +155,15 @@ def batches(programs: Sequence[str], workers: int) -> list[Sequence[str]]:
     return [programs[start : start + size] for start in range(0, len(programs), size)]
 
 
-def judged(suite: Suite, task: str, programs: Sequence[str]) -> list[float]:
+def judged(suite: Suite, task: str, prompt: int, programs: Sequence[str]) -> list[float]:
     """The rewards of programs, in a thread that has a worker."""
-    scenarios = suite.tasks[task].scenarios
-    robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario in scenarios]
+    asked = asked_in(suite, task, prompt)
+    robots = [partial(SimulatedRobot, scenario.world, suite.rules) for scenario, _ in asked]
     ran = shared_pool().here().run_all([(program, robots) for program in programs])
-    starts = met_at_start(suite, task)
-    return [total([*map(Share.of, outcomes, scenarios, starts)]) for outcomes in ran]
+    return [
+        total([Share.of(outcome, *one) for outcome, one in zip(outcomes, asked, strict=True)])
+        for outcomes in ran
+    ]
 
 
 REWARDS = Rewards()

@@ -13,6 +13,7 @@ from codebotler.rtl import Claim, Number, Regex, Text, Without, Words
 from codebotler.rtl.reasoning.alphabet import elements
 from codebotler.simulator.robot import whole_words
 from roboeval.evaluation.failures import failure
+from roboeval.evaluation.runs.rows import Failure
 from roboeval.linting.backtracking import slow_text
 from roboeval.linting.findings import Finding
 from roboeval.linting.trials import Verdicts
@@ -65,7 +66,7 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
     if task.borrows:  # programs that were written for other requirements
         return
     for solution, judged in zip(solutions(task), verdicts, strict=False):  # an ablation's come afterwards
-        failed = failure(judged)
+        failed = _by_some_prompt(judged, len(task.prompts))
         if (None if failed is None else failed.kind) == solution.fails:
             continue
         said = "pass" if solution.fails is None else f"fail by {solution.fails}"
@@ -75,6 +76,12 @@ def _misjudged(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:
             f"{'passes' if failed is None else 'fails'}{where}; correct the program, its `fails`, or a check"
         )
         yield Finding("misjudged", solution.about, message, task.path, 1)
+
+
+def _by_some_prompt(verdicts: Verdicts, prompts: int) -> Failure | None:
+    """The failure of a program that was written for some prompt; None if it does what one of them asks."""
+    failures = [failure([verdict.on(prompt) for verdict in verdicts]) for prompt in range(prompts)]
+    return None if None in failures else failures[0]
 
 
 def _untripped(task: Task, verdicts: Sequence[Verdicts]) -> Iterator[Finding]:

@@ -15,7 +15,10 @@ Verdicts: TypeAlias = Sequence[Verdict]  # on one program in all worlds of a tas
 
 
 def tried(task: Task, suite: Suite, *, workers: int = 1) -> list[Verdicts]:
-    """Run the solutions of a task in its worlds, and after all of them once more in those of its ablation."""
+    """Run the solutions of a task in its worlds, and after all of them once more in those of its ablation.
+
+    The verdicts are by all requirements, also by those that only some prompts ask for.
+    """
     judges = [worlds for worlds in (task.scenarios, task.ablation) if worlds]
     runs = [(solution.program, worlds) for worlds in judges for solution in solutions(task)]
     pairs = ((program, scenario.world) for program, worlds in runs for scenario in worlds)

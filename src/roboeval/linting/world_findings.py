@@ -166,7 +166,8 @@ class JudgedWorld:
 
 
 def judged_worlds(task: Task) -> Iterator[JudgedWorld]:
-    """The worlds of a task, and behind them those of its ablation."""
+    """The worlds of a task, with what each prompt asks for, and behind them those of its ablation."""
     for ablated in (False, True):
         for number, scenario in enumerate(task.judged_in(ablated=ablated), 1):
-            yield JudgedWorld(task, number, scenario, ablated)
+            for asked in {scenario.asked_by(prompt): None for prompt in range(len(task.prompts))}:
+                yield JudgedWorld(task, number, asked, ablated)

@@ -39,6 +39,9 @@ def mutation_score(
 ) -> MutationScore:
     """Run the solutions of a task and further originals, make mutants of the right ones, and try these.
 
+    An original is right if it does what some prompt asks for. Its mutants are judged by that prompt: of those
+    that fit, the one that asks for most.
+
     Raises UserError if a number of worlds is given, but the suite's are written by hand.
     """
     scenarios = worlds_of(suite, task, worlds, seed)
@@ -53,7 +56,8 @@ def mutation_score(
         return [tuple(run(original.program)) for original in some]
 
     def result(mutant: Mutant) -> Result:
-        found = result_of(run(mutant.program), before[mutant.original], scenarios)
+        original = mutant.original
+        found = result_of(run(mutant.program), before[original], judges[original])
         if found.status is MutantStatus.SURVIVED and mutant.key in equivalent:
             return Result(MutantStatus.EQUIVALENT, why=equivalent[mutant.key])
         return found
@@ -65,8 +69,10 @@ def mutation_score(
     programs = originals(task, further)
     ran = pool.map_distinct(outcomes, programs, name=lambda original: digest(original.program))
     before = dict(zip(programs, watched(ran, f"running {task.name}", len(programs)), strict=True))
-    faults = {original: fault_in(before[original], scenarios) for original in programs}
-    right = tuple(original for original in programs if faults[original] is None)
+    asked = asked_by_prompts(scenarios, len(task.prompts))
+    faults = {original: [fault_in(before[original], one) for one in asked] for original in programs}
+    judges = {original: asked[found.index(None)] for original, found in faults.items() if None in found}
+    right = tuple(original for original in programs if original in judges)
     context = Context.of([scenario.world for scenario in scenarios], task.prompts)
     made = drawn(mutants(right, context), most, seed)
     tried = pool.map_distinct(results_of, made, name=lambda mutant: digest(mutant.program))
@@ -75,7 +81,9 @@ def mutation_score(
         task=task.name,
         worlds=len(scenarios),
         right=right,
-        wrong=tuple((original, fault) for original, fault in faults.items() if fault is not None),
+        wrong=tuple(
+            (original, found[-1]) for original, found in faults.items() if found[-1] and None not in found
+        ),
         mutants=tuple(map(TriedMutant, made, results)),
     )
 
@@ -90,6 +98,12 @@ def worlds_of(suite: Suite, task: Task, count: int | None, seed: int) -> tuple[S
             "leave --worlds out"
         )
     return task.scenarios
+
+
+def asked_by_prompts(scenarios: Sequence[Scenario], prompts: int) -> list[tuple[Scenario, ...]]:
+    """The scenarios with what each prompt asks for; those that ask for most first, and none twice."""
+    asked = {tuple(one.asked_by(prompt) for one in scenarios): None for prompt in range(prompts)}
+    return sorted(asked, key=lambda some: -sum(len(one.require) for one in some))
 
 
 def fault_in(outcomes: Sequence[Outcome], scenarios: Sequence[Scenario]) -> Result | None:

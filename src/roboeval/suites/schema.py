@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from codebotler.core.world_file import AnswerFile, Name, Pattern, PersonFile, Text, WorldFile
 from codebotler.simulator.rules import Limits, Rules
@@ -61,6 +61,26 @@ class Fact(_Form):
     commonsense: bool = False
 
 
+class RequirementFile(_Form):
+    """A requirement as a task file writes it: a text, or a mapping if only some prompts ask for it.
+
+    Args:
+        check: the check, perhaps with `not`, and in drawn worlds with `for` or `if`.
+        prompts: by the number of each prompt that asks for it, counted from 0, the words that do.
+    """
+
+    check: Text
+    prompts: Annotated[dict[int, Text], Field(min_length=1)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_text(cls, data: object) -> object:
+        return {"check": data} if isinstance(data, str) else data
+
+
+Require = Annotated[list[RequirementFile], Field(min_length=1)]
+
+
 class Accepted(_Form):
     """A finding of the linter that is there on purpose, and why."""
 
@@ -72,8 +92,8 @@ class ScenarioFile(WorldFile):
     """A world with its requirements as a task file writes it."""
 
     about: Name
-    require: Annotated[list[Text], Field(min_length=1)]
-    ablation: list[Text] | None = None
+    require: Require
+    ablation: list[RequirementFile] | None = None
     ablation_people: dict[str, list[PersonFile]] | None = None
 
 
@@ -111,7 +131,7 @@ class CornerFile(_Form):
 class DrawnWorldsFile(_Form):
     """What the worlds of a task have in common, and what may differ."""
 
-    robot: Name
+    robot: Levels
     rooms: Annotated[list[Name], Field(min_length=1)]
     people: dict[Name, DrawnPersonFile] = {}
     things: dict[Name, DrawnThingFile] = {}
@@ -141,7 +161,7 @@ class DrawnTaskFile(_AnyTaskFile):
     worlds: DrawnWorldsFile
     let: dict[Name, Annotated[str, BeforeValidator(str)]] = {}
     phrases: dict[Name, Annotated[tuple[Name, ...], Field(min_length=1)]] = {}
-    require: Annotated[list[Text], Field(min_length=1)]
+    require: Require
 
 
 class LimitsFile(_Form):

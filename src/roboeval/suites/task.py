@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from codebotler.core.words import counted
@@ -21,6 +21,7 @@ class Requirement:
         formula: the constraint, negated where the text says so.
         category: the class of failure if it does not hold.
         line: where it stands in the task file.
+        words: by the number of each prompt that asks for it, what it says there; empty if all prompts do.
     """
 
     text: str
@@ -28,6 +29,11 @@ class Requirement:
     formula: Formula = field(repr=False)
     category: Category
     line: int | None = None
+    words: tuple[tuple[int, str], ...] = field(default=(), repr=False)
+
+    def is_asked_by(self, prompt: int) -> bool:
+        """Whether a prompt asks for it."""
+        return not self.words or any(number == prompt for number, _ in self.words)
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,10 @@ class Scenario:
 
     world: World
     require: tuple[Requirement, ...]
+
+    def asked_by(self, prompt: int) -> Scenario:
+        """The same with what a prompt asks for, and no other requirements."""
+        return replace(self, require=tuple(one for one in self.require if one.is_asked_by(prompt)))
 
     def __repr__(self) -> str:
         return f"Scenario({self.world!r}, {counted(len(self.require), 'requirement')})"
@@ -73,7 +83,7 @@ class Task:
         prompts: phrasings of the same instruction.
         facts: what the requirements rest on.
         checks: the named constraints.
-        scenarios: the worlds with their requirements.
+        scenarios: the worlds with their requirements, also those that only some prompts ask for.
         ablation: the same with the requirements of common sense only; None where the task has none.
         accepted: findings of the linter that are there on purpose.
         path: the file it was read from.

@@ -13,12 +13,13 @@ from codebotler.core.program import parse_expression
 from codebotler.core.skills import SKILLS, SkillTable
 from codebotler.core.yaml_files import Place, YamlFile
 from codebotler.rtl import RtlSyntaxError, parse
-from roboeval.suites.schema import DrawnTaskFile, ScenarioFile, TaskFile
+from roboeval.suites.schema import DrawnTaskFile, RequirementFile, ScenarioFile, TaskFile
 from roboeval.suites.task import Check, Requirement, Scenario, Task
 from roboeval.suites.worlds import WorldSampler
 
 LENT = ("summary", "abilities", "prompts")
 PEOPLE = "people"  # in checks of drawn worlds: any person or word for people
+START = "start"  # in checks: the room in which the robot starts
 
 _PARAMETER = r" *[^\W\d]\w* *"
 _HEAD = re.compile(rf"(\w+)(?:\(({_PARAMETER}(?:,{_PARAMETER})*)\))?")
@@ -103,7 +104,7 @@ def _phrases(form: DrawnTaskFile, file: YamlFile, words: Sequence[str]) -> dict[
     names = [person.name or key for key, person in form.worlds.people.items()]
     phrases = {PEOPLE: rf"(?:{'|'.join([*words, *names])})s?"}
     for name, regexes in form.phrases.items():
-        if not name.isidentifier() or name == PEOPLE:
+        if not name.isidentifier() or name in {PEOPLE, START}:
             raise file.wrong(f'"{name}" cannot name phrases; choose another word', "phrases", name)
         if not any(f"{{{name}}}" in check.rtl for check in form.checks.values()):
             raise file.wrong(f'no check uses the phrases "{name}"; write {{{name}}} in one', "phrases", name)
@@ -138,7 +139,7 @@ class _Reader:
         if again := next((p for n, p in enumerate(parameters) if p in parameters[:n]), None):
             raise wrong(f'the check "{name}" has two parameters "{again}"; rename one')
         for used in re.findall(r"\{([^\W\d]\w*)\}", body.rtl):
-            if used not in parameters and used not in self.phrases:
+            if used not in parameters and used not in self.phrases and used != START:
                 known = f"its parameters are: {', '.join(parameters)}" if parameters else "it takes none"
                 raise wrong(f'the check "{name}" has no parameter "{used}"; {known}', "rtl")
         if unused := next((p for p in parameters if f"{{{p}}}" not in body.rtl), None):
@@ -152,7 +153,8 @@ class _Reader:
     def listed(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
         for number, world in enumerate(worlds):
             at = ("worlds", number)
-            yield Scenario(world.world(self.file, at), self._requirements(world.require, (*at, "require")))
+            require = self._requirements(world.require, world.robot, (*at, "require"))
+            yield Scenario(world.world(self.file, at), require)
 
     def ablated(self, worlds: Sequence[ScenarioFile]) -> Iterator[Scenario]:
         if any(world.ablation is None for world in worlds):
@@ -161,23 +163,32 @@ class _Reader:
             at = ("worlds", number)
             people = form.people if form.ablation_people is None else form.ablation_people
             world = form.model_copy(update={"people": people}).world(self.file, at)
-            yield Scenario(world, self._requirements(form.ablation or [], (*at, "ablation")))
+            require = self._requirements(form.ablation or [], world.robot, (*at, "ablation"))
+            yield Scenario(world, require)
 
     def drawn(self, sampler: WorldSampler, count: int, seed: int) -> Iterator[Scenario]:
-        known: dict[tuple[str, int], Requirement] = {}
+        known: dict[tuple[str, int, str], Requirement] = {}
         for setting in sampler.settings(count, seed):
-            require = [*sampler.requirements(setting)]
-            for text, number in require:
-                if (text, number) not in known:
-                    known[text, number] = self._requirement(text, ("require", number))
+            require = [(text, number, setting.start) for text, number in sampler.requirements(setting)]
+            for text, number, start in require:
+                if (text, number, start) not in known:
+                    at, form = ("require", number), sampler.form.require[number]
+                    known[text, number, start] = self._requirement(text, form.prompts, start, at)
             yield Scenario(sampler.world(setting), tuple(known[one] for one in require))
 
     # --- requirements
 
-    def _requirements(self, texts: Sequence[str], at: Place) -> tuple[Requirement, ...]:
-        return tuple(self._requirement(text, (*at, index)) for index, text in enumerate(texts))
+    def _requirements(
+        self, forms: Sequence[RequirementFile], start: str, at: Place
+    ) -> tuple[Requirement, ...]:
+        return tuple(
+            self._requirement(form.check, form.prompts, start, (*at, index))
+            for index, form in enumerate(forms)
+        )
 
-    def _requirement(self, text: str, at: Place) -> Requirement:
+    def _requirement(
+        self, text: str, prompts: Mapping[int, str] | None, start: str, at: Place
+    ) -> Requirement:
         bare = text.strip().removeprefix("not ")
         name, arguments = self._call(text, bare, at)
         check = self.checks.get(name)
@@ -189,14 +200,27 @@ class _Reader:
                 f'the check "{name}" takes {takes}, but "{text}" gives {len(arguments)}', *at
             )
         rtl = check.rtl
-        for word, replacement in (*self.phrases.items(), *zip(check.parameters, arguments, strict=True)):
+        given = zip(check.parameters, arguments, strict=True)
+        for word, replacement in (*self.phrases.items(), (START, start), *given):
             rtl = rtl.replace(f"{{{word}}}", replacement)
         try:
             formula = parse(f"not ({rtl})" if bare != text.strip() else rtl, skills=self.skills)
         except RtlSyntaxError as error:
             sentence = f'the check "{name}" is not a valid formula ({error})'
             raise UserError(sentence, file=self.file.name, line=check.line) from None
-        return Requirement(text, name, formula, check.category, self.file.line(at))
+        words = self._words(prompts or {}, (*at, "prompts"))
+        return Requirement(text, name, formula, check.category, self.file.line(at), words)
+
+    def _words(self, prompts: Mapping[int, str], at: Place) -> tuple[tuple[int, str], ...]:
+        """The words of prompts on which a requirement rests, which must stand in them."""
+        known = self.form.prompts
+        for number, words in prompts.items():
+            if not 0 <= number < len(known):
+                raise self.file.wrong(f"there is no prompt {number}; they are 0 to {len(known) - 1}", *at)
+            if " ".join(words.split()).lower() not in " ".join(known[number].split()).lower():
+                sentence = f'prompt {number} does not say "{words}"; quote it word for word'
+                raise self.file.wrong(sentence, *at, number)
+        return tuple(prompts.items())
 
     def _call(self, text: str, bare: str, at: Place) -> tuple[str, list[str]]:
         try:

@@ -23,6 +23,7 @@ from roboeval.suites.schema import NOWHERE, CornerFile, DrawnTaskFile, DrawnWorl
 
 Level: TypeAlias = str | int  # a room, an answer, a position among options, a number of looks
 
+ROBOT = "robot"  # the factor that is the room in which it starts
 _TRIES = 50  # draws for a world that is not there yet
 
 
@@ -38,6 +39,11 @@ class Setting:
         """The room of a person or thing; empty if nowhere."""
         room = str(self.chosen[f"{name}.in"])
         return "" if room == NOWHERE else room
+
+    @property
+    def start(self) -> str:
+        """The room in which the robot starts."""
+        return str(self.chosen[ROBOT])
 
     @property
     def identity(self) -> tuple[object, ...]:
@@ -62,7 +68,7 @@ class WorldSampler:
     @cached_property
     def factors(self) -> dict[str, tuple[Level, ...]]:
         """The levels of each factor, such as `alice.in` and `alice.answer 1`."""
-        found: dict[str, tuple[Level, ...]] = {}
+        found = {ROBOT: self._rooms(self.described.robot, ROBOT)}
         for name, person in self.described.people.items():
             found[f"{name}.in"] = self._rooms(person.where, "people", name, "in")
             for number, answers in enumerate(person.answers, 1):
@@ -79,10 +85,10 @@ class WorldSampler:
         return {factor: len(levels) for factor, levels in self.factors.items() if len(levels) > 1}
 
     def _rooms(self, where: str | list[str], *place: str) -> tuple[Level, ...]:
-        known = self.described.rooms
+        known = self.described.rooms if place == (ROBOT,) else [*self.described.rooms, NOWHERE]
         for room in _levels(where):
-            if room not in (*known, NOWHERE):
-                sentence = f'there is no room "{room}"; there is {", ".join(known)} and {NOWHERE}'
+            if room not in known:
+                sentence = f'there is no room "{room}"; there is {", ".join(known[:-1])} and {known[-1]}'
                 raise self.file.wrong(sentence, "worlds", *place)
         return _levels(where)
 
@@ -139,6 +145,8 @@ class WorldSampler:
             details += [_detail(factor, chosen[factor]) for factor in free if factor != f"{name}.in"]
             if details or len(levels) > 1:
                 parts.append(f"{name} {', '.join(details) or 'in'}")
+        if ROBOT in self._free:
+            parts.append(f"robot in {chosen[ROBOT]}")
         return "; ".join(parts) or "rooms in another order"
 
     # --- what follows from a setting
@@ -155,14 +163,14 @@ class WorldSampler:
         if isinstance(wait, str):
             with self._located("worlds", "may_wait_forever"):
                 wait = bool(value(parsed(wait), self._names(setting)))
-        return World(tuple(rooms), self.described.robot, setting.about, wait)
+        return World(tuple(rooms), setting.start, setting.about, wait)
 
     def requirements(self, setting: Setting) -> Iterator[tuple[str, int]]:
         """The requirements of a world, as a task that lists its worlds would write them, with their entry."""
         names = self._names(setting)
-        for number, text in enumerate(self.form.require):
+        for number, form in enumerate(self.form.require):
             with self._located("require", number):
-                yield from ((one, number) for one in _required(text, names))
+                yield from ((one, number) for one in _required(form.check, names))
 
     def _person(self, name: str, setting: Setting) -> Person:
         form, chosen = self.described.people[name], setting.chosen
@@ -181,6 +189,7 @@ class WorldSampler:
             answered = {"answers": one.answers, "topics": dict(one.topics), "after_looks": one.after_looks}
             people.append(SimpleNamespace(name=name, room=setting.room(name), **answered))
         names: dict[str, Any] = {"people": people, "things": self._things(setting), "rooms": setting.rooms}
+        names["start"] = setting.start
         for name, text in self.form.let.items():
             with self._located("let", name):
                 names[name] = value(parsed(text), names)

@@ -1,5 +1,6 @@
 """What is right and wrong: errors, limits, worlds that may wait, options that cannot be judged."""
 
+import logging
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,13 @@ from codebotler.core.trace import Event, Option, Outcome, RunError, Status, Trac
 from codebotler.core.world import Room, World
 from codebotler.rtl import holds
 from codebotler.rtl.formulas import Formula
+from codebotler.simulator.worker import EVENTS
 from roboeval.evaluation.failures import Verdict, failure
 from roboeval.evaluation.judge import LONGEST_REMEMBERED, evaluate, judge
 from roboeval.evaluation.runs.completions import Completion
 from roboeval.evaluation.runs.rows import Failure, Row
 from roboeval.suites.load import Scenario, Suite, load_suite
+from small_suite import a_suite
 
 SUITE = "name: mine\nversion: 1\n"
 TASK = """\
@@ -51,6 +54,33 @@ def suite(tmp_path: Path) -> Suite:
 def judged(suite: Suite, *programs: str) -> list[Row]:
     completions = [Completion(task="T", prompt=0, index=i, program=p) for i, p in enumerate(programs)]
     return list(evaluate(completions, suite, workers=2))
+
+
+def test_a_program_is_judged_by_what_its_prompt_asks_for(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    task = TASK.replace("[p]", "[p, p and not a word, p in silence]").replace(
+        '[goes, says("hi"), not asks]',
+        """[goes, not asks, {check: 'not says("hi")', prompts: {1: not a word, 2: silence}}]""",
+    )
+    assert task != TASK
+    suite = load_suite(a_suite(tmp_path, task))
+    says, errs = (
+        f"def task_program():\n    go_to('kitchen')\n    {last}\n" for last in ("say('hi')", "say(1)")
+    )
+    completions = [
+        Completion(task="T", prompt=prompt, index=0, program=program)
+        for prompt in range(3)
+        for program in (says, errs)
+    ]
+    with caplog.at_level(logging.DEBUG, logger=EVENTS.name):
+        rows = list(evaluate(completions, suite))
+    assert [row["passed"] for row in rows[::2]] == [True, False, False]
+    assert [row["verdicts"][0]["failed_checks"] for row in rows[::2]] == [[], *[['not says("hi")']] * 2]
+    assert [row["verdicts"][0]["satisfied"] for row in rows] == [True, *[False] * 5]
+    assert [row["failure"] for row in rows[1::2]] == [rows[1]["failure"]] * 3
+    started = [record for record in caplog.records if record.getMessage().endswith("started")]
+    assert len(started) == 2 * 2  # each program once in each world
 
 
 def first_failure(suite: Suite, program: str) -> dict[str, Any] | None:

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -24,9 +25,10 @@ from codebotler.simulator.pool import shared_pool
 from codebotler.simulator.worker import EVENTS, Worker
 from processes import are_gone, children_of
 from roboeval.evaluation.judge import evaluate, is_met
-from roboeval.evaluation.rewards import Share, batches, reward, total
+from roboeval.evaluation.rewards import Share, batches, first_alike, reward, total
 from roboeval.evaluation.runs.completions import recorded_completions
 from roboeval.suites.load import Suite, load_suite
+from small_suite import a_suite
 
 RIGHT = """
 def task_program():
@@ -105,6 +107,28 @@ def test_equal_programs_are_judged_once(caplog: pytest.LogCaptureFixture) -> Non
         assert reward("SayGoodDay", 3, [program]) == first[:1] == [1.0]
     started = [record for record in caplog.records if record.getMessage().endswith("started")]
     assert len(started) == 4  # one a world
+
+
+def test_each_prompt_is_rewarded_for_what_it_asks(tmp_path: Path) -> None:
+    task = """\
+name: T
+summary: s
+prompts: [Go., Go and say nothing., Go.]
+checks:
+  goes: {category: Location, rtl: 'tr.Exists(goto("lab"))'}
+  says: {category: SayAtLocation, rtl: 'tr.Exists(say("x"))'}
+worlds:
+  - about: w
+    robot: hall
+    rooms: [hall, lab]
+    require: [goes, {check: not says, prompts: {1: say nothing}}]
+"""
+    suite, program = (
+        load_suite(a_suite(tmp_path, task)),
+        "def task_program():\n    go_to('lab')\n    say('x')\n",
+    )
+    assert [reward("T", prompt, [program], suite=suite) for prompt in range(3)] == [[1.0], [0.0], [1.0]]
+    assert [first_alike(suite, "T", prompt) for prompt in range(3)] == [0, 1, 0]
 
 
 def test_it_may_be_called_from_many_threads_at_once() -> None:

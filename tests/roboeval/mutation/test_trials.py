@@ -101,6 +101,28 @@ def test_an_original_that_is_wrong_says_where(suite: Suite, task: Task, pool: Wo
     )
 
 
+def test_mutants_are_judged_by_the_prompt_that_asks_most_of_what_their_original_does(
+    tmp_path: Path, pool: WorkerPool
+) -> None:
+    asks_twice = (
+        TASK.replace("[p]", "[p, p twice, p thrice]")
+        .replace("says: {", "twice: {category: Location, rtl: 'tr.AtLeast(goto(\"kitchen\"), 2)'}\n  says: {")
+        .replace("thrice", "thrice and bye", 1)
+        .replace(
+            "[goes,", "[goes, {check: twice, prompts: {1: twice}}, {check: says, prompts: {2: and bye}},"
+        )
+        .replace("not says]", "{check: not says, prompts: {0: p, 1: p}}]")
+    )
+    suite = load_suite(a_suite(tmp_path, asks_twice))
+    twice = Original(
+        "twice", RIGHT.program.replace("    if is", "    go_to('hall')\n    go_to('kitchen')\n    if is")
+    )
+    score = mutation_score(suite.task("T"), suite, pool, further=[RIGHT, twice])
+    assert score.right == (RIGHT, twice)
+    drops = [one.result for one in score.mutants if one.mutant.operator == "drop-a-drive"]
+    assert {result.why for result in drops} >= {"goes", "twice"}
+
+
 # --- the score
 
 

@@ -20,6 +20,23 @@ def test_a_requirement_is_its_check_with_the_arguments_filled_in(tmp_path: Path)
     assert (not_bye.text, not_bye.check, not_bye.category) == ('not says("bye")', "says", "SayAtLocation")
 
 
+def test_a_requirement_may_rest_on_the_words_of_some_prompts(tmp_path: Path) -> None:
+    task = TASK.replace("[p]", "[p, Please say  bye to nobody.]").replace(
+        """not says("bye")]""", """{check: 'not says("bye")', prompts: {1: say bye to NOBODY}}]"""
+    )
+    assert task != TASK
+    (scenario,) = load_suite(a_suite(tmp_path, task)).task("T").scenarios
+    goes, not_bye = scenario.require
+    assert (goes.words, not_bye.words) == ((), ((1, "say bye to NOBODY"),))
+    assert [scenario.asked_by(prompt).require for prompt in range(2)] == [(goes,), (goes, not_bye)]
+
+
+def test_a_check_may_name_where_the_robot_starts(tmp_path: Path) -> None:
+    task = TASK.replace('goto("kitchen")', 'at("{start}", check("x"))')
+    goes, _ = load_suite(a_suite(tmp_path, task)).task("T").scenarios[0].require
+    assert goes.formula == parse('tr.Exists(at("kitchen", check("x")))')
+
+
 def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
     task = TASK.replace(
         """'tr.Exists(say("{what}"))'""", """'tr.Exists(say("a")) or tr.Exists(say("{what}"))'"""
@@ -50,6 +67,11 @@ def test_a_negated_disjunction_is_negated_as_a_whole(tmp_path: Path) -> None:
             7,
             "ablation",
         ),
+        ("[goes,", "[{check: goes, prompts: {0: hello}},", 11, 'prompt 0 does not say "hello"'),
+        ("[goes,", "[{check: goes, prompts: {1: p}},", 11, "there is no prompt 1"),
+        ("[goes,", "[{check: goes, prompts: {}},", 11, '"prompts" has too few entries'),
+        ("[goes,", "[{prompts: {0: p}},", 11, '"check" is missing'),
+        ("[goes,", "[{check: goes, prompt: {0: p}},", 11, '"prompt" is unknown'),
         ('say("{what}")', 'say("{waht}")', 6, '"waht"'),
         ("tr.Exists(goto(", 'tr.Exists(goto("{room}",', 5, '"room"'),
         ('say("{what}")', 'say("x{3}")', 6, "{what}"),

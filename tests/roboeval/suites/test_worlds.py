@@ -90,6 +90,23 @@ def test_worlds_are_drawn_from_a_description(tmp_path: Path) -> None:
     assert "lou|louise" in str(two.require[-1].formula)
 
 
+def test_the_robot_may_start_in_one_of_several_rooms(tmp_path: Path) -> None:
+    task = (
+        TASK.replace("robot: hall", "robot: [hall, lab]")
+        .replace('{"*.in": nowhere}', '{"*.in": nowhere, robot: lab}')
+        .replace('p.room != "hall"', "p.room != start")
+        .replace('tr.Exists(check(r"\\b{people}\\b"))', 'tr.Exists(at("{start}", check("tea")))')
+    )
+    scenarios = load_suite(str(suite(tmp_path, task))).tasks["Tea"].scenarios
+    starts = [scenario.world.robot for scenario in scenarios]
+    assert starts[:2] == ["lab", "hall"]
+    assert {*starts[2:]} == {"hall", "lab"}
+    for scenario, start in zip(scenarios, starts, strict=True):
+        assert f'at("{start}", check("tea"))' in str(scenario.require[-1].formula)
+        assert not any(r.text.startswith(f'tells("{start}"') for r in scenario.require)
+        assert start == "hall" or f"robot in {start}" in scenario.world.about or scenario is scenarios[0]
+
+
 def test_the_same_seed_draws_the_same_worlds_and_another_draws_others(tmp_path: Path) -> None:
     mine = load_suite(str(suite(tmp_path)))
     again, other, more = mine.with_worlds(12, 3), mine.with_worlds(seed=4), mine.with_worlds(40)
@@ -162,6 +179,8 @@ def test_phrases_that_cannot_be(tmp_path: Path, good: str, bad: str, named: list
         ('p.topics["tea"]', 'p.topics["milk"]', 18, "cannot be computed"),
         ("if p.room]'", "if p.age]'", 17, '".age"'),
         ("{option: -1}", "{option: 0}", 8, "no option 0"),
+        ("robot: hall", "robot: [hall, attic]", 5, '"attic"'),
+        ("robot: hall", "robot: [hall, nowhere]", 5, '"nowhere"'),
     ],
 )
 def test_mistakes_are_told_with_their_line(
